@@ -1,0 +1,2 @@
+//! host-fit
+fn main(){}

@@ -1,2 +1,2 @@
 //! host-fit
-fn main(){}
+fn main() {}

@@ -1,0 +1,202 @@
+//! What a physical effect is.
+//!
+//! The signals run in the order of the physics: command → jets → transport
+//! delay → flow → sensor. An effect acts at one place and leaves the recursion
+//! alone: it shapes the jet strength before the delay, adds to what drives the
+//! flow, or changes what the sensor shows of the flow.
+
+use crate::delay::DelayLaw;
+use crate::real::Real;
+
+/// Where an effect acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Place {
+    /// Between the command and the jets.
+    Jet,
+    /// In the transport from jets to sensor.
+    Delay,
+    /// In the recursion of the flow.
+    Flow,
+    /// In what is measured; outside the recursion.
+    Sensor,
+}
+
+/// How a parameter enters, for whoever searches it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Influence {
+    /// The output has a derivative in it.
+    Smooth,
+    /// The output changes in steps (a threshold, a rounded delay).
+    Stepwise,
+}
+
+/// A physical parameter of an effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// Name in model files and reports.
+    pub name: &'static str,
+    /// Unit in words; "-" for none.
+    pub unit: &'static str,
+    /// Lowest value that makes sense.
+    pub low: f64,
+    /// Highest value that makes sense.
+    pub high: f64,
+    /// Values from which a search should set out; between the bounds.
+    pub starts: &'static [f64],
+    /// How it enters.
+    pub influence: Influence,
+}
+
+impl Parameter {
+    /// Whether it spans orders of magnitude and is best searched in its logarithm.
+    #[must_use]
+    pub fn is_logarithmic(&self) -> bool {
+        self.low > 0.0 && self.high > 20.0 * self.low
+    }
+}
+
+/// The identity card of an effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spec {
+    /// Name in commands, model files and reports.
+    pub name: &'static str,
+    /// Rust path of the effect below `model_core::effects`, for generated code.
+    pub rust: &'static str,
+    /// Where it acts.
+    pub place: Place,
+    /// The physics in one line.
+    pub summary: &'static str,
+    /// The continuous-time equation.
+    pub equation: &'static str,
+    /// Its parameters, in the order of [`Physics::new`].
+    pub parameters: &'static [Parameter],
+    /// The measured channel it needs besides u and y.
+    pub channel: Option<&'static str>,
+    /// Where to read more.
+    pub source: &'static str,
+}
+
+/// What an effect is told about the rig.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting<T> {
+    /// Sample period, s.
+    pub period: T,
+    /// Which of the [`Instant::channels`] belongs to the effect.
+    pub channel: usize,
+    /// The reference of that channel, usually its mean, in its own unit.
+    pub reference: T,
+}
+
+/// What an effect sees at a sample, besides its own place.
+#[derive(Clone, Copy, Debug)]
+pub struct Instant<'a, T> {
+    /// The command u_k.
+    pub command: T,
+    /// The jet strength that arrives at the flow at this sample.
+    pub arrived: T,
+    /// Measured channels, in the order of the model's settings.
+    pub channels: &'a [T],
+}
+
+/// What a flow effect sees at a sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Flow<T> {
+    /// s_k, the friction now.
+    pub now: T,
+    /// s_{k−1}.
+    pub before: T,
+    /// 1 − Σa − Σc·j, per sample: turns an equilibrium level into a drive.
+    pub relaxation: T,
+}
+
+/// A physical effect, prepared for a sample period.
+///
+/// Parameters and state are apart: the effect itself is constant, `State` is
+/// plain data. Every hook passes its signal through unless the effect acts there.
+pub trait Effect<T: Real> {
+    /// What the effect remembers.
+    type State: Clone;
+
+    /// The state at the record's start: at rest.
+    fn start(&self) -> Self::State;
+
+    /// Shapes the jet strength; called once a sample, before the delay.
+    #[inline]
+    fn jet(&self, _state: &mut Self::State, jet: T, _at: &Instant<'_, T>) -> T {
+        jet
+    }
+
+    /// Whether [`drive`](Self::drive) does anything.
+    #[inline]
+    fn drives(&self) -> bool {
+        false
+    }
+
+    /// What is added to s_{k+1}; called once a sample.
+    #[inline]
+    fn drive(&self, _state: &mut Self::State, _flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
+        T::ZERO
+    }
+
+    /// What the sensor shows of `signal`; called once a sample.
+    #[inline]
+    fn sense(&self, _state: &mut Self::State, signal: T, _at: &Instant<'_, T>) -> T {
+        signal
+    }
+}
+
+/// An effect with physical parameters: what one file of
+/// [`effects`](crate::effects) defines.
+pub trait Physics<T: Real>: Sized {
+    /// The effect's identity card.
+    const SPEC: Spec;
+
+    /// Prepares the effect. `parameters` are in the units and the order of
+    /// `SPEC.parameters`; missing ones count as 0.
+    fn new(parameters: &[T], setting: &Setting<T>) -> Self;
+}
+
+/// A delay law that is in the catalogue of effects.
+pub trait DelayPhysics<T: Real>: Physics<T> + DelayLaw<T> {}
+impl<T: Real, L: Physics<T> + DelayLaw<T>> DelayPhysics<T> for L {}
+
+/// The first `N` parameters; missing ones are 0.
+pub(crate) fn take<T: Real, const N: usize>(parameters: &[T]) -> [T; N] {
+    core::array::from_fn(|i| parameters.get(i).copied().unwrap_or(T::ZERO))
+}
+
+/// No effect.
+impl<T: Real> Effect<T> for () {
+    type State = ();
+    #[inline]
+    fn start(&self) {}
+}
+
+/// Two effects, one after the other; nest pairs for more.
+impl<T: Real, A: Effect<T>, B: Effect<T>> Effect<T> for (A, B) {
+    type State = (A::State, B::State);
+
+    #[inline]
+    fn start(&self) -> Self::State {
+        (self.0.start(), self.1.start())
+    }
+    #[inline]
+    fn jet(&self, state: &mut Self::State, jet: T, at: &Instant<'_, T>) -> T {
+        let jet = self.0.jet(&mut state.0, jet, at);
+        self.1.jet(&mut state.1, jet, at)
+    }
+    #[inline]
+    fn drives(&self) -> bool {
+        self.0.drives() || self.1.drives()
+    }
+    #[inline]
+    fn drive(&self, state: &mut Self::State, flow: &Flow<T>, at: &Instant<'_, T>) -> T {
+        let first = self.0.drive(&mut state.0, flow, at);
+        first + self.1.drive(&mut state.1, flow, at)
+    }
+    #[inline]
+    fn sense(&self, state: &mut Self::State, signal: T, at: &Instant<'_, T>) -> T {
+        let signal = self.0.sense(&mut state.0, signal, at);
+        self.1.sense(&mut state.1, signal, at)
+    }
+}

@@ -1,0 +1,63 @@
+//! The hot-film and its substrate take time to follow the friction.
+
+use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::real::Real;
+
+
+/// τ·ẏ = s − y, exact for a friction that runs straight between samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HotFilmLag<T> {
+    kept: T,
+    from_before: T,
+    from_now: T,
+}
+
+/// What the film shows and what it was shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Film<T> {
+    shown: T,
+    signal: T,
+}
+
+impl<T: Real> Effect<T> for HotFilmLag<T> {
+    type State = Film<T>;
+    fn start(&self) -> Film<T> {
+        Film {
+            shown: T::ZERO,
+            signal: T::ZERO,
+        }
+    }
+    #[inline]
+    fn sense(&self, film: &mut Film<T>, signal: T, _at: &Instant<'_, T>) -> T {
+        film.shown =
+            self.kept * film.shown + self.from_before * film.signal + self.from_now * signal;
+        film.signal = signal;
+        film.shown
+    }
+}
+
+impl<T: Real> Physics<T> for HotFilmLag<T> {
+    const SPEC: Spec = Spec {
+        name: "hot-film-lag",
+        rust: "hot_film_lag::HotFilmLag",
+        place: Place::Sensor,
+        summary: "the hot-film follows the friction with a lag",
+        equation: "τ·ẏ = s − y",
+        parameters: &[
+            Parameter { name: "time_constant", unit: "s", low: 0.002, high: 2.0, starts: &[0.006, 0.03, 0.2], influence: Influence::Smooth },
+        ],
+        channel: None,
+        source: "Bruun, Hot-wire Anemometry (1995)",
+    };
+
+    fn new(parameters: &[T], setting: &Setting<T>) -> Self {
+        let [time] = take(parameters);
+        let kept = (-setting.period / time).exp();
+        let mean = (T::ONE - kept) * time / setting.period;
+        Self {
+            kept,
+            from_before: mean - kept,
+            from_now: T::ONE - mean,
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! The hot-film's voltage is not linear in the wall shear stress (King's law).
+
+use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::real::Real;
+
+
+/// E² = 1 + κ·(s + s0)^(1/3); y = (E − E(0))/(E(1) − E(0)). A film cannot tell
+/// a reversed flow: s + s0 below 0 counts as 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HotFilmNonlinearity<T> {
+    ratio: T,
+    offset: T,
+    /// E(0).
+    natural: T,
+    /// E(1) − E(0).
+    span: T,
+}
+
+impl<T: Real> HotFilmNonlinearity<T> {
+    #[inline]
+    fn voltage(ratio: T, offset: T, friction: T) -> T {
+        (T::ONE + ratio * (friction + offset).at_least(T::ZERO).cbrt()).sqrt()
+    }
+}
+
+impl<T: Real> Effect<T> for HotFilmNonlinearity<T> {
+    type State = ();
+    fn start(&self) {}
+    #[inline]
+    fn sense(&self, _state: &mut (), signal: T, _at: &Instant<'_, T>) -> T {
+        (Self::voltage(self.ratio, self.offset, signal) - self.natural) / self.span
+    }
+}
+
+impl<T: Real> Physics<T> for HotFilmNonlinearity<T> {
+    const SPEC: Spec = Spec {
+        name: "hot-film-nonlinearity",
+        rust: "hot_film_nonlinearity::HotFilmNonlinearity",
+        place: Place::Sensor,
+        summary: "the hot-film's voltage follows King's law, not the friction",
+        equation: "E² = 1 + κ·(s + s0)^(1/3); y = (E − E(0))/(E(1) − E(0))",
+        parameters: &[
+            Parameter { name: "king_ratio", unit: "-", low: 0.1, high: 10.0, starts: &[0.5, 3.0], influence: Influence::Smooth },
+            Parameter { name: "king_offset", unit: "y", low: 0.01, high: 1.0, starts: &[0.05, 0.25], influence: Influence::Smooth },
+        ],
+        channel: None,
+        source: "King, Phil. Trans. A 214 (1914); Bellhouse & Schultz, J. Fluid Mech. 24 (1966)",
+    };
+
+    fn new(parameters: &[T], _setting: &Setting<T>) -> Self {
+        let [ratio, offset] = take(parameters);
+        let natural = Self::voltage(ratio, offset, T::ZERO);
+        Self {
+            ratio,
+            offset,
+            natural,
+            span: Self::voltage(ratio, offset, T::ONE) - natural,
+        }
+    }
+}

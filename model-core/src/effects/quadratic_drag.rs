@@ -1,0 +1,45 @@
+//! Drag that grows with the square of the speed of change.
+
+use crate::effect::{Effect, Flow, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::real::Real;
+
+
+/// Adds −d·(s_k − s_{k−1})·|s_k − s_{k−1}| to s_{k+1}.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct QuadraticDrag<T> {
+    coefficient: T,
+}
+
+impl<T: Real> Effect<T> for QuadraticDrag<T> {
+    type State = ();
+    fn start(&self) {}
+    #[inline]
+    fn drives(&self) -> bool {
+        true
+    }
+    #[inline]
+    fn drive(&self, _state: &mut (), flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
+        let change = flow.now - flow.before;
+        -(self.coefficient * change * change.abs())
+    }
+}
+
+impl<T: Real> Physics<T> for QuadraticDrag<T> {
+    const SPEC: Spec = Spec {
+        name: "quadratic-drag",
+        rust: "quadratic_drag::QuadraticDrag",
+        place: Place::Flow,
+        summary: "drag grows with the square of the speed of change",
+        equation: "adds −d·(s_k − s_{k−1})·|s_k − s_{k−1}|",
+        parameters: &[
+            Parameter { name: "coefficient", unit: "1/y", low: -1000.0, high: 1000.0, starts: &[1.0], influence: Influence::Smooth },
+        ],
+        channel: None,
+        source: "Morison et al. (1950)",
+    };
+
+    fn new(parameters: &[T], _setting: &Setting<T>) -> Self {
+        let [coefficient] = take(parameters);
+        Self { coefficient }
+    }
+}

@@ -1,0 +1,69 @@
+//! The jet's front rolls up into a vortex that helps for a while.
+
+use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::real::Real;
+
+
+/// ẇ = −w/τ + max(dj/dt, 0); the flow receives j + g·w.
+///
+/// `strength` is the mean of w over the sample, which is what a flow that
+/// integrates its drive receives; so a change within a sample or at its start
+/// gives the same vortex.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StartingVortex<T> {
+    gain: T,
+    /// Decay over a sample.
+    kept: T,
+    /// Mean over a sample of a vortex born at its start.
+    mean: T,
+}
+
+/// The vortex and the jet that made it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vortex<T> {
+    strength: T,
+    jet: T,
+}
+
+impl<T: Real> Effect<T> for StartingVortex<T> {
+    type State = Vortex<T>;
+    fn start(&self) -> Vortex<T> {
+        Vortex {
+            strength: T::ZERO,
+            jet: T::ZERO,
+        }
+    }
+    #[inline]
+    fn jet(&self, vortex: &mut Vortex<T>, jet: T, _at: &Instant<'_, T>) -> T {
+        let change = (jet - vortex.jet).at_least(T::ZERO);
+        vortex.jet = jet;
+        vortex.strength = vortex.strength * self.kept + change * self.mean;
+        jet + self.gain * vortex.strength
+    }
+}
+
+impl<T: Real> Physics<T> for StartingVortex<T> {
+    const SPEC: Spec = Spec {
+        name: "starting-vortex",
+        rust: "starting_vortex::StartingVortex",
+        place: Place::Jet,
+        summary: "the jet's front rolls up into a vortex that helps for a while",
+        equation: "ẇ = −w/τ + max(dj/dt, 0); the flow receives j + g·w",
+        parameters: &[
+            Parameter { name: "gain", unit: "-", low: 0.0, high: 3.0, starts: &[0.5], influence: Influence::Smooth },
+            Parameter { name: "decay_time", unit: "s", low: 0.003, high: 0.2, starts: &[0.008, 0.025, 0.08], influence: Influence::Smooth },
+        ],
+        channel: None,
+        source: "Glezer, AIAA J. 26 (1988): starting vortex of a jet",
+    };
+
+    fn new(parameters: &[T], setting: &Setting<T>) -> Self {
+        let [gain, decay] = take(parameters);
+        let kept = (-setting.period / decay).exp();
+        Self {
+            gain,
+            kept,
+            mean: (T::ONE - kept) * decay / setting.period,
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! The transport delay depends on how far the flow is attached, eq. (2).
+
+use crate::delay::{DelayLaw, Tap};
+use crate::effect::{Influence, Parameter, Physics, Place, Setting, Spec, take};
+use crate::real::Real;
+
+/// h_l = round(f_l · (p0 + p1·exp(−p2·ỹ))), samples, eqs. (2) and (4).
+///
+/// A negative ỹ counts as 0: the exponential would run away (theory: at
+/// ỹ = −0.1 it would be 2.4 times the delay of the natural flow).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StateDependentDelay<T, F = [T; 1]> {
+    /// p0, samples: the delay of the attached flow.
+    pub floor: T,
+    /// p1, samples: how much longer the delay of the separated flow is.
+    pub rise: T,
+    /// p2, 1/y: how quickly the delay shortens as the flow attaches.
+    pub rate: T,
+    /// f_l, one factor for each input.
+    pub factors: F,
+}
+
+impl<T: Real, F: AsRef<[T]> + Clone> DelayLaw<T> for StateDependentDelay<T, F> {
+    type State = ();
+    fn start(&self) {}
+    #[inline]
+    fn evaluate(&self, output: T) -> T {
+        self.floor + self.rise * (-self.rate * output).exp()
+    }
+    #[inline]
+    fn tap(&self, l: usize, evaluated: T) -> Tap<T> {
+        let factor = self.factors.as_ref().get(l).copied().unwrap_or(T::ONE);
+        Tap::on((factor * evaluated).round().max(0) as usize)
+    }
+}
+
+impl<T: Real> Physics<T> for StateDependentDelay<T> {
+    const SPEC: Spec = Spec {
+        name: "state-dependent-delay",
+        rust: "state_dependent_delay::StateDependentDelay",
+        place: Place::Delay,
+        summary: "the delay shortens as the flow attaches",
+        equation: "h = p0 + p1·exp(−p2·ỹ)",
+        parameters: &[
+            Parameter {
+                name: "delay_floor",
+                unit: "samples",
+                low: 0.0,
+                high: 500.0,
+                starts: &[30.0],
+                influence: Influence::Stepwise,
+            },
+            Parameter {
+                name: "delay_rise",
+                unit: "samples",
+                low: -100.0,
+                high: 500.0,
+                starts: &[10.0],
+                influence: Influence::Stepwise,
+            },
+            Parameter {
+                name: "delay_rate",
+                unit: "1/y",
+                low: 0.1,
+                high: 200.0,
+                starts: &[4.0, 20.0],
+                influence: Influence::Stepwise,
+            },
+        ],
+        channel: None,
+        source: "Feingesicht et al., ECC 2016, eq. (2)",
+    };
+
+    fn new(parameters: &[T], _setting: &Setting<T>) -> Self {
+        let [floor, rise, rate] = take(parameters);
+        Self {
+            floor,
+            rise,
+            rate,
+            factors: [T::ONE],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_papers_law_at_its_ends() {
+        let law = StateDependentDelay {
+            floor: 47.35_f32,
+            rise: 12.69,
+            rate: 20.18,
+            factors: [1.0],
+        };
+        assert_eq!(law.tap(0, law.evaluate(0.0)).whole, 60);
+        assert_eq!(law.tap(0, law.evaluate(1.0)).whole, 47);
+        let fast = StateDependentDelay {
+            factors: [1.5513_f32, 106.756],
+            floor: 47.35,
+            rise: 12.69,
+            rate: 20.18,
+        };
+        assert_eq!(fast.tap(1, fast.evaluate(0.0)).whole, 6410);
+        assert_eq!(fast.tap(1, fast.evaluate(1.0)).whole, 5055);
+    }
+}

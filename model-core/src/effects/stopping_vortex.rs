@@ -1,0 +1,69 @@
+//! A vortex rolls up after switch-off and the friction undershoots.
+
+use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::real::Real;
+
+
+/// ẇ = −w/τ + max(−dj/dt, 0); the flow receives j − g·w.
+///
+/// `strength` is the mean of w over the sample, which is what a flow that
+/// integrates its drive receives; so a change within a sample or at its start
+/// gives the same vortex.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StoppingVortex<T> {
+    gain: T,
+    /// Decay over a sample.
+    kept: T,
+    /// Mean over a sample of a vortex born at its start.
+    mean: T,
+}
+
+/// The vortex and the jet that made it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vortex<T> {
+    strength: T,
+    jet: T,
+}
+
+impl<T: Real> Effect<T> for StoppingVortex<T> {
+    type State = Vortex<T>;
+    fn start(&self) -> Vortex<T> {
+        Vortex {
+            strength: T::ZERO,
+            jet: T::ZERO,
+        }
+    }
+    #[inline]
+    fn jet(&self, vortex: &mut Vortex<T>, jet: T, _at: &Instant<'_, T>) -> T {
+        let change = (vortex.jet - jet).at_least(T::ZERO);
+        vortex.jet = jet;
+        vortex.strength = vortex.strength * self.kept + change * self.mean;
+        jet - self.gain * vortex.strength
+    }
+}
+
+impl<T: Real> Physics<T> for StoppingVortex<T> {
+    const SPEC: Spec = Spec {
+        name: "stopping-vortex",
+        rust: "stopping_vortex::StoppingVortex",
+        place: Place::Jet,
+        summary: "a vortex rolls up after switch-off and the friction undershoots",
+        equation: "ẇ = −w/τ + max(−dj/dt, 0); the flow receives j − g·w",
+        parameters: &[
+            Parameter { name: "gain", unit: "-", low: 0.0, high: 3.0, starts: &[0.5], influence: Influence::Smooth },
+            Parameter { name: "decay_time", unit: "s", low: 0.003, high: 0.3, starts: &[0.008, 0.025, 0.08], influence: Influence::Smooth },
+        ],
+        channel: None,
+        source: "Darabi & Wygnanski, J. Fluid Mech. 510 (2004): separation of a flow after forcing stops",
+    };
+
+    fn new(parameters: &[T], setting: &Setting<T>) -> Self {
+        let [gain, decay] = take(parameters);
+        let kept = (-setting.period / decay).exp();
+        Self {
+            gain,
+            kept,
+            mean: (T::ONE - kept) * decay / setting.period,
+        }
+    }
+}

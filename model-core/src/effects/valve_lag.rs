@@ -1,0 +1,51 @@
+//! The valve takes time to open and to close.
+
+use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::real::Real;
+
+
+/// v̇ = (u − v)/τ_o while u > v, (u − v)/τ_c otherwise; exact for a held command.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ValveLag<T> {
+    opening: T,
+    closing: T,
+}
+
+impl<T: Real> Effect<T> for ValveLag<T> {
+    /// v, the opening reached.
+    type State = T;
+    fn start(&self) -> T {
+        T::ZERO
+    }
+    #[inline]
+    fn jet(&self, opening: &mut T, jet: T, _at: &Instant<'_, T>) -> T {
+        let share = if jet > *opening { self.opening } else { self.closing };
+        *opening = *opening + (jet - *opening) * share;
+        *opening
+    }
+}
+
+impl<T: Real> Physics<T> for ValveLag<T> {
+    const SPEC: Spec = Spec {
+        name: "valve-lag",
+        rust: "valve_lag::ValveLag",
+        place: Place::Jet,
+        summary: "the valve opens and closes gradually",
+        equation: "v̇ = (u − v)/τ_o while u > v, (u − v)/τ_c otherwise",
+        parameters: &[
+            Parameter { name: "opening_time", unit: "s", low: 0.001, high: 0.05, starts: &[0.004, 0.015], influence: Influence::Smooth },
+            Parameter { name: "closing_time", unit: "s", low: 0.001, high: 0.1, starts: &[0.004, 0.025], influence: Influence::Smooth },
+        ],
+        channel: None,
+        source: "first-order valve model; e.g. Topçu et al., Mechatronics 16 (2006)",
+    };
+
+    fn new(parameters: &[T], setting: &Setting<T>) -> Self {
+        let share = |time: T| T::ONE - (-setting.period / time).exp();
+        let [opening, closing] = take(parameters);
+        Self {
+            opening: share(opening),
+            closing: share(closing),
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! What the model remembers: fixed ring buffers for outputs and jet strength,
+//! one bit per sample for an on/off command.
+
+use crate::real::Real;
+
+/// Reads the past of a signal.
+pub trait Past<T> {
+    /// The value `lag` samples before the newest one; 0 where nothing was
+    /// recorded (the paper's y_j = 0 for j < 0) or the buffer does not reach.
+    fn back(&self, lag: usize) -> T;
+}
+
+/// A past that grows by one sample at a time.
+pub trait Memory<T>: Past<T> {
+    /// Makes `value` the newest sample.
+    fn push(&mut self, value: T);
+    /// How many samples are kept: `back` reaches lags below this.
+    fn capacity(&self) -> usize;
+    /// Mean of `window` samples, the newest of them `lag` back: eq. (13) for a
+    /// delayed input. Costs `window` reads unless the memory knows better.
+    fn mean_back(&self, lag: usize, window: u32) -> T
+    where
+        T: Real,
+    {
+        let mut sum = T::ZERO;
+        for i in 0..window as usize {
+            sum = sum + self.back(lag.saturating_add(i));
+        }
+        sum / T::from_count(window.max(1))
+    }
+}
+
+/// Ring buffer of the last `LEN` samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DelayLine<T, const LEN: usize> {
+    samples: [T; LEN],
+    newest: usize,
+}
+
+impl<T: Real, const LEN: usize> DelayLine<T, LEN> {
+    /// A line at rest: all samples 0.
+    #[must_use]
+    pub const fn new() -> Self {
+        const { assert!(LEN > 0, "a delay line holds at least one sample") };
+        Self {
+            samples: [T::ZERO; LEN],
+            newest: 0,
+        }
+    }
+}
+
+impl<T: Real, const LEN: usize> Default for DelayLine<T, LEN> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real, const LEN: usize> Past<T> for DelayLine<T, LEN> {
+    #[inline]
+    fn back(&self, lag: usize) -> T {
+        if lag >= LEN {
+            return T::ZERO;
+        }
+        let index = if lag <= self.newest {
+            self.newest - lag
+        } else {
+            self.newest + LEN - lag
+        };
+        self.samples.get(index).copied().unwrap_or(T::ZERO)
+    }
+}
+
+impl<T: Real, const LEN: usize> Memory<T> for DelayLine<T, LEN> {
+    #[inline]
+    fn push(&mut self, value: T) {
+        self.newest = if self.newest + 1 < LEN {
+            self.newest + 1
+        } else {
+            0
+        };
+        if let Some(slot) = self.samples.get_mut(self.newest) {
+            *slot = value;
+        }
+    }
+    #[inline]
+    fn capacity(&self) -> usize {
+        LEN
+    }
+}
+
+/// On/off history, one bit per sample: 32·`WORDS` samples.
+///
+/// The 6 411-sample input delay of the paper's Table IV needs 201 words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BitHistory<const WORDS: usize> {
+    words: [u32; WORDS],
+    /// Position of the newest bit.
+    newest: usize,
+}
+
+impl<const WORDS: usize> BitHistory<WORDS> {
+    const BITS: usize = WORDS * 32;
+
+    /// A command that has always been off.
+    #[must_use]
+    pub const fn new() -> Self {
+        const { assert!(WORDS > 0, "a history holds at least one word") };
+        Self {
+            words: [0; WORDS],
+            newest: 0,
+        }
+    }
+
+    /// Words needed to reach `lag` samples back.
+    #[must_use]
+    pub const fn words_for(lag: usize) -> usize {
+        lag / 32 + 1
+    }
+
+    /// Whether the command was on `lag` samples ago; off beyond the buffer.
+    #[inline]
+    #[must_use]
+    pub fn is_on(&self, lag: usize) -> bool {
+        if lag >= Self::BITS {
+            return false;
+        }
+        let position = self.position(lag);
+        match self.words.get(position / 32) {
+            Some(word) => word >> (position % 32) & 1 == 1,
+            None => false,
+        }
+    }
+
+    /// How many of `window` samples were on, the newest of them `lag` back.
+    #[must_use]
+    pub fn count_on(&self, lag: usize, window: u32) -> u32 {
+        if lag >= Self::BITS {
+            return 0;
+        }
+        // Newest first, a word at a time: bits at and below `position`.
+        let mut left = (window as usize).min(Self::BITS - lag);
+        let mut position = self.position(lag);
+        let mut count = 0;
+        while left > 0 {
+            let available = position % 32 + 1;
+            let taken = available.min(left);
+            let word = self.words.get(position / 32).copied().unwrap_or(0);
+            // The newest bit goes to the top, then all but `taken` fall off below.
+            let kept = (word << (32 - available)) >> (32 - taken);
+            count += kept.count_ones();
+            left -= taken;
+            position = if position + 1 > taken {
+                position - taken
+            } else {
+                Self::BITS - 1
+            };
+        }
+        count
+    }
+
+    #[inline]
+    fn position(&self, lag: usize) -> usize {
+        if lag <= self.newest {
+            self.newest - lag
+        } else {
+            self.newest + Self::BITS - lag
+        }
+    }
+
+    /// Makes `on` the newest sample.
+    #[inline]
+    pub fn record(&mut self, on: bool) {
+        self.newest = if self.newest + 1 < Self::BITS {
+            self.newest + 1
+        } else {
+            0
+        };
+        let bit = 1_u32 << (self.newest % 32);
+        if let Some(word) = self.words.get_mut(self.newest / 32) {
+            if on {
+                *word |= bit;
+            } else {
+                *word &= !bit;
+            }
+        }
+    }
+}
+
+impl<const WORDS: usize> Default for BitHistory<WORDS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real, const WORDS: usize> Past<T> for BitHistory<WORDS> {
+    #[inline]
+    fn back(&self, lag: usize) -> T {
+        if self.is_on(lag) { T::ONE } else { T::ZERO }
+    }
+}
+
+impl<T: Real, const WORDS: usize> Memory<T> for BitHistory<WORDS> {
+    #[inline]
+    fn push(&mut self, value: T) {
+        self.record(value.value() > 0.5);
+    }
+    #[inline]
+    fn capacity(&self) -> usize {
+        Self::BITS
+    }
+    fn mean_back(&self, lag: usize, window: u32) -> T {
+        T::from_count(self.count_on(lag, window)) / T::from_count(window.max(1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_remembers_its_length_and_no_more() {
+        let mut line = DelayLine::<f32, 5>::new();
+        assert_eq!(line.back(0), 0.0);
+        for k in 1..=12 {
+            line.push(k as f32);
+        }
+        for lag in 0..5 {
+            assert_eq!(line.back(lag), (12 - lag) as f32);
+        }
+        assert_eq!(line.back(5), 0.0);
+        assert_eq!(line.back(usize::MAX), 0.0);
+    }
+
+    #[test]
+    fn bits_agree_with_a_line_of_numbers() {
+        let mut bits = BitHistory::<3>::new();
+        let mut line = DelayLine::<f64, 96>::new();
+        let mut seed = 1_u32;
+        for _ in 0..500 {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let on = seed >> 31 == 1;
+            bits.record(on);
+            line.push(f64::from(u8::from(on)));
+            for lag in [0, 1, 31, 32, 33, 63, 64, 95, 96, 200] {
+                assert_eq!(Past::<f64>::back(&bits, lag), line.back(lag), "lag {lag}");
+                for window in [1, 2, 31, 32, 33, 64, 90, 96] {
+                    let direct: f64 = (0..window as usize).map(|i| line.back(lag + i)).sum();
+                    assert_eq!(
+                        f64::from(bits.count_on(lag, window)),
+                        direct,
+                        "{lag} {window}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_papers_longest_delay_fits_in_802_bytes() {
+        const { assert!(BitHistory::<201>::BITS > 6411) };
+        assert_eq!(BitHistory::<1>::words_for(6411), 201);
+        assert!(size_of::<BitHistory<201>>() <= 804 + 2 * size_of::<usize>());
+    }
+}

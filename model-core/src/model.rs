@@ -1,0 +1,506 @@
+//! The whole model: command in, sensor reading out, one sample at a time.
+
+use crate::average::WindowSum;
+use crate::delay::DelayLaw;
+use crate::effect::{Effect, Flow, Instant};
+use crate::history::{BitHistory, DelayLine, Memory};
+use crate::real::Real;
+use crate::recursion::{Bilinear, LagConvention};
+use nalgebra::{SMatrix, SVector};
+
+/// How outputs and inputs are averaged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Averaging {
+    /// W, samples, at least 2; 250 in the paper.
+    pub window: u32,
+    /// Full model, eq. (4): the delay follows ỹ of eq. (1), the input is u.
+    /// Averaged model, eq. (15): the delay follows y itself (an average
+    /// already), the input is the mean of u over W samples, eq. (13).
+    pub averaged_model: bool,
+}
+
+/// The constant part of a model: everything an identification gives.
+///
+/// Implemented by [`Params`] with sizes known at compile time and by the host
+/// with sizes known at run time; [`step`] is the same function for both.
+pub trait Parts<T: Real> {
+    /// The delay law.
+    type Delay: DelayLaw<T>;
+    /// The effects, in the order of the physics.
+    type Effects: Effect<T>;
+    /// Structure and coefficients.
+    fn recursion(&self) -> Bilinear<'_, T>;
+    /// The delay law.
+    fn delay(&self) -> &Self::Delay;
+    /// The effects.
+    fn effects(&self) -> &Self::Effects;
+    /// How signals are averaged.
+    fn averaging(&self) -> Averaging;
+
+    /// At rest, for an on/off command: `NY` outputs (more than the longest lag,
+    /// and at least the averaging window), 32·`WORDS` commands.
+    fn on_off_state<const NY: usize, const WORDS: usize>(&self) -> OnOffState<T, NY, WORDS, Self>
+    where
+        Self: Sized,
+    {
+        State::at_rest(self, DelayLine::new(), BitHistory::new())
+    }
+
+    /// At rest, for jets of any strength: `NY` outputs, `NJ` jet strengths.
+    fn graded_state<const NY: usize, const NJ: usize>(&self) -> GradedState<T, NY, NJ, Self>
+    where
+        Self: Sized,
+    {
+        State::at_rest(self, DelayLine::new(), DelayLine::new())
+    }
+}
+
+/// A model with N1 state delays, N2 product delays and N3 inputs.
+#[derive(Clone, Copy, Debug)]
+pub struct Params<T: Real, const N1: usize, const N2: usize, const N3: usize, D, E> {
+    /// What the lags mean.
+    pub convention: LagConvention,
+    /// Averages.
+    pub averaging: Averaging,
+    /// d.
+    pub constant: T,
+    /// τ_i, samples.
+    pub state_lags: [u16; N1],
+    /// a_i.
+    pub a: SVector<T, N1>,
+    /// τ̄_j, samples.
+    pub product_lags: [u16; N2],
+    /// b_l.
+    pub b: SVector<T, N3>,
+    /// c_jl.
+    pub c: SMatrix<T, N2, N3>,
+    /// The delay law.
+    pub delay: D,
+    /// The effects; `()` for none, pairs for several.
+    pub effects: E,
+}
+
+impl<T: Real, const N1: usize, const N2: usize, const N3: usize, D, E> Parts<T>
+    for Params<T, N1, N2, N3, D, E>
+where
+    D: DelayLaw<T>,
+    E: Effect<T>,
+{
+    type Delay = D;
+    type Effects = E;
+    #[inline]
+    fn recursion(&self) -> Bilinear<'_, T> {
+        Bilinear {
+            convention: self.convention,
+            constant: self.constant,
+            state_lags: &self.state_lags,
+            a: self.a.as_slice(),
+            product_lags: &self.product_lags,
+            b: self.b.as_slice(),
+            c: self.c.as_slice(),
+        }
+    }
+    #[inline]
+    fn delay(&self) -> &D {
+        &self.delay
+    }
+    #[inline]
+    fn effects(&self) -> &E {
+        &self.effects
+    }
+    #[inline]
+    fn averaging(&self) -> Averaging {
+        self.averaging
+    }
+}
+
+/// How often a state-dependent delay had to be clamped (counts saturate).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Clamps {
+    /// The averaged output was below 0 and was taken as 0.
+    pub below_zero: u32,
+    /// The delay reached beyond the input memory and was cut to it.
+    pub beyond_memory: u32,
+}
+
+/// Everything a model remembers. `Y` holds the output, `J` the jets.
+#[derive(Clone, Copy, Debug)]
+pub struct State<T, Y, J, D, E> {
+    /// Past outputs of the flow; the newest is s_k.
+    pub outputs: Y,
+    /// Past jet strengths as they left the jets.
+    pub jets: J,
+    /// Counts of clamped delays.
+    pub clamps: Clamps,
+    average: WindowSum<T>,
+    delay: D,
+    effects: E,
+}
+
+/// The state that model `M` needs, in memories `Y` and `J`.
+pub type StateOf<T, M, Y, J> = State<
+    T,
+    Y,
+    J,
+    <<M as Parts<T>>::Delay as DelayLaw<T>>::State,
+    <<M as Parts<T>>::Effects as Effect<T>>::State,
+>;
+
+/// State on the board of a model driven by an on/off command.
+pub type OnOffState<T, const NY: usize, const WORDS: usize, M> =
+    StateOf<T, M, DelayLine<T, NY>, BitHistory<WORDS>>;
+
+/// State on the board of a model whose jets take any strength.
+pub type GradedState<T, const NY: usize, const NJ: usize, M> =
+    StateOf<T, M, DelayLine<T, NY>, DelayLine<T, NJ>>;
+
+impl<T, Y, J, D, E> State<T, Y, J, D, E>
+where
+    T: Real,
+    Y: Memory<T>,
+    J: Memory<T>,
+{
+    /// The state of `model` at rest, with the given empty memories.
+    pub fn at_rest<M>(model: &M, outputs: Y, jets: J) -> Self
+    where
+        M: Parts<T>,
+        M::Delay: DelayLaw<T, State = D>,
+        M::Effects: Effect<T, State = E>,
+    {
+        Self {
+            outputs,
+            jets,
+            clamps: Clamps::default(),
+            average: WindowSum::new(),
+            delay: model.delay().start(),
+            effects: model.effects().start(),
+        }
+    }
+
+    /// ỹ_k of eq. (1): the W − 1 outputs before y_k, divided by W.
+    #[inline]
+    pub fn averaged_output(&self, window: u32) -> T {
+        self.average.value() / T::from_count(window)
+    }
+
+    /// Makes `flow` the newest output s_{k+1}: what [`step`] does with its own
+    /// prediction, or a measurement takes the place of.
+    #[inline]
+    pub fn advance(&mut self, flow: T, window: u32) {
+        let terms = window.saturating_sub(1).max(1);
+        let entering = self.outputs.back(0);
+        let leaving = self.outputs.back(terms as usize);
+        self.average.slide(entering, leaving, terms);
+        self.outputs.push(flow);
+    }
+}
+
+/// What the model is given at a sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Input<'a, T> {
+    /// The command u_k: 0 or 1 for on/off blowers.
+    pub command: T,
+    /// Measured channels that effects need.
+    pub channels: &'a [T],
+}
+
+/// What the model says at a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Output<T> {
+    /// What the sensor shows at this sample, y_k.
+    pub measured: T,
+    /// What the flow does at this sample, s_k; equals `measured` without sensor effects.
+    pub flow: T,
+    /// What the flow will do at the next sample, s_{k+1}.
+    pub next: T,
+    /// The jet strength arriving now (through the first input delay).
+    pub arrived: T,
+}
+
+/// Computes what happens at sample k without moving on: effects and input
+/// memory take the sample in, the flow's output does not advance.
+///
+/// Call [`State::advance`] afterwards, with `next` for a free run or with a
+/// measurement for one-step prediction.
+#[inline]
+pub fn observe<T, M, Y, J>(
+    model: &M,
+    state: &mut StateOf<T, M, Y, J>,
+    input: &Input<'_, T>,
+) -> Output<T>
+where
+    T: Real,
+    M: Parts<T>,
+    Y: Memory<T>,
+    J: Memory<T>,
+{
+    let (law, effects, averaging) = (model.delay(), model.effects(), model.averaging());
+    let mut at = Instant {
+        command: input.command,
+        arrived: T::ZERO,
+        channels: input.channels,
+    };
+    let command = law.command(&mut state.delay, input.command);
+    let jet = effects.jet(&mut state.effects, command, &at);
+    state.jets.push(jet);
+
+    let flow = state.outputs.back(0);
+    let follows = if averaging.averaged_model {
+        flow
+    } else {
+        state.averaged_output(averaging.window)
+    };
+    if follows < T::ZERO {
+        state.clamps.below_zero = state.clamps.below_zero.saturating_add(1);
+    }
+    let evaluated = law.evaluate(follows.at_least(T::ZERO));
+    let jets = &state.jets;
+    let farthest = jets
+        .capacity()
+        .saturating_sub(1 + usize::from(M::Delay::INTERPOLATES));
+    let mut beyond = false;
+    let mut arriving = |l: usize| {
+        let tap = law.tap(l, evaluated);
+        beyond |= tap.whole > farthest;
+        let whole = tap.whole.min(farthest);
+        let read = |lag| {
+            if averaging.averaged_model {
+                jets.mean_back(lag, averaging.window)
+            } else {
+                jets.back(lag)
+            }
+        };
+        if M::Delay::INTERPOLATES {
+            let newer = read(whole);
+            newer + tap.fraction * (read(whole + 1) - newer)
+        } else {
+            read(whole)
+        }
+    };
+
+    at.arrived = arriving(0);
+    let measured = effects.sense(&mut state.effects, flow, &at);
+    let recursion = model.recursion();
+    let first = at.arrived;
+    let mut strength = |l: usize| if l == 0 { first } else { arriving(l) };
+    let mut next = recursion.next(&state.outputs, &mut strength);
+    if effects.drives() {
+        let flow = Flow {
+            now: flow,
+            before: state.outputs.back(1),
+            relaxation: recursion.relaxation(&mut strength),
+        };
+        next = next + effects.drive(&mut state.effects, &flow, &at);
+    }
+    if beyond {
+        state.clamps.beyond_memory = state.clamps.beyond_memory.saturating_add(1);
+    }
+    Output {
+        measured,
+        flow,
+        next,
+        arrived: at.arrived,
+    }
+}
+
+/// One sample of a free run: observes sample k and moves on to k + 1.
+#[inline]
+pub fn step<T, M, Y, J>(
+    model: &M,
+    state: &mut StateOf<T, M, Y, J>,
+    input: &Input<'_, T>,
+) -> Output<T>
+where
+    T: Real,
+    M: Parts<T>,
+    Y: Memory<T>,
+    J: Memory<T>,
+{
+    let output = observe(model, state, input);
+    state.advance(output.next, model.averaging().window);
+    output
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::delay::FixedDelay;
+    use crate::effect::{Physics, Setting};
+    use crate::effects::{HotFilmLag, StateDependentDelay, ValveLag};
+
+    /// Table II of the paper, state-dependent delays.
+    fn table_two<T: Real>(
+        convention: LagConvention,
+    ) -> Params<T, 5, 10, 1, StateDependentDelay<T>, ()> {
+        let number = T::from_f64;
+        Params {
+            convention,
+            averaging: Averaging {
+                window: 250,
+                averaged_model: false,
+            },
+            constant: T::ZERO,
+            state_lags: [1, 44, 123, 479, 496],
+            a: SVector::from([0.9759, 0.0141, 0.0025, -0.0042, 0.0055].map(number)),
+            product_lags: [1, 73, 242, 264, 299, 335, 414, 477, 494, 500],
+            b: SVector::from([0.0080].map(number)),
+            c: SMatrix::from([[
+                -0.0228, 0.0138, 0.0621, -0.0286, -0.0186, -0.0121, -0.0035, -0.0056, 0.0189,
+                -0.0049,
+            ]
+            .map(number)]),
+            delay: StateDependentDelay {
+                floor: number(47.35),
+                rise: number(12.69),
+                rate: number(20.18),
+                factors: [T::ONE],
+            },
+            effects: (),
+        }
+    }
+
+    fn step_response<T: Real>(convention: LagConvention, samples: usize) -> T {
+        let model = table_two::<T>(convention);
+        let mut state = model.on_off_state::<512, 4>();
+        let mut y = T::ZERO;
+        let input = Input {
+            command: T::ONE,
+            channels: &[],
+        };
+        for _ in 0..=samples {
+            y = step(&model, &mut state, &input).measured;
+        }
+        y
+    }
+
+    /// Step responses of the printed coefficients, computed independently
+    /// (theory 0.3): .11 .23 .54 .79 .99 literal, .15 .27 .62 .84 1.02 one-step.
+    #[test]
+    fn the_papers_model_rises_as_printed() {
+        let literal = [
+            (100, 0.11),
+            (200, 0.23),
+            (500, 0.54),
+            (1000, 0.79),
+            (2000, 0.99),
+        ];
+        for (k, expected) in literal {
+            let y = step_response::<f64>(LagConvention::Literal, k);
+            assert!((y - expected).abs() < 0.006, "literal {k}: {y}");
+        }
+        let one_step = [
+            (100, 0.15),
+            (200, 0.27),
+            (500, 0.62),
+            (1000, 0.84),
+            (2000, 1.02),
+        ];
+        for (k, expected) in one_step {
+            let y = step_response::<f64>(LagConvention::OneStep, k);
+            assert!((y - expected).abs() < 0.006, "one-step {k}: {y}");
+        }
+    }
+
+    #[test]
+    fn single_precision_follows_double() {
+        let single = step_response::<f32>(LagConvention::OneStep, 5000);
+        let double = step_response::<f64>(LagConvention::OneStep, 5000);
+        assert!((f64::from(single) - double).abs() < 2e-4);
+    }
+
+    /// A first-order flow and a fixed delay, by hand.
+    #[test]
+    fn the_recursion_starts_at_zero_and_waits_for_the_delay() {
+        let model = Params::<f64, 1, 1, 1, _, ()> {
+            convention: LagConvention::OneStep,
+            averaging: Averaging {
+                window: 2,
+                averaged_model: false,
+            },
+            constant: 0.0,
+            state_lags: [1],
+            a: SVector::from([0.5]),
+            product_lags: [1],
+            b: SVector::from([1.0]),
+            c: SMatrix::from([[-0.25]]),
+            delay: FixedDelay { delays: [2] },
+            effects: (),
+        };
+        let mut state = model.on_off_state::<4, 1>();
+        let mut run = [0.0; 6];
+        for y in &mut run {
+            let input = Input {
+                command: 1.0,
+                channels: &[],
+            };
+            *y = step(&model, &mut state, &input).measured;
+        }
+        assert_eq!(run, [0.0, 0.0, 0.0, 1.0, 1.25, 1.3125]);
+    }
+
+    #[test]
+    fn effects_compose_around_the_recursion() {
+        let setting = Setting {
+            period: 0.001,
+            channel: 0,
+            reference: 1.0,
+        };
+        let bare = table_two::<f64>(LagConvention::OneStep);
+        let model = Params {
+            convention: bare.convention,
+            averaging: bare.averaging,
+            constant: bare.constant,
+            state_lags: bare.state_lags,
+            a: bare.a,
+            product_lags: bare.product_lags,
+            b: bare.b,
+            c: bare.c,
+            delay: bare.delay,
+            effects: (
+                ValveLag::new(&[0.010, 0.020], &setting),
+                (HotFilmLag::new(&[0.050], &setting), ()),
+            ),
+        };
+        let mut state = model.graded_state::<512, 128>();
+        let input = Input {
+            command: 1.0,
+            channels: &[],
+        };
+        let mut last = step(&model, &mut state, &input);
+        for _ in 0..60 {
+            last = step(&model, &mut state, &input);
+        }
+        // 61 samples on: the first air has just arrived, at the valve's first opening.
+        assert!(last.arrived > 0.0 && last.arrived < 0.2);
+        for _ in 0..200 {
+            last = step(&model, &mut state, &input);
+        }
+        // The valve is open by now; the film trails a rising friction by 50 ms.
+        assert!((last.arrived - 1.0).abs() < 1e-6);
+        let trailing = (last.flow - last.measured) / (last.next - last.flow);
+        assert!((40.0..80.0).contains(&trailing), "{trailing} samples");
+    }
+
+    #[test]
+    fn clamping_is_counted() {
+        let model = Params {
+            delay: StateDependentDelay {
+                floor: 100.0,
+                rise: 100.0,
+                rate: 20.0,
+                factors: [1.0],
+            },
+            ..table_two::<f64>(LagConvention::OneStep)
+        };
+        let mut state = model.on_off_state::<512, 4>();
+        state.advance(-0.5, 250);
+        state.advance(0.0, 250);
+        let input = Input {
+            command: 0.0,
+            channels: &[],
+        };
+        observe(&model, &mut state, &input);
+        assert_eq!(state.clamps.below_zero, 1);
+        assert_eq!(state.clamps.beyond_memory, 1);
+    }
+}

@@ -1,1 +1,3 @@
-//! host
+//! Host side: recordings to models.
+
+pub mod search;

@@ -1,0 +1,42 @@
+//! What a search minimises.
+
+use super::variable::{Point, Variable};
+
+/// Outcome of one evaluation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Evaluation {
+    /// The exact value; `f64::INFINITY` for a point that has none.
+    Value(f64),
+    /// The evaluation was given up early: the value is not below this one.
+    AtLeast(f64),
+}
+
+/// A function of integers and granular reals to be minimised.
+///
+/// [`evaluate`](Self::evaluate) must depend on nothing but the point and what
+/// [`prepare`](Self::prepare) did, and be callable from several threads: that is
+/// what makes a search repeatable whatever the number of threads.
+pub trait Problem: Sync {
+    /// The variables, in the order of a point's coordinates.
+    fn variables(&self) -> &[Variable];
+
+    /// Name under which the cache knows a point. Points that the problem cannot
+    /// tell apart (permuted or repeated delays) should share one.
+    fn canonical(&self, point: &[i64]) -> Point {
+        point.to_vec()
+    }
+
+    /// Sets of coordinates that are polled separately, because moving them
+    /// together is rarely useful or much dearer. Default: all in one.
+    fn groups(&self) -> Vec<Vec<usize>> {
+        vec![(0..self.variables().len()).collect()]
+    }
+
+    /// Called in order, on one thread, before a block of points is evaluated:
+    /// the place to build tables they share.
+    fn prepare(&mut self, _points: &[&Point]) {}
+
+    /// Value at a point. May return [`Evaluation::AtLeast`] as soon as the value
+    /// is known not to be below `give_up_at`.
+    fn evaluate(&self, point: &Point, give_up_at: f64) -> Evaluation;
+}

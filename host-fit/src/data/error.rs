@@ -1,0 +1,306 @@
+//! What can be wrong with measured data, where it is, and what to do about it.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Where in the user's data a fault lies: every part that is known is printed.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Place {
+    /// The file (or folder) as the caller named it.
+    pub file: Option<PathBuf>,
+    /// The name of the record, where the data were not read from a file of their own.
+    pub record: Option<String>,
+    /// Line in the file; the header is line 1.
+    pub line: Option<u64>,
+    /// Sample index in the record (0 is the first), for data that have no lines.
+    pub sample: Option<usize>,
+    /// Name of the CSV column or channel.
+    pub column: Option<String>,
+    /// Key in `dataset.toml`.
+    pub key: Option<String>,
+}
+
+impl Place {
+    /// A place that names a file only.
+    #[must_use]
+    pub fn file(path: &Path) -> Self {
+        Self {
+            file: Some(path.to_path_buf()),
+            ..Self::default()
+        }
+    }
+
+    /// The same place with a line number added.
+    #[must_use]
+    pub fn at_line(mut self, line: u64) -> Self {
+        self.line = Some(line);
+        self
+    }
+
+    /// The same place with a column name added.
+    #[must_use]
+    pub fn in_column(mut self, column: &str) -> Self {
+        self.column = Some(column.to_owned());
+        self
+    }
+
+    /// The same place with a TOML key added.
+    #[must_use]
+    pub fn at_key(mut self, key: &str) -> Self {
+        self.key = Some(key.to_owned());
+        self
+    }
+
+    /// The error at this place.
+    #[must_use]
+    pub fn error(self, problem: Problem) -> DataError {
+        DataError {
+            place: Box::new(self),
+            problem: Box::new(problem),
+        }
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut separator = "";
+        if let Some(file) = &self.file {
+            write!(f, "{}", file.display())?;
+            separator = ", ";
+        }
+        if let Some(record) = &self.record {
+            write!(f, "{separator}record `{}`", printable(record))?;
+            separator = ", ";
+        }
+        if let Some(line) = self.line {
+            write!(f, "{separator}line {line}")?;
+            separator = ", ";
+        }
+        if let Some(sample) = self.sample {
+            write!(f, "{separator}sample {sample}")?;
+            separator = ", ";
+        }
+        if let Some(column) = &self.column {
+            write!(f, "{separator}column `{}`", printable(column))?;
+            separator = ", ";
+        }
+        if let Some(key) = &self.key {
+            write!(f, "{separator}key `{}`", printable(key))?;
+            separator = ", ";
+        }
+        if separator.is_empty() {
+            write!(f, "the data")?;
+        }
+        Ok(())
+    }
+}
+
+/// The user's text on one line, cut to a length that a terminal can show.
+pub(crate) fn printable(text: &str) -> String {
+    let mut out: String = text
+        .chars()
+        .take(60)
+        .flat_map(char::escape_debug)
+        .collect::<String>()
+        .replace("\\'", "'")
+        .replace("\\\"", "\"");
+    if text.chars().count() > 60 {
+        out.push('…');
+    }
+    out
+}
+
+/// A fault in measured data: one paragraph that names the place, the fault and the remedy.
+#[derive(Debug, thiserror::Error)]
+#[error("{place}: {problem}")]
+pub struct DataError {
+    /// Where.
+    pub place: Box<Place>,
+    /// What, with the remedy.
+    pub problem: Box<Problem>,
+}
+
+impl DataError {
+    /// A file could not be opened or read.
+    #[must_use]
+    pub fn unreadable(path: &Path, cause: std::io::Error) -> Self {
+        Place::file(path).error(Problem::Unreadable(cause))
+    }
+}
+
+/// The kinds of fault; each message ends with the remedy.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Problem {
+    /// The operating system refused to open or read it.
+    #[error("cannot be read ({0}); check the path and its permissions")]
+    Unreadable(std::io::Error),
+    /// A folder without `dataset.toml`.
+    #[error(
+        "the folder holds no dataset.toml; write one with `sample_period_s` and one [[record]] (name, file, use) per CSV, or name a CSV file"
+    )]
+    NoManifest,
+    /// Nothing in the file at all.
+    #[error("the file is empty; it needs a header line `t,u,y` and one row per sample")]
+    Empty,
+    /// A header and no rows (or a single one).
+    #[error("has {0} row(s) of numbers; a record needs at least 2")]
+    TooFewRows(usize),
+    /// Not text.
+    #[error("is not UTF-8 text; export the data as a plain CSV file in UTF-8")]
+    NotText,
+    /// A line beyond any sensible length.
+    #[error(
+        "the line is longer than 1 MiB, which no row of measurements is; check that this is a CSV file"
+    )]
+    LineTooLong,
+    /// The header line cannot be split into names.
+    #[error(
+        "the header cannot be read ({0}); write the column names once, separated by commas: t,u,y"
+    )]
+    BadHeader(String),
+    /// Semicolons or tabs instead of commas.
+    #[error(
+        "the header has no comma but {0}; separate columns with commas and write decimals with a point"
+    )]
+    WrongSeparator(&'static str),
+    /// A column that has to be there is not.
+    #[error("no column `{name}` in the header ({found}); name the columns t (s), u and y", name = .name, found = .found)]
+    MissingColumn {
+        /// The name that was looked for.
+        name: &'static str,
+        /// The names that are there.
+        found: String,
+    },
+    /// The same name twice.
+    #[error("this column name stands twice in the header; rename or remove one of the two")]
+    DoubledColumn,
+    /// An empty name in the header.
+    #[error("column {0} has no name in the header; name it or remove it")]
+    UnnamedColumn(usize),
+    /// A row that is shorter or longer than the header.
+    #[error(
+        "the row has {found} values where the header has {expected} names; complete the row or cut the record before it"
+    )]
+    RowLength {
+        /// Number of names in the header.
+        expected: usize,
+        /// Number of values in this row.
+        found: usize,
+    },
+    /// An empty cell.
+    #[error(
+        "the value is missing; fill it in, or split the record there (records are independent)"
+    )]
+    MissingValue,
+    /// Text where a number belongs.
+    #[error("`{0}` is not a number; write decimals with a point, without units or thousands marks")]
+    NotANumber(String),
+    /// NaN or infinity.
+    #[error("the value is {0}, not a finite number; repair it, or split the record there")]
+    NotFinite(f64),
+    /// So large that its square would not be finite.
+    #[error("the value {0:e} is beyond ±1e100; check the column's units")]
+    TooLarge(f64),
+    /// Time stands still or goes back.
+    #[error(
+        "time does not increase: {time} s follows {before} s; sort the rows, remove doubled ones, and print t with enough digits"
+    )]
+    TimeBackward {
+        /// The previous row's time.
+        before: f64,
+        /// This row's time.
+        time: f64,
+    },
+    /// Samples are missing.
+    #[error(
+        "time jumps by {step} s where the sampling period is {period} s: about {missing} sample(s) missing; split the record there or fill the gap"
+    )]
+    TimeGap {
+        /// The step found.
+        step: f64,
+        /// The sampling period.
+        period: f64,
+        /// Number of missing samples.
+        missing: u64,
+    },
+    /// Steps that vary.
+    #[error(
+        "the time step is {step} s where the sampling period is {period} s (10 % and the rounding of the printed t are allowed); resample the record to a uniform period"
+    )]
+    TimeUneven {
+        /// The step found.
+        step: f64,
+        /// The sampling period.
+        period: f64,
+    },
+    /// The file's time and the stated sampling period differ.
+    #[error(
+        "the rows are {found} s apart but the sampling period is stated as {stated} s; correct sample_period_s or the column t"
+    )]
+    PeriodMismatch {
+        /// From the time column.
+        found: f64,
+        /// From `dataset.toml` or the other records.
+        stated: f64,
+    },
+    /// A sampling period that is none.
+    #[error("the sampling period is {0}; it must be a finite number of seconds above 0")]
+    BadPeriod(f64),
+    /// A negative standard error.
+    #[error("the standard error is {0}; it must be 0 or above")]
+    NegativeDeviation(f64),
+    /// Lower envelope above the upper one.
+    #[error(
+        "y_min = {low} lies above y_max = {high}; exchange the two columns or repair the value"
+    )]
+    EnvelopeCrossed {
+        /// The value of `y_min`.
+        low: f64,
+        /// The value of `y_max`.
+        high: f64,
+    },
+    /// Columns of a record differ in length.
+    #[error(
+        "has {found} values where u has {expected}; all columns of a record need the same length"
+    )]
+    UnequalLengths {
+        /// Length of `u`.
+        expected: usize,
+        /// Length of this column.
+        found: usize,
+    },
+    /// The command is not on/off where it has to be.
+    #[error(
+        "u = {0} is neither 0 nor 1, but an on/off command is needed here; scale the command so that off is 0 and on is 1"
+    )]
+    NotOnOff(f64),
+    /// A channel that carries the name of a column with a meaning of its own.
+    #[error("this name is reserved (t, u, y, y_sd, y_min, y_max); rename the channel")]
+    ReservedChannel,
+    /// A name that cannot be printed or is empty.
+    #[error("a name must not be empty or hold control characters; rename it")]
+    BadName,
+    /// Two records with one name.
+    #[error("the record name `{0}` is used twice; give every record its own name")]
+    DoubledRecord(String),
+    /// No records at all.
+    #[error("there is no record; add at least one [[record]] with name, file and use")]
+    NoRecords,
+    /// `dataset.toml` does not parse, lacks a key or has one that does not exist.
+    #[error(
+        "{0}; a dataset.toml has title (optional), sample_period_s, and per [[record]] name, file and use (\"identify\" or \"validate\")"
+    )]
+    Manifest(String),
+    /// A record's file outside the data set's folder.
+    #[error(
+        "the path `{0}` leaves the data set's folder; give a path relative to dataset.toml, without `..`, to a file inside the folder"
+    )]
+    OutsideFolder(String),
+    /// Not a regular file.
+    #[error("`{0}` is not a file; name a CSV file")]
+    NotAFile(String),
+    /// The data set could not be written.
+    #[error("{0}")]
+    Unwritable(#[from] crate::output::OutputError),
+}

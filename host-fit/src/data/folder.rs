@@ -1,0 +1,392 @@
+//! A data set on disk: a folder with `dataset.toml` and CSV files, or one CSV file.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Component, Path, PathBuf};
+
+use super::error::{DataError, Place, Problem, printable};
+use super::record::{DataSet, Origin, Record, Use};
+use super::table::Table;
+use crate::output::Staging;
+
+const MANIFEST: &str = "dataset.toml";
+
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Manifest {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    title: Option<String>,
+    sample_period_s: f64,
+    #[serde(default)]
+    record: Vec<Entry>,
+}
+
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    name: String,
+    file: String,
+    #[serde(rename = "use")]
+    role: Use,
+}
+
+/// See [`DataSet::load`].
+pub(crate) fn load(path: &Path) -> Result<DataSet, DataError> {
+    let kind = fs::metadata(path).map_err(|e| DataError::unreadable(path, e))?;
+    if kind.is_dir() {
+        return load_folder(path);
+    }
+    if path.file_name().is_some_and(|n| n == MANIFEST) {
+        return load_folder(folder_of(path));
+    }
+    let name = path
+        .file_stem()
+        .map_or_else(|| "record".into(), |s| s.to_string_lossy().into_owned());
+    let (record, origin) = Table::load(path, None)?.into_record(&name, Use::Identify)?;
+    DataSet::assemble(None, vec![record], vec![origin], &Place::file(path))
+}
+
+fn folder_of(manifest: &Path) -> &Path {
+    match manifest.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+fn load_folder(folder: &Path) -> Result<DataSet, DataError> {
+    let path = folder.join(MANIFEST);
+    let bytes = match fs::read(&path) {
+        Ok(bytes) => bytes,
+        Err(e) if e.kind() == io::ErrorKind::NotFound => {
+            return Err(Place::file(folder).error(Problem::NoManifest));
+        }
+        Err(e) => return Err(DataError::unreadable(&path, e)),
+    };
+    let place = Place::file(&path);
+    let text = String::from_utf8(bytes).map_err(|_| place.clone().error(Problem::NotText))?;
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    let manifest: Manifest = toml::from_str(text).map_err(|e| manifest_error(&path, text, &e))?;
+    if !(manifest.sample_period_s.is_finite() && manifest.sample_period_s > 0.0) {
+        return Err(place
+            .at_key("sample_period_s")
+            .error(Problem::BadPeriod(manifest.sample_period_s)));
+    }
+    let mut records = Vec::with_capacity(manifest.record.len());
+    let mut origins = Vec::with_capacity(manifest.record.len());
+    for entry in &manifest.record {
+        let bad_name = entry.name.trim().is_empty() || entry.name.chars().any(char::is_control);
+        if bad_name {
+            return Err(place.at_key("name").error(Problem::BadName));
+        }
+        let file = resolve(folder, &entry.file, &place)?;
+        let table = Table::load(&file, Some(manifest.sample_period_s))?;
+        let (record, origin): (Record, Origin) = table.into_record(&entry.name, entry.role)?;
+        records.push(record);
+        origins.push(origin);
+    }
+    DataSet::assemble(manifest.title, records, origins, &place)
+}
+
+/// The path of a record's file, which has to be a file inside the folder, also after following links.
+fn resolve(folder: &Path, file: &str, manifest: &Place) -> Result<PathBuf, DataError> {
+    let place = || manifest.clone().at_key("file");
+    let relative = Path::new(file);
+    let plain = relative
+        .components()
+        .all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+    if !plain || file.contains('\0') {
+        return Err(place().error(Problem::OutsideFolder(printable(file))));
+    }
+    let path = folder.join(relative);
+    let unreadable = |e: io::Error| DataError::unreadable(&path, e);
+    let real = fs::canonicalize(&path).map_err(unreadable)?;
+    let root = fs::canonicalize(folder).map_err(unreadable)?;
+    if !real.starts_with(&root) {
+        return Err(place().error(Problem::OutsideFolder(printable(file))));
+    }
+    if !real.is_file() {
+        return Err(place().error(Problem::NotAFile(printable(file))));
+    }
+    Ok(path)
+}
+
+/// The TOML error in one paragraph, with the line and the key it is about.
+fn manifest_error(path: &Path, text: &str, error: &toml::de::Error) -> DataError {
+    let mut place = Place::file(path);
+    if let Some(span) = error.span() {
+        let before = text.get(..span.start).unwrap_or(text);
+        place.line = Some(before.matches('\n').count() as u64 + 1);
+        let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+        let line = text.get(line_start..).and_then(|l| l.lines().next());
+        place.key = line
+            .and_then(|l| l.split_once('='))
+            .map(|(key, _)| key.trim().to_owned())
+            .filter(|key| !key.is_empty());
+    }
+    let message = error
+        .message()
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ");
+    place.error(Problem::Manifest(message))
+}
+
+/// See [`DataSet::save`].
+pub(crate) fn save(set: &DataSet, dir: &Path) -> Result<(), DataError> {
+    let failed = |e: crate::output::OutputError| Place::default().error(Problem::Unwritable(e));
+    let mut staging = Staging::new(dir).map_err(failed)?;
+    let mut entries: Vec<Entry> = Vec::with_capacity(set.records.len());
+    for record in &set.records {
+        let stem = file_stem(&record.name);
+        let file = (1..)
+            .map(|i| match i {
+                1 => format!("{stem}.csv"),
+                _ => format!("{stem}-{i}.csv"),
+            })
+            .find(|name| entries.iter().all(|e| !e.file.eq_ignore_ascii_case(name)))
+            .unwrap_or_default();
+        staging
+            .write(&file, |w| write_record(record, w))
+            .map_err(failed)?;
+        entries.push(Entry {
+            name: record.name.clone(),
+            file,
+            role: record.role,
+        });
+    }
+    let manifest = Manifest {
+        title: set.title.clone(),
+        sample_period_s: set.sample_period_s,
+        record: entries,
+    };
+    let text = toml::to_string(&manifest)
+        .map_err(|e| Place::file(dir).error(Problem::Manifest(e.to_string())))?;
+    staging
+        .write(MANIFEST, |w| w.write_all(text.as_bytes()))
+        .map_err(failed)?;
+    staging.commit().map_err(failed)
+}
+
+/// The record's name as a file name: letters, digits, `-`, `_` and `.` stay, the rest becomes `-`.
+fn file_stem(name: &str) -> String {
+    let stem: String = name
+        .chars()
+        .map(|c| match c {
+            c if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') => c,
+            _ => '-',
+        })
+        .take(80)
+        .collect();
+    let stem = stem.trim_start_matches('.').to_owned();
+    if stem.is_empty() {
+        "record".into()
+    } else {
+        stem
+    }
+}
+
+/// Writes a record as CSV, numbers in the shortest form that reads back to the same bits.
+pub(crate) fn write_record(record: &Record, w: &mut dyn Write) -> io::Result<()> {
+    let columns: Vec<(&str, &[f64])> = record.columns().collect();
+    let mut csv = csv::Writer::from_writer(w);
+    csv.write_field("t")?;
+    for (name, _) in &columns {
+        csv.write_field(name)?;
+    }
+    csv.write_record(None::<&[u8]>)?;
+    let decimals = time_decimals(record);
+    for k in 0..record.len() {
+        csv.write_field(format!("{:.decimals$}", record.time(k)))?;
+        for (_, values) in &columns {
+            let value = values.get(k).copied().unwrap_or(f64::NAN);
+            csv.write_field(value.to_string())?;
+        }
+        csv.write_record(None::<&[u8]>)?;
+    }
+    csv.flush()
+}
+
+/// Decimals with which the times are written: enough that the sampling period and t0 read back exactly where that is
+/// possible (0.001 → 3), at most 12.
+fn time_decimals(record: &Record) -> usize {
+    let exact = |decimals: usize| {
+        let kept = |x: f64| format!("{x:.decimals$}").parse() == Ok(x);
+        kept(record.sample_period_s) && kept(record.t0)
+    };
+    (0..12).find(|&d| exact(d)).unwrap_or(12)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn write(folder: &Path, name: &str, text: &str) {
+        fs::write(folder.join(name), text).unwrap();
+    }
+
+    const CSV: &str = "t,u,y\n0.000,0,0\n0.001,1,0.5\n0.002,1,0.75\n";
+
+    fn message(manifest: &str) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), "a.csv", CSV);
+        write(folder.path(), MANIFEST, manifest);
+        let text = DataSet::load(folder.path()).unwrap_err().to_string();
+        assert!(!text.contains('\n'), "one paragraph: {text}");
+        text
+    }
+
+    #[test]
+    fn folder_manifest_and_single_file_load() {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), "a.csv", CSV);
+        write(
+            folder.path(),
+            MANIFEST,
+            "title = \"T\"\nsample_period_s = 0.001\n[[record]]\nname = \"one\"\nfile = \"a.csv\"\nuse = \"validate\"\n",
+        );
+        for path in [folder.path().to_path_buf(), folder.path().join(MANIFEST)] {
+            let set = DataSet::load(&path).unwrap();
+            assert_eq!(set.title.as_deref(), Some("T"));
+            assert_eq!(set.records[0].name, "one");
+            assert_eq!(set.records[0].role, Use::Validate);
+        }
+        let set = DataSet::load(&folder.path().join("a.csv")).unwrap();
+        assert_eq!(
+            (set.records[0].name.as_str(), set.records[0].role),
+            ("a", Use::Identify)
+        );
+        assert_eq!(set.sample_period_s, 0.001);
+    }
+
+    #[test]
+    fn manifest_faults_name_the_key() {
+        let head = "sample_period_s = 0.001\n";
+        let entry = |file: &str| {
+            format!("{head}[[record]]\nname = \"a\"\nfile = \"{file}\"\nuse = \"identify\"\n")
+        };
+        for (manifest, part) in [
+            (format!("{head}smaple = 1\n"), "smaple"),
+            (format!("{}speed = 3\n", entry("a.csv")), "speed"),
+            (entry("a.csv").replace("identify", "train"), "`train`"),
+            (entry("a.csv").replace("use = \"identify\"\n", ""), "`use`"),
+            (
+                entry("a.csv").replace("0.001", "\"fast\""),
+                "line 1, key `sample_period_s`",
+            ),
+            (
+                entry("a.csv").replace("0.001", "-1"),
+                "key `sample_period_s`",
+            ),
+            (
+                entry("a.csv").replace("0.001", "0.002"),
+                "a.csv, line 3, column `t`",
+            ),
+            (entry("../a.csv"), "key `file`: the path `../a.csv` leaves"),
+            (entry("/etc/passwd"), "leaves the data set's folder"),
+            (entry("."), "is not a file"),
+            (entry("none.csv"), "none.csv: cannot be read"),
+            (head.to_owned(), "[[record]]"),
+            (
+                format!("{}{}", entry("a.csv"), entry("a.csv").replace(head, "")),
+                "used twice",
+            ),
+            ("= 3".to_owned(), "line 1"),
+            (entry("a.csv").replace("\"a\"", "\"\""), "key `name`"),
+        ] {
+            let text = message(&manifest);
+            assert!(text.contains(part), "{manifest}\n-> {text}");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let text = DataSet::load(folder.path()).unwrap_err().to_string();
+        assert!(text.contains("no dataset.toml"), "{text}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_may_not_lead_out_of_the_folder() {
+        let (folder, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        write(other.path(), "secret.csv", CSV);
+        let link = folder.path().join("a.csv");
+        std::os::unix::fs::symlink(other.path().join("secret.csv"), &link).unwrap();
+        write(
+            folder.path(),
+            MANIFEST,
+            "sample_period_s = 0.001\n[[record]]\nname = \"a\"\nfile = \"a.csv\"\nuse = \"identify\"\n",
+        );
+        let text = DataSet::load(folder.path()).unwrap_err().to_string();
+        assert!(text.contains("leaves the data set's folder"), "{text}");
+    }
+
+    #[test]
+    fn what_is_saved_loads_back_to_the_same_bits() {
+        let folder = tempfile::tempdir().unwrap();
+        let n = 300;
+        let mut a = Record::new(
+            "8 Hz / 50 %",
+            Use::Identify,
+            0.001,
+            (0..n).map(|k| f64::from(k % 2)).collect(),
+            (0..n).map(|k| (f64::from(k) * 0.1).sin() / 3.0).collect(),
+        );
+        a.y_sd = Some(vec![1e-7; n as usize]);
+        a.channels
+            .insert("wall, \"T\"".into(), vec![293.15; n as usize]);
+        let mut b = a.clone();
+        b.name = "8 Hz : 50 %".into();
+        b.role = Use::Validate;
+        b.t0 = 12.5;
+        let set = DataSet::from_records(Some("A \"title\"".into()), vec![a, b]).unwrap();
+        let target = folder.path().join("set");
+        set.save(&target).unwrap();
+        let again = DataSet::load(&target).unwrap();
+        assert_eq!(again.records, set.records);
+        assert_eq!((again.hash, again.title), (set.hash, set.title));
+    }
+
+    #[test]
+    fn a_set_that_cannot_be_written_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let record = Record::new("a", Use::Identify, 1.0, vec![0.0, 1.0], vec![0.0, 1.0]);
+        let set = DataSet::from_records(None, vec![record]).unwrap();
+        write(folder.path(), "file", "");
+        assert!(set.save(&folder.path().join("file")).is_err());
+        assert!(set.save(&folder.path().join("no/such/folder")).is_err());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn the_bundled_ramp_records_load() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/ramp-cfd");
+        let set = DataSet::load(&folder).unwrap();
+        assert_eq!(set.sample_period_s, 0.001);
+        assert!(set.is_on_off());
+        assert!(set.records.iter().all(|r| r.len() == 10_000));
+        let names: Vec<&str> = set.validate().map(|r| r.name.as_str()).collect();
+        assert_eq!(names, ["4Hz80"]);
+    }
+
+    #[test]
+    fn real_recordings_load_with_their_own_sampling_periods() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/real");
+        for (file, period) in [
+            ("silverbox/silverbox_train_multisine.csv", 0.0016384),
+            ("emps/emps_train.csv", 0.001),
+            ("gas_furnace/gas_furnace_train.csv", 9.0),
+            ("dc_motor_generator/dc_motor_generator_train.csv", 1.0),
+            ("robot_arm_abb/robot_arm_train.csv", 0.0005),
+            (
+                "wiener_hammerstein_2009/wh_train_first80000.csv",
+                1.0 / 51200.0,
+            ),
+        ] {
+            let path = folder.join(file);
+            if path.exists() {
+                assert_eq!(
+                    DataSet::load(&path).unwrap().sample_period_s,
+                    period,
+                    "{file}"
+                );
+            }
+        }
+    }
+}

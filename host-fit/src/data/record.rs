@@ -1,0 +1,421 @@
+//! Records and data sets: checked once when they are made, trusted afterwards.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::error::{DataError, Place, Problem};
+use super::hash;
+
+/// Names of columns with a meaning of their own; every other column is a measured channel.
+pub(crate) const RESERVED: [&str; 6] = ["t", "u", "y", "y_sd", "y_min", "y_max"];
+
+/// Values beyond this are refused: their squares would not be finite.
+const LARGEST: f64 = 1e100;
+
+/// What a record is used for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Use {
+    /// Parameters are fitted on it.
+    Identify,
+    /// Held out: models are judged on it.
+    Validate,
+}
+
+/// One measured (usually phase-averaged) record, sampled uniformly. History before it is 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    /// Unique within the data set.
+    pub name: String,
+    /// Fitted on, or held out.
+    pub role: Use,
+    /// Sampling period, s, above 0.
+    pub sample_period_s: f64,
+    /// Time of sample 0 as written in the file, s.
+    pub t0: f64,
+    /// Command (or input) per sample; 0 and 1 for an on/off actuator, any finite value otherwise.
+    pub u: Vec<f64>,
+    /// Measured output per sample (normalised friction gain), as long as `u`.
+    pub y: Vec<f64>,
+    /// Standard error of the phase-averaged `y`, ≥ 0, as long as `u`.
+    pub y_sd: Option<Vec<f64>>,
+    /// Lower envelope of `y` over the repeats, as long as `u`.
+    pub y_min: Option<Vec<f64>>,
+    /// Upper envelope of `y` over the repeats, as long as `u`.
+    pub y_max: Option<Vec<f64>>,
+    /// Further measured channels by name (`u_inf`, `temperature` …), each as long as `u`.
+    pub channels: BTreeMap<String, Vec<f64>>,
+}
+
+impl Record {
+    /// A record of input and output alone, starting at t = 0.
+    #[must_use]
+    pub fn new(name: &str, role: Use, sample_period_s: f64, u: Vec<f64>, y: Vec<f64>) -> Self {
+        Self {
+            name: name.to_owned(),
+            role,
+            sample_period_s,
+            t0: 0.0,
+            u,
+            y,
+            y_sd: None,
+            y_min: None,
+            y_max: None,
+            channels: BTreeMap::new(),
+        }
+    }
+
+    /// Number of samples.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.u.len()
+    }
+
+    /// Whether the record has no sample (never true for a record of a [`DataSet`]).
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.u.is_empty()
+    }
+
+    /// Time of sample `k`, s.
+    #[must_use]
+    pub fn time(&self, k: usize) -> f64 {
+        self.t0 + k as f64 * self.sample_period_s
+    }
+
+    /// Whether every value of the command is exactly 0 or 1.
+    #[must_use]
+    pub fn is_on_off(&self) -> bool {
+        self.u.iter().all(|&u| u == 0.0 || u == 1.0)
+    }
+
+    /// Every column with its name, in the order of the file.
+    pub(crate) fn columns(&self) -> impl Iterator<Item = (&str, &[f64])> {
+        [("u", Some(&self.u)), ("y", Some(&self.y))]
+            .into_iter()
+            .chain([
+                ("y_sd", self.y_sd.as_ref()),
+                ("y_min", self.y_min.as_ref()),
+                ("y_max", self.y_max.as_ref()),
+            ])
+            .filter_map(|(name, values)| Some((name, values?.as_slice())))
+            .chain(
+                self.channels
+                    .iter()
+                    .map(|(name, values)| (name.as_str(), values.as_slice())),
+            )
+    }
+
+    /// Checks everything a [`DataSet`] promises about a record; `place` turns a sample into a place in a file.
+    pub(crate) fn check(&self, place: &dyn Fn(Option<usize>) -> Place) -> Result<(), DataError> {
+        if self.name.trim().is_empty() || self.name.chars().any(char::is_control) {
+            return Err(place(None).error(Problem::BadName));
+        }
+        if !(self.sample_period_s.is_finite() && self.sample_period_s > 0.0) {
+            return Err(place(None).error(Problem::BadPeriod(self.sample_period_s)));
+        }
+        if self.u.len() < 2 {
+            return Err(place(None).error(Problem::TooFewRows(self.u.len())));
+        }
+        check_values("t", &[self.t0], place)?;
+        for (name, values) in self.columns() {
+            if values.len() != self.u.len() {
+                return Err(place(None).in_column(name).error(Problem::UnequalLengths {
+                    expected: self.u.len(),
+                    found: values.len(),
+                }));
+            }
+            check_values(name, values, place)?;
+        }
+        if let Some(name) = self
+            .channels
+            .keys()
+            .find(|n| RESERVED.contains(&n.as_str()))
+        {
+            return Err(place(None).in_column(name).error(Problem::ReservedChannel));
+        }
+        if let Some(name) = self.channels.keys().find(|n| {
+            n.trim().is_empty() || n.trim() != n.as_str() || n.chars().any(char::is_control)
+        }) {
+            return Err(place(None).in_column(name).error(Problem::BadName));
+        }
+        if let Some((k, &sd)) = indexed(self.y_sd.as_deref()).find(|&(_, &sd)| sd < 0.0) {
+            return Err(place(Some(k))
+                .in_column("y_sd")
+                .error(Problem::NegativeDeviation(sd)));
+        }
+        let envelope = indexed(self.y_min.as_deref()).zip(self.y_max.iter().flatten());
+        for ((k, &low), &high) in envelope {
+            if low > high {
+                return Err(place(Some(k))
+                    .in_column("y_min")
+                    .error(Problem::EnvelopeCrossed { low, high }));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn indexed(values: Option<&[f64]>) -> impl Iterator<Item = (usize, &f64)> {
+    values.unwrap_or_default().iter().enumerate()
+}
+
+/// Checks that every value is finite and of a sensible size.
+pub(crate) fn check_values(
+    column: &str,
+    values: &[f64],
+    place: &dyn Fn(Option<usize>) -> Place,
+) -> Result<(), DataError> {
+    for (k, &value) in values.iter().enumerate() {
+        let problem = if !value.is_finite() {
+            Problem::NotFinite(value)
+        } else if value.abs() > LARGEST {
+            Problem::TooLarge(value)
+        } else {
+            continue;
+        };
+        return Err(place(Some(k)).in_column(column).error(problem));
+    }
+    Ok(())
+}
+
+/// Records of one rig and one sampling period.
+///
+/// Made by [`DataSet::load`] or [`DataSet::from_records`], which check everything said at [`Record`]; code that takes
+/// a `DataSet` relies on it. Records that are to be changed go through [`DataSet::from_records`] again, which also
+/// renews the hash.
+#[derive(Debug, Clone)]
+pub struct DataSet {
+    /// For reports.
+    pub title: Option<String>,
+    /// Sampling period of every record, s.
+    pub sample_period_s: f64,
+    /// At least one; names are unique.
+    pub records: Vec<Record>,
+    /// Hash of names, uses, sampling period and every value, 16 hexadecimal digits: FNV-1a, 64 bits.
+    pub hash: String,
+    /// Where each record was read from (folder or file, line of each sample), for later messages.
+    pub(crate) origin: Vec<Origin>,
+}
+
+/// Where a record came from.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Origin {
+    pub(crate) file: Option<std::path::PathBuf>,
+    /// Line of each sample, when it came from a file.
+    pub(crate) lines: Vec<u64>,
+}
+
+impl Origin {
+    pub(crate) fn place(&self, name: &str, sample: Option<usize>) -> Place {
+        match &self.file {
+            Some(file) => Place {
+                file: Some(file.clone()),
+                line: sample.and_then(|k| self.lines.get(k).copied()),
+                ..Place::default()
+            },
+            None => Place {
+                record: Some(name.to_owned()),
+                sample,
+                ..Place::default()
+            },
+        }
+    }
+}
+
+impl DataSet {
+    /// A data set from records in memory.
+    ///
+    /// # Errors
+    /// [`DataError`] naming record, sample and column when a record breaks a rule of [`Record`], two records share a
+    /// name, their sampling periods differ, or there is no record.
+    pub fn from_records(title: Option<String>, records: Vec<Record>) -> Result<Self, DataError> {
+        let origin = vec![Origin::default(); records.len()];
+        Self::assemble(title, records, origin, &Place::default())
+    }
+
+    /// Checks the records and what binds them; `whole` is the place for faults of the set itself.
+    pub(crate) fn assemble(
+        title: Option<String>,
+        records: Vec<Record>,
+        origin: Vec<Origin>,
+        whole: &Place,
+    ) -> Result<Self, DataError> {
+        let Some(first) = records.first() else {
+            return Err(whole.clone().error(Problem::NoRecords));
+        };
+        let sample_period_s = first.sample_period_s;
+        for (i, (record, origin)) in records.iter().zip(&origin).enumerate() {
+            record.check(&|sample| origin.place(&record.name, sample))?;
+            if record.sample_period_s != sample_period_s {
+                return Err(origin
+                    .place(&record.name, None)
+                    .error(Problem::PeriodMismatch {
+                        found: record.sample_period_s,
+                        stated: sample_period_s,
+                    }));
+            }
+            if records.iter().take(i).any(|r| r.name == record.name) {
+                return Err(whole
+                    .clone()
+                    .at_key("name")
+                    .error(Problem::DoubledRecord(record.name.clone())));
+            }
+        }
+        Ok(Self {
+            hash: hash::of(sample_period_s, &records),
+            title,
+            sample_period_s,
+            records,
+            origin,
+        })
+    }
+
+    /// The records that parameters are fitted on.
+    pub fn identify(&self) -> impl Iterator<Item = &Record> {
+        self.records.iter().filter(|r| r.role == Use::Identify)
+    }
+
+    /// The records that are held out.
+    pub fn validate(&self) -> impl Iterator<Item = &Record> {
+        self.records.iter().filter(|r| r.role == Use::Validate)
+    }
+
+    /// Whether the command is exactly 0 or 1 throughout.
+    #[must_use]
+    pub fn is_on_off(&self) -> bool {
+        self.records.iter().all(Record::is_on_off)
+    }
+
+    /// Where sample `k` of record `record` stands in the user's files, for messages.
+    #[must_use]
+    pub fn place(&self, record: usize, k: Option<usize>) -> Place {
+        let name = self.records.get(record).map_or("", |r| r.name.as_str());
+        self.origin
+            .get(record)
+            .map_or_else(Place::default, |origin| origin.place(name, k))
+    }
+
+    /// Refuses data whose command is not on/off.
+    ///
+    /// # Errors
+    /// [`DataError`] naming file and line (or record and sample) of the first value that is neither 0 nor 1.
+    pub fn require_on_off(&self) -> Result<(), DataError> {
+        for (i, record) in self.records.iter().enumerate() {
+            if let Some((k, &u)) = indexed(Some(&record.u)).find(|&(_, &u)| u != 0.0 && u != 1.0) {
+                return Err(self
+                    .place(i, Some(k))
+                    .in_column("u")
+                    .error(Problem::NotOnOff(u)));
+            }
+        }
+        Ok(())
+    }
+
+    /// Loads a folder with `dataset.toml`, or one CSV file (then one `identify` record named by the file's stem).
+    ///
+    /// # Errors
+    /// [`DataError`] naming file, line and column (or TOML key) of the first fault found.
+    pub fn load(path: &Path) -> Result<Self, DataError> {
+        super::folder::load(path)
+    }
+
+    /// Writes `dataset.toml` and one CSV per record into the folder `dir`, all together or not at all.
+    ///
+    /// Numbers are written in the shortest form that reads back to the same bits.
+    ///
+    /// # Errors
+    /// [`DataError`] when the folder cannot be written.
+    pub fn save(&self, dir: &Path) -> Result<(), DataError> {
+        super::folder::save(self, dir)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record() -> Record {
+        Record::new(
+            "a",
+            Use::Identify,
+            0.001,
+            vec![0.0, 1.0, 1.0],
+            vec![0.0, 0.1, 0.2],
+        )
+    }
+
+    fn message(change: impl FnOnce(&mut Record)) -> String {
+        let mut r = record();
+        change(&mut r);
+        DataSet::from_records(None, vec![r])
+            .unwrap_err()
+            .to_string()
+    }
+
+    #[test]
+    fn every_rule_of_a_record_is_checked_and_named() {
+        assert!(message(|r| r.y[1] = f64::NAN).contains("record `a`, sample 1, column `y`"));
+        assert!(message(|r| r.u[0] = 1e200).contains("units"));
+        assert!(message(|r| r.y.truncate(2)).contains("2 values where u has 3"));
+        assert!(
+            message(|r| r.y_sd = Some(vec![0.0, 0.0, -0.1])).contains("sample 2, column `y_sd`")
+        );
+        assert!(message(|r| r.sample_period_s = 0.0).contains("above 0"));
+        assert!(message(|r| r.t0 = f64::INFINITY).contains("column `t`"));
+        assert!(message(|r| r.name = " ".into()).contains("empty"));
+        assert!(
+            message(|r| {
+                r.channels.insert("y_sd".into(), vec![0.0; 3]);
+            })
+            .contains("reserved")
+        );
+        assert!(
+            message(|r| {
+                r.y_min = Some(vec![0.0, 0.0, 2.0]);
+                r.y_max = Some(vec![1.0, 1.0, 1.0]);
+            })
+            .contains("sample 2, column `y_min`")
+        );
+        assert!(
+            message(|r| {
+                r.u.truncate(1);
+                r.y.truncate(1);
+            })
+            .contains("at least 2")
+        );
+    }
+
+    #[test]
+    fn sets_need_unique_names_and_one_period() {
+        let error = |records| {
+            DataSet::from_records(None, records)
+                .unwrap_err()
+                .to_string()
+        };
+        assert!(error(vec![]).contains("[[record]]"));
+        assert!(error(vec![record(), record()]).contains("used twice"));
+        let other = Record {
+            name: "b".into(),
+            sample_period_s: 0.002,
+            ..record()
+        };
+        assert!(error(vec![record(), other]).contains("0.002"));
+    }
+
+    #[test]
+    fn on_off_is_asked_for_where_needed() {
+        let mut half = record();
+        half.u[2] = 0.5;
+        let set = DataSet::from_records(None, vec![half]).unwrap();
+        assert!(!set.is_on_off());
+        let text = set.require_on_off().unwrap_err().to_string();
+        assert!(
+            text.contains("sample 2, column `u`") && text.contains("0.5"),
+            "{text}"
+        );
+        let set = DataSet::from_records(None, vec![record()]).unwrap();
+        assert!(set.require_on_off().is_ok());
+        assert_eq!((set.identify().count(), set.validate().count()), (1, 0));
+    }
+}

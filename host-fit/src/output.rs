@@ -1,0 +1,305 @@
+//! Output files appear whole or not at all.
+//!
+//! A file is written under a temporary name in the folder it belongs to, flushed to the disk and renamed; several
+//! files that belong together are written into a temporary folder first ([`Staging`]). An error, a full disk or a
+//! killed process therefore never leaves half a file under the name the user asked for.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Component, Path, PathBuf};
+
+/// Why an output could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OutputError {
+    /// The operating system refused (no such folder, no permission, disk full …).
+    #[error("{path} cannot be written ({cause}); nothing was left behind; check that its folder exists, may be written to and has space", path = .path.display())]
+    Io {
+        /// The file or folder that was asked for.
+        path: PathBuf,
+        /// What the operating system said.
+        cause: io::Error,
+    },
+    /// The path names a folder, the root, or nothing.
+    #[error("{path} does not name a file; give a file name", path = .path.display())]
+    NoFileName {
+        /// The path that was asked for.
+        path: PathBuf,
+    },
+    /// A name inside a [`Staging`] folder that leads out of it.
+    #[error("{path} leads out of the output folder; use a plain relative name", path = .path.display())]
+    Outside {
+        /// The name that was asked for.
+        path: PathBuf,
+    },
+}
+
+/// Writes a file through `write`; the file appears under `path` only when everything went well.
+///
+/// An existing file is replaced (through a symbolic link, its target). A path that exists and is not a regular file
+/// (`/dev/stdout`, a pipe) is written to directly: there is nothing to rename.
+///
+/// # Errors
+/// [`OutputError`] when the temporary file cannot be made, `write` fails, or the rename is refused; the previous
+/// content of `path` is then untouched.
+pub fn write_atomic<F>(path: &Path, write: F) -> Result<(), OutputError>
+where
+    F: FnOnce(&mut dyn Write) -> io::Result<()>,
+{
+    let failed = |cause: io::Error| OutputError::Io {
+        path: path.to_path_buf(),
+        cause,
+    };
+    let target = match fs::canonicalize(path) {
+        Ok(existing) => existing,
+        Err(e) if e.kind() == io::ErrorKind::NotFound => path.to_path_buf(),
+        Err(e) => return Err(failed(e)),
+    };
+    if target.is_dir() || target.file_name().is_none() {
+        return Err(OutputError::NoFileName {
+            path: path.to_path_buf(),
+        });
+    }
+    if target.exists() && !target.is_file() {
+        let mut device = BufWriter::new(File::options().write(true).open(&target).map_err(failed)?);
+        return write(&mut device)
+            .and_then(|()| device.flush())
+            .map_err(failed);
+    }
+    let mut temporary = permissions_of_a_plain_file(tempfile::Builder::new().prefix(".host-fit-"))
+        .tempfile_in(parent_of(&target))
+        .map_err(failed)?;
+    {
+        let mut buffered = BufWriter::with_capacity(1 << 16, temporary.as_file_mut());
+        write(&mut buffered)
+            .and_then(|()| buffered.flush())
+            .map_err(failed)?;
+    }
+    temporary.as_file().sync_all().map_err(failed)?;
+    temporary.persist(&target).map_err(|e| failed(e.error))?;
+    Ok(())
+}
+
+/// Several output files that belong together: written into a temporary folder beside the target, moved in together.
+///
+/// Dropped without [`Staging::commit`], it removes everything it wrote.
+#[derive(Debug)]
+pub struct Staging {
+    target: PathBuf,
+    folder: tempfile::TempDir,
+    names: Vec<PathBuf>,
+}
+
+impl Staging {
+    /// Starts the files of the folder `target`, which need not exist yet (its parent must).
+    ///
+    /// # Errors
+    /// [`OutputError`] when `target` is a file, or no folder can be made beside it.
+    pub fn new(target: &Path) -> Result<Self, OutputError> {
+        let failed = |cause: io::Error| OutputError::Io {
+            path: target.to_path_buf(),
+            cause,
+        };
+        let real = match fs::canonicalize(target) {
+            Ok(existing) if existing.is_dir() => existing,
+            Ok(_) => return Err(failed(io::Error::from(io::ErrorKind::NotADirectory))),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => target.to_path_buf(),
+            Err(e) => return Err(failed(e)),
+        };
+        let folder = permissions_of_a_plain_folder(tempfile::Builder::new().prefix(".host-fit-"))
+            .tempdir_in(parent_of(&real))
+            .map_err(failed)?;
+        Ok(Self {
+            target: real,
+            folder,
+            names: Vec::new(),
+        })
+    }
+
+    /// Writes one file, `name` relative to the target folder (sub-folders are made).
+    ///
+    /// # Errors
+    /// [`OutputError`] when the name leads out of the folder or the file cannot be written.
+    pub fn write<F>(&mut self, name: &str, write: F) -> Result<(), OutputError>
+    where
+        F: FnOnce(&mut dyn Write) -> io::Result<()>,
+    {
+        let relative = Path::new(name);
+        let plain = relative
+            .components()
+            .all(|c| matches!(c, Component::Normal(_)));
+        if !plain || relative.file_name().is_none() {
+            return Err(OutputError::Outside {
+                path: relative.to_path_buf(),
+            });
+        }
+        let staged = self.folder.path().join(relative);
+        let named = |e: OutputError| match e {
+            OutputError::Io { cause, .. } => OutputError::Io {
+                path: self.target.join(relative),
+                cause,
+            },
+            other => other,
+        };
+        fs::create_dir_all(parent_of(&staged)).map_err(|cause| {
+            named(OutputError::Io {
+                path: staged.clone(),
+                cause,
+            })
+        })?;
+        write_atomic(&staged, write).map_err(named)?;
+        if !self.names.iter().any(|n| n == relative) {
+            self.names.push(relative.to_path_buf());
+        }
+        Ok(())
+    }
+
+    /// Moves everything into the target folder, in the order it was written; files of the same names are replaced.
+    ///
+    /// A target that does not exist yet appears complete in one rename.
+    ///
+    /// # Errors
+    /// [`OutputError`] when a rename is refused.
+    pub fn commit(self) -> Result<(), OutputError> {
+        let failed = |path: &Path, cause: io::Error| OutputError::Io {
+            path: path.to_path_buf(),
+            cause,
+        };
+        if !self.target.exists() {
+            fs::rename(self.folder.path(), &self.target).map_err(|e| failed(&self.target, e))?;
+            // The folder has its final name now: there is nothing left to remove.
+            let _ = self.folder.keep();
+            return Ok(());
+        }
+        let destinations: Vec<PathBuf> = self.names.iter().map(|n| self.target.join(n)).collect();
+        if let Some(folder) = destinations.iter().find(|d| d.is_dir()) {
+            return Err(failed(folder, io::Error::from(io::ErrorKind::IsADirectory)));
+        }
+        for (name, destination) in self.names.iter().zip(&destinations) {
+            fs::create_dir_all(parent_of(destination)).map_err(|e| failed(destination, e))?;
+            fs::rename(self.folder.path().join(name), destination)
+                .map_err(|e| failed(destination, e))?;
+        }
+        Ok(())
+    }
+}
+
+fn parent_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// Temporary files are private by default; an output file has the permissions the user's umask gives.
+fn permissions_of_a_plain_file<'a, 'b>(
+    builder: &'a mut tempfile::Builder<'b, 'b>,
+) -> &'a mut tempfile::Builder<'b, 'b> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder
+}
+
+fn permissions_of_a_plain_folder<'a, 'b>(
+    builder: &'a mut tempfile::Builder<'b, 'b>,
+) -> &'a mut tempfile::Builder<'b, 'b> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o777));
+    }
+    builder
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entries(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> = fs::read_dir(folder)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    fn full_disk(w: &mut dyn Write) -> io::Result<()> {
+        w.write_all(&[b'x'; 100_000])?;
+        Err(io::Error::from(io::ErrorKind::StorageFull))
+    }
+
+    #[test]
+    fn a_failing_writer_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model.toml");
+        assert!(write_atomic(&path, full_disk).is_err());
+        assert!(entries(folder.path()).is_empty());
+        write_atomic(&path, |w| w.write_all(b"old")).unwrap();
+        let message = write_atomic(&path, full_disk).unwrap_err().to_string();
+        assert!(message.contains("model.toml"), "{message}");
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(entries(folder.path()), ["model.toml"]);
+        assert!(write_atomic(folder.path(), |w| w.write_all(b"x")).is_err());
+        assert!(write_atomic(&folder.path().join("no/such/x"), |w| w.write_all(b"x")).is_err());
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_device_is_written_to_and_not_replaced() {
+        use std::os::unix::fs::FileTypeExt;
+        let error = write_atomic(Path::new("/dev/full"), |w| w.write_all(b"x")).unwrap_err();
+        assert!(
+            matches!(error, OutputError::Io { ref cause, .. } if cause.kind() == io::ErrorKind::StorageFull),
+            "{error}"
+        );
+        write_atomic(Path::new("/dev/null"), |w| w.write_all(b"x")).unwrap();
+        let kind = fs::metadata("/dev/null").unwrap().file_type();
+        assert!(kind.is_char_device());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_keeps_pointing_and_the_file_is_readable_by_others() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let (real, link) = (folder.path().join("real"), folder.path().join("link"));
+        write_atomic(&real, |w| w.write_all(b"1")).unwrap();
+        std::os::unix::fs::symlink(&real, &link).unwrap();
+        write_atomic(&link, |w| w.write_all(b"2")).unwrap();
+        assert_eq!(fs::read(&real).unwrap(), b"2");
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        let plain = folder.path().join("plain");
+        fs::write(&plain, b"").unwrap();
+        let mode = |p: &Path| fs::metadata(p).unwrap().permissions().mode();
+        assert_eq!(mode(&real), mode(&plain));
+    }
+
+    #[test]
+    fn staged_files_appear_together_or_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("out");
+        {
+            let mut staging = Staging::new(&target).unwrap();
+            staging.write("a.csv", |w| w.write_all(b"a")).unwrap();
+            assert!(staging.write("b.csv", full_disk).is_err());
+        }
+        assert!(entries(folder.path()).is_empty());
+        for content in [b"1", b"2"] {
+            let mut staging = Staging::new(&target).unwrap();
+            staging.write("a.csv", |w| w.write_all(content)).unwrap();
+            staging
+                .write("sub/b.csv", |w| w.write_all(content))
+                .unwrap();
+            assert!(staging.write("../c.csv", |w| w.write_all(content)).is_err());
+            staging.commit().unwrap();
+            assert_eq!(entries(folder.path()), ["out"]);
+            assert_eq!(entries(&target), ["a.csv", "sub"]);
+            assert_eq!(fs::read(target.join("sub/b.csv")).unwrap(), content);
+        }
+        assert!(Staging::new(&target.join("a.csv")).is_err());
+    }
+}

@@ -1,2 +1,41 @@
-//! xtask
-fn main() {}
+//! The project's chores; `cargo xtask help` lists them.
+
+mod ci;
+mod setup;
+mod shell;
+
+use std::process::ExitCode;
+
+/// A subcommand; each has a file of its own.
+struct Task {
+    name: &'static str,
+    does: &'static str,
+    run: fn(&[String]) -> anyhow::Result<()>,
+}
+
+const TASKS: &[Task] = &[ci::TASK, setup::TASK];
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let Some((name, rest)) = arguments.split_first() else {
+        return usage();
+    };
+    let Some(task) = TASKS.iter().find(|task| task.name == name) else {
+        return usage();
+    };
+    match (task.run)(rest) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("xtask {name}: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn usage() -> ExitCode {
+    eprintln!("cargo xtask TASK [OPTIONS]");
+    for task in TASKS {
+        eprintln!("  {:<16} {}", task.name, task.does);
+    }
+    ExitCode::from(2)
+}

@@ -1,0 +1,79 @@
+//! Everything CI runs, in one command; failures are collected, not fatal.
+
+use crate::Task;
+use crate::setup::TARGETS;
+use crate::shell::{cargo, run};
+use anyhow::{Result, bail};
+use std::time::Instant;
+
+pub(crate) const TASK: Task = Task {
+    name: "ci",
+    does: "everything CI runs; goes on after a failure and lists all at the end",
+    run: ci,
+};
+
+type Step = (&'static str, fn() -> Result<()>);
+
+const STEPS: &[Step] = &[
+    ("format", || run(&mut cargo(&["fmt", "--all", "--check"]))),
+    ("lints", || {
+        run(&mut cargo(&[
+            "clippy",
+            "--release",
+            "--workspace",
+            "--all-targets",
+            "--",
+            "-Dwarnings",
+        ]))
+    }),
+    // The README's test command; documentation examples are part of it.
+    ("tests", || {
+        run(&mut cargo(&["test", "--release", "--workspace"]))
+    }),
+    ("documentation", || {
+        run(cargo(&["doc", "--release", "--workspace", "--no-deps"])
+            .env("RUSTDOCFLAGS", "-Dwarnings"))
+    }),
+    ("set-up", || crate::setup::setup(&[])),
+    ("no_std", || {
+        TARGETS
+            .iter()
+            .try_for_each(|target| crate::setup::cross_build(target, &["--package", "model-core"]))
+    }),
+];
+
+fn ci(arguments: &[String]) -> Result<()> {
+    if let Some(unknown) = arguments
+        .iter()
+        .find(|name| STEPS.iter().all(|(step, _)| step != name))
+    {
+        let names: Vec<&str> = STEPS.iter().map(|(name, _)| *name).collect();
+        bail!(
+            "no step `{unknown}`; the steps are: {} (none named: all)",
+            names.join(", ")
+        );
+    }
+    let chosen = |name: &str| arguments.is_empty() || arguments.iter().any(|a| a == name);
+    let mut rows = Vec::new();
+    for (name, step) in STEPS.iter().filter(|(name, _)| chosen(name)) {
+        eprintln!("\n== {name}");
+        let started = Instant::now();
+        let result = step();
+        if let Err(error) = &result {
+            eprintln!("{name}: {error:#}");
+        }
+        rows.push((*name, started.elapsed().as_secs_f64(), result));
+    }
+    println!("\nci: {} steps", rows.len());
+    for (name, seconds, result) in &rows {
+        match result {
+            Ok(()) => println!("  ok      {name:<16} {seconds:7.1} s"),
+            Err(error) => println!("  FAILED  {name:<16} {seconds:7.1} s  {error:#}"),
+        }
+    }
+    let failed = rows.iter().filter(|(.., result)| result.is_err()).count();
+    if failed > 0 {
+        bail!("{failed} of {} steps failed", rows.len());
+    }
+    Ok(())
+}

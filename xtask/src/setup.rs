@@ -1,0 +1,162 @@
+//! Installs what cross builds and board runs need.
+//!
+//! Where rustup manages the toolchain it fetches the targets' `core`. Where the
+//! compiler is a distribution's own, Debian's `rustc-web` with `rust-web-src`
+//! builds `core` from source.
+
+use crate::Task;
+use crate::shell::{cargo, command, exists, output, run, shown};
+use anyhow::{Context, Result, bail};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+pub(crate) const TASK: Task = Task {
+    name: "setup",
+    does: "installs the cross targets, QEMU and the C peer's compiler",
+    run: setup,
+};
+
+/// Cortex-M4F (the boards here), M0+ and M33 (builds without board code).
+pub(crate) const TARGETS: [&str; 3] = [
+    "thumbv7em-none-eabihf",
+    "thumbv6m-none-eabi",
+    "thumbv8m.main-none-eabihf",
+];
+
+/// Debian's compiler; `core` is built by it from `rust-web-src`.
+const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
+
+/// Where `core` for the targets comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Core {
+    /// The toolchain in use has it built.
+    Prebuilt,
+    /// The toolchain in use has its source.
+    FromSource,
+    /// Debian's compiler has its source.
+    FromDebianSource,
+}
+
+pub(crate) fn setup(_arguments: &[String]) -> Result<()> {
+    let packages: Vec<&str> = [
+        ("qemu-system-arm", "qemu-system-arm"),
+        ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
+        ("arm-none-eabi-gcc", "libnewlib-arm-none-eabi"),
+    ]
+    .into_iter()
+    .filter(|(program, _)| !exists(program))
+    .map(|(_, package)| package)
+    .collect();
+    install(&packages)?;
+    if core_source().is_none() && exists("rustup") {
+        let mut add = command("rustup", &["target", "add"]);
+        add.args(TARGETS);
+        if let Err(error) = run(&mut add) {
+            eprintln!("rustup cannot fetch the targets ({error:#})");
+        }
+    }
+    if core_source().is_none() {
+        install(&["rustc-web", "rust-web-src", "rust-web-llvm"])?;
+    }
+    let core = core_source().context(
+        "no `core` for the targets: install rustup, or Debian's rustc-web and rust-web-src",
+    )?;
+    eprintln!("set up; core: {core:?}");
+    Ok(())
+}
+
+fn install(packages: &[&str]) -> Result<()> {
+    if packages.is_empty() {
+        return Ok(());
+    }
+    if !exists("apt-get") {
+        bail!(
+            "missing {}; install by this system's own means",
+            packages.join(", ")
+        );
+    }
+    let apt = |arguments: &[&str]| {
+        let mut apt = if is_root() {
+            command("apt-get", arguments)
+        } else {
+            let mut sudo = command("sudo", &["apt-get"]);
+            sudo.args(arguments);
+            sudo
+        };
+        apt.env("DEBIAN_FRONTEND", "noninteractive");
+        apt
+    };
+    // Lists may be old but good enough: only a failed install asks for new ones.
+    let mut arguments = vec!["install", "--yes", "--quiet", "--no-install-recommends"];
+    arguments.extend(packages);
+    if run(&mut apt(&arguments)).is_ok() {
+        return Ok(());
+    }
+    run(&mut apt(&["update", "--quiet"]))?;
+    run(&mut apt(&arguments))
+}
+
+fn is_root() -> bool {
+    output(&mut command("id", &["-u"])).is_ok_and(|id| id.trim() == "0")
+}
+
+fn sysroot(rustc: &Path) -> Option<PathBuf> {
+    let printed = Command::new(rustc)
+        .args(["--print", "sysroot"])
+        .current_dir(crate::shell::root())
+        .output()
+        .ok()?;
+    let path = String::from_utf8(printed.stdout).ok()?;
+    (!path.trim().is_empty()).then(|| PathBuf::from(path.trim()))
+}
+
+fn core_source() -> Option<Core> {
+    let source = |root: &Path| root.join("lib/rustlib/src/rust/library/core").is_dir();
+    let own = sysroot(Path::new("rustc"))?;
+    let built = |target: &&str| own.join("lib/rustlib").join(target).join("lib").is_dir();
+    if TARGETS.iter().all(built) {
+        return Some(Core::Prebuilt);
+    }
+    if source(&own) {
+        return Some(Core::FromSource);
+    }
+    let debian = Path::new(DEBIAN_RUSTC);
+    let has_source = debian.is_file() && sysroot(debian).is_some_and(|root| source(&root));
+    has_source.then_some(Core::FromDebianSource)
+}
+
+/// `cargo` with what it takes to build for `target`; the caller adds the
+/// subcommand's own arguments.
+pub(crate) fn cross_cargo(subcommand: &str, target: &str) -> Result<Command> {
+    let mut build = cargo(&[subcommand, "--release", "--target", target]);
+    let core = core_source().context("no `core` for the boards; run `cargo xtask setup`")?;
+    if core != Core::Prebuilt {
+        build.arg("-Zbuild-std=core").env("RUSTC_BOOTSTRAP", "1");
+    }
+    if core == Core::FromDebianSource {
+        build.env("RUSTC", DEBIAN_RUSTC);
+        let own = sysroot(Path::new("rustc")).context("rustc has no sysroot")?;
+        let linker = rust_lld(&own).context("the toolchain has no rust-lld")?;
+        let key = format!(
+            "CARGO_TARGET_{}_LINKER",
+            target.to_uppercase().replace(['-', '.'], "_")
+        );
+        build.env(key, linker);
+    }
+    Ok(build)
+}
+
+fn rust_lld(sysroot: &Path) -> Option<PathBuf> {
+    let hosts = std::fs::read_dir(sysroot.join("lib/rustlib")).ok()?;
+    hosts
+        .flatten()
+        .map(|host| host.path().join("bin/rust-lld"))
+        .find(|path| path.is_file())
+}
+
+/// Builds for `target` without linking a program.
+pub(crate) fn cross_build(target: &str, arguments: &[&str]) -> Result<()> {
+    let mut build = cross_cargo("build", target)?;
+    build.args(arguments);
+    run(&mut build).with_context(|| format!("for {target}: `{}`", shown(&build)))
+}

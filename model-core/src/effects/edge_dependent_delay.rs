@@ -28,15 +28,22 @@ pub struct Run {
     samples: u32,
 }
 
+impl Default for Run {
+    /// Off for ever.
+    fn default() -> Self {
+        Self {
+            on: false,
+            samples: u32::MAX,
+        }
+    }
+}
+
 impl<T: Real> DelayLaw<T> for EdgeDependentDelay<T> {
     type State = Run;
     const INTERPOLATES: bool = true;
 
     fn start(&self) -> Run {
-        Run {
-            on: false,
-            samples: u32::MAX,
-        }
+        Run::default()
     }
 
     #[inline]

@@ -1,0 +1,184 @@
+//! Forward-mode derivatives: numbers that carry `P` partial derivatives.
+//!
+//! Running `model-core` in [`Dual`] gives exact sensitivities of a free run
+//! from the very code that runs on the board.
+
+use model_core::Real;
+use std::cmp::Ordering;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A value and its derivatives with respect to `P` parameters.
+///
+/// Ordering looks at the value alone; equality at everything, so that a zero
+/// that still depends on a parameter is not taken for nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dual<const P: usize> {
+    /// The value.
+    pub value: f64,
+    /// ∂value/∂parameter.
+    pub partials: [f64; P],
+}
+
+impl<const P: usize> Dual<P> {
+    /// A number that depends on nothing.
+    #[must_use]
+    pub const fn constant(value: f64) -> Self {
+        Self {
+            value,
+            partials: [0.0; P],
+        }
+    }
+
+    /// The parameter with index `index` itself; a constant if `index >= P`.
+    #[must_use]
+    pub fn parameter(value: f64, index: usize) -> Self {
+        let mut dual = Self::constant(value);
+        if let Some(partial) = dual.partials.get_mut(index) {
+            *partial = 1.0;
+        }
+        dual
+    }
+
+    /// f(self), given f and f′ at the value.
+    #[inline]
+    fn chain(self, value: f64, slope: f64) -> Self {
+        let mut partials = self.partials;
+        for partial in &mut partials {
+            *partial *= slope;
+        }
+        Self { value, partials }
+    }
+}
+
+impl<const P: usize> PartialOrd for Dual<P> {
+    #[inline]
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        self.value.partial_cmp(&other.value)
+    }
+}
+
+impl<const P: usize> Add for Dual<P> {
+    type Output = Self;
+    #[inline]
+    fn add(mut self, other: Self) -> Self {
+        self.value += other.value;
+        for (partial, theirs) in self.partials.iter_mut().zip(other.partials) {
+            *partial += theirs;
+        }
+        self
+    }
+}
+
+impl<const P: usize> Sub for Dual<P> {
+    type Output = Self;
+    #[inline]
+    fn sub(mut self, other: Self) -> Self {
+        self.value -= other.value;
+        for (partial, theirs) in self.partials.iter_mut().zip(other.partials) {
+            *partial -= theirs;
+        }
+        self
+    }
+}
+
+impl<const P: usize> Mul for Dual<P> {
+    type Output = Self;
+    #[inline]
+    fn mul(self, other: Self) -> Self {
+        let mut partials = [0.0; P];
+        for ((partial, mine), theirs) in partials.iter_mut().zip(self.partials).zip(other.partials)
+        {
+            *partial = mine * other.value + theirs * self.value;
+        }
+        Self {
+            value: self.value * other.value,
+            partials,
+        }
+    }
+}
+
+impl<const P: usize> Div for Dual<P> {
+    type Output = Self;
+    #[inline]
+    fn div(self, other: Self) -> Self {
+        let value = self.value / other.value;
+        let mut partials = [0.0; P];
+        for ((partial, mine), theirs) in partials.iter_mut().zip(self.partials).zip(other.partials)
+        {
+            *partial = (mine - theirs * value) / other.value;
+        }
+        Self { value, partials }
+    }
+}
+
+impl<const P: usize> Neg for Dual<P> {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        self.chain(-self.value, -1.0)
+    }
+}
+
+impl<const P: usize> Real for Dual<P> {
+    const ZERO: Self = Self::constant(0.0);
+    const ONE: Self = Self::constant(1.0);
+    fn from_f64(value: f64) -> Self {
+        Self::constant(value)
+    }
+    fn from_count(count: u32) -> Self {
+        Self::constant(f64::from(count))
+    }
+    fn value(self) -> f64 {
+        self.value
+    }
+    fn exp(self) -> Self {
+        let value = Real::exp(self.value);
+        self.chain(value, value)
+    }
+    fn sin(self) -> Self {
+        self.chain(Real::sin(self.value), Real::cos(self.value))
+    }
+    fn cos(self) -> Self {
+        self.chain(Real::cos(self.value), -Real::sin(self.value))
+    }
+    fn sqrt(self) -> Self {
+        let value = Real::sqrt(self.value);
+        // At 0 the slope is infinite; 0 keeps a search from running away.
+        self.chain(value, if value > 0.0 { 0.5 / value } else { 0.0 })
+    }
+    fn cbrt(self) -> Self {
+        let value = Real::cbrt(self.value);
+        let slope = if value == 0.0 {
+            0.0
+        } else {
+            1.0 / (3.0 * value * value)
+        };
+        self.chain(value, slope)
+    }
+    fn round(self) -> i32 {
+        Real::round(self.value)
+    }
+    fn floor(self) -> i32 {
+        Real::floor(self.value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn derivatives_are_those_of_finite_differences() {
+        fn f<T: Real>(x: T, y: T) -> T {
+            let e = (-x * y).exp() + (x / y).sqrt() - (x * x).cbrt();
+            (e.sin() * y - (x + y).cos()) / (T::ONE + x)
+        }
+        let (x, y, h) = (0.7, 1.3, 1e-6);
+        let dual = f(Dual::<2>::parameter(x, 0), Dual::<2>::parameter(y, 1));
+        assert_eq!(dual.value, f(x, y));
+        let by_x = (f(x + h, y) - f(x - h, y)) / (2.0 * h);
+        let by_y = (f(x, y + h) - f(x, y - h)) / (2.0 * h);
+        assert!((dual.partials[0] - by_x).abs() < 1e-8);
+        assert!((dual.partials[1] - by_y).abs() < 1e-8);
+    }
+}

@@ -1,0 +1,400 @@
+//! Levenberg–Marquardt on the free run, ε of eq. (9), with exact sensitivities
+//! of everything smooth and secants for what acts in steps.
+
+use crate::data::Record;
+use crate::dual::Dual;
+use crate::linalg;
+use crate::model::{Coordinate, Model};
+use crate::simulate::{Signals, SimulateError, Simulator};
+use model_core::Output;
+use rayon::prelude::*;
+use std::ops::ControlFlow;
+
+/// Derivatives carried by one run.
+const CHUNK: usize = 8;
+
+/// How to fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitOptions {
+    /// Most iterations.
+    pub iterations: usize,
+    /// Stop when an iteration lowers the sum of squares by less than this fraction.
+    pub tolerance: f64,
+    /// Whether the constant d may differ from 0.
+    pub constant: bool,
+    /// Whether coefficients a, b, c and d move.
+    pub linear: bool,
+}
+
+impl Default for FitOptions {
+    fn default() -> Self {
+        Self {
+            iterations: 30,
+            tolerance: 1e-5,
+            constant: false,
+            linear: true,
+        }
+    }
+}
+
+/// What a fit gives.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The model with its fitted parameters.
+    pub model: Model,
+    /// Σ (y − y_sim)² over the records.
+    pub sum_of_squares: f64,
+    /// Samples that were judged.
+    pub samples: usize,
+    /// Indices of the coordinates that moved.
+    pub free: Vec<usize>,
+    /// Covariance of the free coordinates that allows for correlated residuals,
+    /// row-major; empty if the information matrix is singular.
+    pub covariance: Vec<f64>,
+    /// Iterations made.
+    pub iterations: usize,
+}
+
+impl Fit {
+    /// Standard error of the coordinate with index `index`, if it is known.
+    #[must_use]
+    pub fn standard_error(&self, index: usize) -> Option<f64> {
+        let n = self.free.len();
+        let at = self.free.iter().position(|free| *free == index)?;
+        let variance = self.covariance.get(at * n + at)?;
+        (*variance >= 0.0).then(|| variance.sqrt())
+    }
+}
+
+/// How a coordinate is searched.
+#[derive(Clone, Copy, Debug)]
+struct Axis {
+    index: usize,
+    logarithmic: bool,
+    low: f64,
+    high: f64,
+    /// Half width of the secant, for coordinates that act in steps.
+    secant: Option<f64>,
+}
+
+impl Axis {
+    fn of(index: usize, coordinate: &Coordinate) -> Self {
+        match coordinate.parameter() {
+            None => Self {
+                index,
+                logarithmic: false,
+                low: f64::NEG_INFINITY,
+                high: f64::INFINITY,
+                secant: None,
+            },
+            Some(parameter) => Self {
+                index,
+                logarithmic: parameter.is_logarithmic(),
+                low: parameter.low,
+                high: parameter.high,
+                secant: (!coordinate.is_smooth()).then_some(match parameter.unit {
+                    "samples" => 0.6,
+                    "1/y" => 0.5,
+                    _ => 0.01,
+                }),
+            },
+        }
+    }
+
+    /// d value / d searched.
+    fn slope(&self, value: f64) -> f64 {
+        if self.logarithmic { value } else { 1.0 }
+    }
+
+    fn moved(&self, value: f64, step: f64) -> f64 {
+        let moved = if self.logarithmic {
+            // A step of more than a factor e² is a leap in the dark.
+            value * step.clamp(-2.0, 2.0).exp()
+        } else {
+            value + step
+        };
+        moved.clamp(self.low, self.high)
+    }
+}
+
+/// Residuals and Jacobian of one record.
+struct Linearised {
+    residual: Vec<f64>,
+    /// ∂y_sim/∂searched, one series per axis.
+    jacobian: Vec<Vec<f64>>,
+}
+
+struct Problem<'a> {
+    model: &'a Model,
+    signals: Vec<Signals<'a>>,
+    measured: Vec<&'a [f64]>,
+    axes: Vec<Axis>,
+    warm_up: usize,
+}
+
+impl Problem<'_> {
+    /// y_sim of a record; `None` if it diverges.
+    fn run(&self, values: &[f64], record: usize) -> Option<Vec<f64>> {
+        let signals = &self.signals[record];
+        let mut y = Vec::with_capacity(signals.u.len());
+        let simulator = Simulator::with_values(self.model, values);
+        let left = simulator.run(signals, |_, output: &Output<f64>| {
+            y.push(output.measured);
+            ControlFlow::Continue(())
+        });
+        left.is_none().then_some(y)
+    }
+
+    /// Σ r²; infinite if a run diverges, and not summed beyond `enough`.
+    fn cost(&self, values: &[f64], enough: f64) -> f64 {
+        let simulator = Simulator::with_values(self.model, values);
+        let each = |record: usize| {
+            let measured = self.measured[record];
+            let mut sum = 0.0;
+            let left = simulator.run(&self.signals[record], |k, output: &Output<f64>| {
+                if k >= self.warm_up {
+                    let error = measured[k] - output.measured;
+                    sum += error * error;
+                }
+                // NaN breaks off too.
+                if sum <= enough { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            });
+            if left.is_some() || sum.is_nan() { f64::INFINITY } else { sum }
+        };
+        let sums: Vec<f64> = (0..self.signals.len()).into_par_iter().map(each).collect();
+        sums.iter().sum()
+    }
+
+    fn linearise(&self, values: &[f64], record: usize) -> Option<Linearised> {
+        let simulated = self.run(values, record)?;
+        let measured = self.measured[record];
+        let residual = |(k, sim): (usize, &f64)| {
+            if k < self.warm_up { 0.0 } else { measured[k] - sim }
+        };
+        let residual: Vec<f64> = simulated.iter().enumerate().map(residual).collect();
+        let mut jacobian: Vec<Vec<f64>> = vec![Vec::new(); self.axes.len()];
+        let smooth: Vec<usize> =
+            (0..self.axes.len()).filter(|axis| self.axes[*axis].secant.is_none()).collect();
+        for chunk in smooth.chunks(CHUNK) {
+            let mut duals: Vec<Dual<CHUNK>> = values.iter().map(|v| Dual::constant(*v)).collect();
+            for (slot, axis) in chunk.iter().enumerate() {
+                let axis = &self.axes[*axis];
+                let value = values[axis.index];
+                duals[axis.index].partials[slot] = axis.slope(value);
+                jacobian[chunk[slot]] = Vec::with_capacity(simulated.len());
+            }
+            let simulator = Simulator::with_values(self.model, &duals);
+            simulator.run(&self.signals[record], |k, output: &Output<Dual<CHUNK>>| {
+                for (slot, axis) in chunk.iter().enumerate() {
+                    let slope = output.measured.partials[slot];
+                    jacobian[*axis].push(if k < self.warm_up { 0.0 } else { slope });
+                }
+                ControlFlow::Continue(())
+            });
+        }
+        for (axis, column) in self.axes.iter().zip(&mut jacobian) {
+            let Some(half) = axis.secant else { continue };
+            let at = |shift: f64| {
+                let mut moved = values.to_vec();
+                moved[axis.index] = (values[axis.index] + shift).clamp(axis.low, axis.high);
+                (moved[axis.index], self.run(&moved, record))
+            };
+            let ((above, high), (below, low)) = (at(half), at(-half));
+            let (high, low) = (high?, low?);
+            let width = (above - below).max(1e-12);
+            let scale = axis.slope(values[axis.index]) / width;
+            let slopes = high.iter().zip(&low).enumerate();
+            *column = slopes
+                .map(|(k, (high, low))| if k < self.warm_up { 0.0 } else { (high - low) * scale })
+                .collect();
+        }
+        // A run with derivatives breaks off where the plain one would not.
+        let complete = jacobian.iter().all(|column| column.len() == residual.len());
+        complete.then_some(Linearised { residual, jacobian })
+    }
+
+    fn linearise_all(&self, values: &[f64]) -> Option<Vec<Linearised>> {
+        let each = |record| self.linearise(values, record);
+        let all: Vec<_> = (0..self.signals.len()).into_par_iter().map(each).collect();
+        all.into_iter().collect()
+    }
+}
+
+/// JᵀJ (row-major) and Jᵀr.
+fn normal_equations(parts: &[Linearised], n: usize) -> (Vec<f64>, Vec<f64>) {
+    let mut information = vec![0.0; n * n];
+    let mut gradient = vec![0.0; n];
+    for part in parts {
+        for i in 0..n {
+            for j in 0..=i {
+                let sum = dot(&part.jacobian[i], &part.jacobian[j]);
+                information[i * n + j] += sum;
+                if i != j {
+                    information[j * n + i] += sum;
+                }
+            }
+            gradient[i] += dot(&part.jacobian[i], &part.residual);
+        }
+    }
+    (information, gradient)
+}
+
+/// Four partial sums, so that the processor can work on them side by side; the
+/// order is fixed and the result repeatable.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
+    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in a4.zip(b4) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
+/// Fits the parameters of `model` to `records` in free run, from where they are.
+///
+/// # Errors
+/// A missing channel, or a model whose free run diverges from the start.
+pub fn fit(model: &Model, records: &[&Record], options: &FitOptions) -> Result<Fit, SimulateError> {
+    let signals: Result<Vec<_>, _> = records.iter().map(|r| Signals::of(model, r)).collect();
+    let coordinates = model.coordinates();
+    let moves = |index: usize, coordinate: &Coordinate| match coordinate.parameter() {
+        None => options.linear && (index > 0 || options.constant),
+        Some(_) => true,
+    };
+    let axes: Vec<Axis> = coordinates
+        .iter()
+        .enumerate()
+        .filter(|(index, coordinate)| moves(*index, coordinate))
+        .map(|(index, coordinate)| Axis::of(index, coordinate))
+        .collect();
+    let problem = Problem {
+        model,
+        signals: signals?,
+        measured: records.iter().map(|record| record.y.as_slice()).collect(),
+        axes,
+        warm_up: model.warm_up(),
+    };
+    let n = problem.axes.len();
+    let samples: usize = records.iter().map(|r| r.y.len().saturating_sub(problem.warm_up)).sum();
+    let mut values = model.values();
+    let mut cost = problem.cost(&values, f64::INFINITY);
+    if !cost.is_finite() {
+        for record in records {
+            model.free_run(record)?;
+        }
+    }
+    let mut damping = 1e-3;
+    let mut iterations = 0;
+    let mut linearised = None;
+    while iterations < options.iterations && n > 0 {
+        let Some(parts) = problem.linearise_all(&values) else {
+            break;
+        };
+        let (information, gradient) = normal_equations(&parts, n);
+        linearised = Some((parts, information.clone()));
+        iterations += 1;
+        let mut lowered = None;
+        for _ in 0..10 {
+            let mut damped = information.clone();
+            for i in 0..n {
+                damped[i * n + i] += damping * information[i * n + i] + 1e-12;
+            }
+            if let Some(step) = linalg::solve_symmetric(&damped, &gradient) {
+                let mut moved = values.clone();
+                for (axis, step) in problem.axes.iter().zip(&step) {
+                    moved[axis.index] = axis.moved(values[axis.index], *step);
+                }
+                let moved_cost = problem.cost(&moved, cost);
+                if moved_cost < cost {
+                    lowered = Some((moved, moved_cost));
+                    damping = (damping * 0.2).max(1e-9);
+                    break;
+                }
+            }
+            damping *= 6.0;
+            if damping > 1e8 {
+                break;
+            }
+        }
+        let Some((moved, moved_cost)) = lowered else {
+            break;
+        };
+        let gain = (cost - moved_cost) / cost.max(f64::MIN_POSITIVE);
+        values = moved;
+        cost = moved_cost;
+        if gain < options.tolerance {
+            break;
+        }
+    }
+    let covariance = linearised
+        .and_then(|(parts, information)| sandwich(&parts, &information, n))
+        .map(|searched| in_values(searched, &problem.axes, &values))
+        .unwrap_or_default();
+    Ok(Fit {
+        model: model.with_values(&values),
+        sum_of_squares: cost,
+        samples,
+        free: problem.axes.iter().map(|axis| axis.index).collect(),
+        covariance,
+        iterations,
+    })
+}
+
+/// (JᵀJ)⁻¹ S (JᵀJ)⁻¹ with S the long-run covariance of J·r (Newey & West 1987,
+/// Bartlett weights): residuals of a free run are correlated over many samples,
+/// and standard errors that ignore it are several times too small.
+fn sandwich(parts: &[Linearised], information: &[f64], n: usize) -> Option<Vec<f64>> {
+    let columns: Option<Vec<Vec<f64>>> = (0..n)
+        .map(|i| {
+            let mut unit = vec![0.0; n];
+            unit[i] = 1.0;
+            linalg::solve_symmetric(information, &unit)
+        })
+        .collect();
+    let inverse = columns?;
+    let mut middle = vec![0.0; n * n];
+    // Sums over blocks much longer than the noise's memory (batch means) are
+    // uncorrelated, and their outer products are cheap.
+    for part in parts {
+        let length = part.residual.len();
+        let block = (length / 40).clamp(1, 250);
+        let mut from = 0;
+        while from < length {
+            let to = (from + block).min(length);
+            let score: Vec<f64> = (0..n)
+                .map(|i| dot(&part.jacobian[i][from..to], &part.residual[from..to]))
+                .collect();
+            for i in 0..n {
+                for j in 0..n {
+                    middle[i * n + j] += score[i] * score[j];
+                }
+            }
+            from = to;
+        }
+    }
+    let product = |left: &dyn Fn(usize, usize) -> f64, right: &dyn Fn(usize, usize) -> f64| {
+        let mut out = vec![0.0; n * n];
+        for i in 0..n {
+            for j in 0..n {
+                out[i * n + j] = (0..n).map(|k| left(i, k) * right(k, j)).sum();
+            }
+        }
+        out
+    };
+    let half = product(&|i, k| inverse[k][i], &|k, j| middle[k * n + j]);
+    Some(product(&|i, k| half[i * n + k], &|k, j| inverse[j][k]))
+}
+
+fn in_values(mut searched: Vec<f64>, axes: &[Axis], values: &[f64]) -> Vec<f64> {
+    let n = axes.len();
+    for (i, row) in axes.iter().enumerate() {
+        for (j, column) in axes.iter().enumerate() {
+            searched[i * n + j] *=
+                row.slope(values[row.index]) * column.slope(values[column.index]);
+        }
+    }
+    searched
+}

@@ -1,0 +1,159 @@
+//! How well a free run matches a measurement: the paper's indicators
+//! (9)–(11), the error's size and the noise floor.
+
+use crate::data::{Record, Use};
+use crate::model::Model;
+use crate::simulate::SimulateError;
+use serde::{Deserialize, Serialize};
+
+/// Indicators of a free run over a record, or over several together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Indicators {
+    /// The record's name, or `identify` / `validate` for all of them.
+    pub name: String,
+    /// `identify` or `validate`.
+    #[serde(rename = "use")]
+    pub role: Use,
+    /// Samples that were judged.
+    pub samples: usize,
+    /// ε = ‖x − x_simu‖₂, eq. (9), in y.
+    pub epsilon: f64,
+    /// FIT, eq. (10), in percent; 100 is perfect, 0 is the mean.
+    pub fit_percent: f64,
+    /// ρ, eq. (11), −1 to 1.
+    pub correlation: f64,
+    /// Root mean square error, in y.
+    pub rmse: f64,
+    /// Root mean square of the standard error `y_sd`: the error of a perfect
+    /// model. None without `y_sd`.
+    pub noise_rmse: Option<f64>,
+    /// Fraction of samples inside [y_min, y_max]; none without an envelope.
+    pub inside_envelope: Option<f64>,
+}
+
+/// Sums that the indicators come from; sums of several records add.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    samples: f64,
+    y: f64,
+    sim: f64,
+    y_y: f64,
+    sim_sim: f64,
+    y_sim: f64,
+    error: f64,
+    noise: Option<f64>,
+    inside: Option<f64>,
+}
+
+impl Sums {
+    fn of(record: &Record, simulated: &[f64], warm_up: usize) -> Self {
+        let mut sums = Self::default();
+        for (y, sim) in record.y.iter().zip(simulated).skip(warm_up) {
+            sums.samples += 1.0;
+            sums.y += y;
+            sums.sim += sim;
+            sums.y_y += y * y;
+            sums.sim_sim += sim * sim;
+            sums.y_sim += y * sim;
+            sums.error += (y - sim) * (y - sim);
+        }
+        let judged = |series: &Vec<f64>| series.iter().skip(warm_up).map(|sd| sd * sd).sum();
+        sums.noise = record.y_sd.as_ref().map(judged);
+        if let (Some(low), Some(high)) = (&record.y_min, &record.y_max) {
+            let bounds = low.iter().zip(high).zip(simulated).skip(warm_up);
+            let inside = bounds.filter(|((low, high), sim)| *low <= *sim && *sim <= *high);
+            sums.inside = Some(inside.count() as f64);
+        }
+        sums
+    }
+
+    fn add(&mut self, other: &Self) {
+        let both = |a: Option<f64>, b: Option<f64>| Some(a? + b?);
+        *self = if self.samples == 0.0 {
+            *other
+        } else {
+            Self {
+                samples: self.samples + other.samples,
+                y: self.y + other.y,
+                sim: self.sim + other.sim,
+                y_y: self.y_y + other.y_y,
+                sim_sim: self.sim_sim + other.sim_sim,
+                y_sim: self.y_sim + other.y_sim,
+                error: self.error + other.error,
+                noise: both(self.noise, other.noise),
+                inside: both(self.inside, other.inside),
+            }
+        };
+    }
+
+    fn indicators(&self, name: &str, role: Use) -> Indicators {
+        let n = self.samples.max(1.0);
+        let spread = (self.y_y - self.y * self.y / n).max(0.0);
+        let sim_spread = (self.sim_sim - self.sim * self.sim / n).max(0.0);
+        let covariance = self.y_sim - self.y * self.sim / n;
+        let both = (spread * sim_spread).sqrt();
+        Indicators {
+            name: name.to_owned(),
+            role,
+            samples: self.samples as usize,
+            epsilon: self.error.sqrt(),
+            fit_percent: if spread > 0.0 {
+                100.0 * (1.0 - (self.error / spread).sqrt())
+            } else {
+                0.0
+            },
+            correlation: if both > 0.0 { covariance / both } else { 0.0 },
+            rmse: (self.error / n).sqrt(),
+            noise_rmse: self.noise.map(|noise| (noise / n).sqrt()),
+            inside_envelope: self.inside.map(|inside| inside / n),
+        }
+    }
+}
+
+/// Indicators of a model on a data set.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scores {
+    /// One entry per record, in the data set's order.
+    pub records: Vec<Indicators>,
+    /// All identify records together; none if there are none.
+    pub identify: Option<Indicators>,
+    /// All validate records together; none if there are none.
+    pub validate: Option<Indicators>,
+}
+
+impl Scores {
+    /// The held-out indicators, or those of the identify records where nothing
+    /// was held out.
+    #[must_use]
+    pub fn held_out(&self) -> Option<&Indicators> {
+        self.validate.as_ref().or(self.identify.as_ref())
+    }
+}
+
+/// Runs `model` free over every record and judges it; also gives the runs.
+///
+/// # Errors
+/// A missing channel, or a free run that diverges.
+pub fn score(model: &Model, records: &[Record]) -> Result<(Scores, Vec<Vec<f64>>), SimulateError> {
+    let mut scores = Scores {
+        records: Vec::new(),
+        identify: None,
+        validate: None,
+    };
+    let (mut identify, mut validate) = (Sums::default(), Sums::default());
+    let mut runs = Vec::new();
+    for record in records {
+        let run = model.free_run(record)?;
+        let sums = Sums::of(record, &run, model.warm_up());
+        scores.records.push(sums.indicators(&record.name, record.role));
+        match record.role {
+            Use::Identify => identify.add(&sums),
+            Use::Validate => validate.add(&sums),
+        }
+        runs.push(run);
+    }
+    let together = |sums: &Sums, name, role| (sums.samples > 0.0).then(|| sums.indicators(name, role));
+    scores.identify = together(&identify, "identify", Use::Identify);
+    scores.validate = together(&validate, "validate", Use::Validate);
+    Ok((scores, runs))
+}

@@ -1,0 +1,264 @@
+//! An identified model with sizes known at run time.
+
+mod file;
+mod parameters;
+mod prepared;
+
+pub use file::{FORMAT_VERSION, ModelError};
+pub use parameters::{Coordinate, Kind};
+pub use prepared::{AnyDelay, Chain, Prepared};
+
+use model_core::effect::{Place, Spec};
+use model_core::model::Averaging;
+use model_core::recursion::LagConvention;
+use serde::{Deserialize, Serialize};
+
+/// A bilinear model, eqs. (3), (4), (14) or (15), with its effects and with
+/// what is known of its origin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    /// Sample period T, s.
+    pub sample_period_s: f64,
+    /// What lags mean.
+    pub convention: LagConvention,
+    /// Averages.
+    pub averaging: Averaging,
+    /// How a free run begins.
+    pub start: Start,
+    /// d, what drives the flow without jets; 0 in the paper.
+    pub constant: f64,
+    /// τ_i, samples.
+    pub state_lags: Vec<u16>,
+    /// a_i.
+    pub a: Vec<f64>,
+    /// τ̄_j, samples.
+    pub product_lags: Vec<u16>,
+    /// b_l.
+    pub b: Vec<f64>,
+    /// c_jl, column-major (N2 coefficients of input 1 first).
+    pub c: Vec<f64>,
+    /// Input delays.
+    pub delay: Delay,
+    /// Effects in the order of the physics, delay laws not among them.
+    pub effects: Vec<Added>,
+    /// What the model was trained on.
+    pub training: Training,
+}
+
+/// How a free run begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Start {
+    /// Everything was 0 before the record (the paper).
+    #[default]
+    Rest,
+    /// The record begins in mid-run: its first values are held before it, and
+    /// the first samples, as many as the longest lag, follow the measurement.
+    Measured,
+}
+
+/// The law of the input delays.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "law", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Delay {
+    /// h_l, samples, eq. (3).
+    Fixed {
+        /// h_l, samples.
+        delays: Vec<u16>,
+    },
+    /// h_l = round(f_l·(p0 + p1·exp(−p2·ỹ))), eqs. (2) and (4).
+    StateDependent {
+        /// p0, samples.
+        delay_floor: f64,
+        /// p1, samples.
+        delay_rise: f64,
+        /// p2, 1/y.
+        delay_rate: f64,
+        /// f_l.
+        factors: Vec<f64>,
+    },
+    /// Rising and falling edges travel differently long.
+    EdgeDependent {
+        /// Delay of rising edges, s.
+        rise_delay: f64,
+        /// Delay of falling edges, s.
+        fall_delay: f64,
+    },
+}
+
+/// An effect that was added to a model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Added {
+    /// Its name in the catalogue, or of the user's effect.
+    pub name: String,
+    /// Parameter values in the order and units of the catalogue.
+    pub parameters: Vec<f64>,
+    /// The measured channel it uses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub channel: Option<String>,
+    /// The reference of that channel, in its unit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<f64>,
+}
+
+/// What the model was trained on: predictions outside are extrapolations.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Training {
+    /// Lowest and highest measured y.
+    pub y_range: [f64; 2],
+    /// Lowest and highest duty over the records, fractions.
+    pub duty_range: [f64; 2],
+    /// Shortest and longest on-time, s; zeros if the input is not on/off.
+    pub on_time_range_s: [f64; 2],
+    /// Hash of the data set.
+    pub data_hash: String,
+    /// Version of the tool.
+    pub tool_version: String,
+    /// The seed.
+    pub seed: u64,
+    /// Objective the delays were searched with, and its value.
+    pub objective: String,
+    /// Its value.
+    pub objective_value: f64,
+    /// FIT of the free run over the identify records, %.
+    pub identify_fit_percent: f64,
+    /// FIT of the free run over the validate records, %; NaN is written as absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub validate_fit_percent: Option<f64>,
+}
+
+impl Model {
+    /// Names of the effects, the delay law among them, in the order of the physics.
+    #[must_use]
+    pub fn effect_names(&self) -> Vec<String> {
+        let jet = |added: &&Added| self.place_of(added) == Some(Place::Jet);
+        let mut names: Vec<String> = self
+            .effects
+            .iter()
+            .filter(jet)
+            .map(|added| added.name.clone())
+            .collect();
+        names.extend(self.delay.effect_name().map(str::to_owned));
+        names.extend(
+            self.effects
+                .iter()
+                .filter(|added| !jet(added))
+                .map(|added| added.name.clone()),
+        );
+        names
+    }
+
+    fn place_of(&self, added: &Added) -> Option<Place> {
+        model_core::effects::spec(&added.name).map(|spec| spec.place)
+    }
+
+    /// N3.
+    #[must_use]
+    pub fn inputs(&self) -> usize {
+        self.b.len()
+    }
+
+    /// The longest lag behind y_k that the recursion reads, samples.
+    #[must_use]
+    pub fn longest_lag(&self) -> usize {
+        self.state_lags
+            .iter()
+            .chain(&self.product_lags)
+            .map(|lag| self.convention.behind_newest(*lag))
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// The longest input delay, samples: at ỹ = 0 if it depends on the state.
+    #[must_use]
+    pub fn longest_delay(&self) -> usize {
+        let longest = match &self.delay {
+            Delay::Fixed { delays } => delays.iter().copied().max().unwrap_or(0).into(),
+            Delay::StateDependent {
+                delay_floor,
+                delay_rise,
+                factors,
+                ..
+            } => {
+                let factor = factors.iter().copied().fold(0.0, f64::max);
+                factor * delay_floor.max(delay_floor + delay_rise)
+            }
+            Delay::EdgeDependent {
+                rise_delay,
+                fall_delay,
+            } => rise_delay.max(*fall_delay) / self.sample_period_s + 1.0,
+        };
+        // A delay of more than 2²⁰ samples is a mistake that clamping reports.
+        longest.clamp(0.0, 1_048_576.0).round() as usize
+    }
+
+    /// Channels that the effects need, in the order in which they are passed.
+    #[must_use]
+    pub fn channels(&self) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for name in self.effects.iter().filter_map(|added| added.channel.as_ref()) {
+            if !names.contains(name) {
+                names.push(name.clone());
+            }
+        }
+        names
+    }
+
+    /// Adds an effect of the catalogue at its first starting values, where the
+    /// physics has its place. A delay law replaces the one there is.
+    pub fn add(&mut self, spec: &'static Spec, parameters: &[f64], reference: Option<f64>) {
+        match (spec.name, parameters) {
+            ("state-dependent-delay", &[delay_floor, delay_rise, delay_rate]) => {
+                let factors = match &self.delay {
+                    // Inputs keep their delays relative to the first.
+                    Delay::Fixed { delays } => {
+                        let first = f64::from(delays.first().copied().unwrap_or(1).max(1));
+                        delays.iter().map(|h| f64::from(*h) / first).collect()
+                    }
+                    Delay::StateDependent { factors, .. } => factors.clone(),
+                    Delay::EdgeDependent { .. } => vec![1.0; self.inputs()],
+                };
+                self.delay = Delay::StateDependent {
+                    delay_floor,
+                    delay_rise,
+                    delay_rate,
+                    factors,
+                };
+            }
+            ("edge-dependent-delay", &[rise_delay, fall_delay]) => {
+                self.delay = Delay::EdgeDependent {
+                    rise_delay,
+                    fall_delay,
+                };
+            }
+            _ => {
+                self.effects.push(Added {
+                    name: spec.name.to_owned(),
+                    parameters: parameters.to_vec(),
+                    channel: spec.channel.map(str::to_owned),
+                    reference,
+                });
+                let order = |added: &Added| {
+                    model_core::effects::SPECS
+                        .iter()
+                        .position(|spec| spec.name == added.name)
+                };
+                self.effects.sort_by_key(order);
+            }
+        }
+    }
+}
+
+impl Delay {
+    /// The name of the law in the catalogue of effects; a fixed delay is none.
+    #[must_use]
+    pub fn effect_name(&self) -> Option<&'static str> {
+        match self {
+            Self::Fixed { .. } => None,
+            Self::StateDependent { .. } => Some("state-dependent-delay"),
+            Self::EdgeDependent { .. } => Some("edge-dependent-delay"),
+        }
+    }
+}

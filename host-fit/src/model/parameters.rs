@@ -1,0 +1,134 @@
+//! A model's parameters as one vector, for whoever searches or differentiates.
+
+use super::{Added, Delay, Model};
+use model_core::effect::{Influence, Parameter, Spec};
+use model_core::effects;
+
+/// What a coordinate of the parameter vector is.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Kind {
+    /// d, a_i, b_l or c_jl: the recursion is linear in it.
+    Linear,
+    /// A parameter of the delay law.
+    Delay(Parameter),
+    /// A parameter of the effect with this index in [`Model::effects`].
+    Effect(usize, Parameter),
+}
+
+/// One coordinate of the parameter vector.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coordinate {
+    /// Readable name: `a1`, `c21`, `valve-lag.opening_time`.
+    pub name: String,
+    /// What it is.
+    pub kind: Kind,
+}
+
+impl Coordinate {
+    /// The catalogue's entry, for parameters of delay laws and effects.
+    #[must_use]
+    pub fn parameter(&self) -> Option<&Parameter> {
+        match &self.kind {
+            Kind::Linear => None,
+            Kind::Delay(parameter) | Kind::Effect(_, parameter) => Some(parameter),
+        }
+    }
+
+    /// Whether a free run has a derivative in it.
+    #[must_use]
+    pub fn is_smooth(&self) -> bool {
+        self.parameter()
+            .is_none_or(|parameter| parameter.influence == Influence::Smooth)
+    }
+}
+
+fn parameters_of(name: &str) -> &'static [Parameter] {
+    effects::spec(name).map_or(&[], |spec: &Spec| spec.parameters)
+}
+
+impl Model {
+    /// What the coordinates of the parameter vector are: d, a, b, c (by
+    /// columns), the delay law's, then each effect's.
+    #[must_use]
+    pub fn coordinates(&self) -> Vec<Coordinate> {
+        let linear = |name: String| Coordinate {
+            name,
+            kind: Kind::Linear,
+        };
+        let mut all = vec![linear("d".to_owned())];
+        all.extend((1..=self.a.len()).map(|i| linear(format!("a{i}"))));
+        all.extend((1..=self.b.len()).map(|l| linear(format!("b{l}"))));
+        let lags = self.product_lags.len();
+        all.extend((0..self.c.len()).map(|i| linear(format!("c{}{}", i % lags + 1, i / lags + 1))));
+        if let Some(name) = self.delay.effect_name() {
+            all.extend(parameters_of(name).iter().map(|parameter| Coordinate {
+                name: format!("{name}.{}", parameter.name),
+                kind: Kind::Delay(*parameter),
+            }));
+        }
+        for (index, added) in self.effects.iter().enumerate() {
+            let parameters = parameters_of(&added.name);
+            all.extend(parameters.iter().map(|parameter| Coordinate {
+                name: format!("{}.{}", added.name, parameter.name),
+                kind: Kind::Effect(index, *parameter),
+            }));
+        }
+        all
+    }
+
+    /// The parameter vector, in the order of [`coordinates`](Self::coordinates).
+    #[must_use]
+    pub fn values(&self) -> Vec<f64> {
+        let mut values = vec![self.constant];
+        values.extend(&self.a);
+        values.extend(&self.b);
+        values.extend(&self.c);
+        match self.delay {
+            Delay::Fixed { .. } => {}
+            Delay::StateDependent {
+                delay_floor,
+                delay_rise,
+                delay_rate,
+                ..
+            } => values.extend([delay_floor, delay_rise, delay_rate]),
+            Delay::EdgeDependent {
+                rise_delay,
+                fall_delay,
+            } => values.extend([rise_delay, fall_delay]),
+        }
+        values.extend(self.effects.iter().flat_map(|added| &added.parameters));
+        values
+    }
+
+    /// The same model with another parameter vector; missing values keep theirs.
+    #[must_use]
+    pub fn with_values(&self, values: &[f64]) -> Self {
+        let mut model = self.clone();
+        let mut rest = values.iter().copied();
+        let mut set = |slot: &mut f64| {
+            if let Some(value) = rest.next() {
+                *slot = value;
+            }
+        };
+        set(&mut model.constant);
+        model.a.iter_mut().for_each(&mut set);
+        model.b.iter_mut().for_each(&mut set);
+        model.c.iter_mut().for_each(&mut set);
+        match &mut model.delay {
+            Delay::Fixed { .. } => {}
+            Delay::StateDependent {
+                delay_floor,
+                delay_rise,
+                delay_rate,
+                ..
+            } => [delay_floor, delay_rise, delay_rate].into_iter().for_each(&mut set),
+            Delay::EdgeDependent {
+                rise_delay,
+                fall_delay,
+            } => [rise_delay, fall_delay].into_iter().for_each(&mut set),
+        }
+        let parameters = |added: &mut Added| added.parameters.iter_mut().for_each(&mut set);
+        model.effects.iter_mut().for_each(parameters);
+        model
+    }
+}

@@ -1,0 +1,207 @@
+//! A model in numbers of one type, ready to run.
+
+use super::{Delay, Model};
+use model_core::delay::{DelayLaw, FixedDelay, Tap};
+use model_core::effect::{Effect, Flow, Instant, Physics, Setting};
+use model_core::effects::edge_dependent_delay::Run;
+use model_core::effects::{AnyEffect, EdgeDependentDelay, StateDependentDelay};
+use model_core::model::{Averaging, Parts};
+use model_core::recursion::{Bilinear, LagConvention};
+use model_core::{Real, effects};
+
+/// A model prepared to run in numbers of type `T`.
+#[derive(Clone, Debug)]
+pub struct Prepared<T: Real> {
+    convention: LagConvention,
+    averaging: Averaging,
+    state_lags: Vec<u16>,
+    product_lags: Vec<u16>,
+    constant: T,
+    a: Vec<T>,
+    b: Vec<T>,
+    c: Vec<T>,
+    delay: AnyDelay<T>,
+    effects: Chain<T>,
+}
+
+impl<T: Real> Parts<T> for Prepared<T> {
+    type Delay = AnyDelay<T>;
+    type Effects = Chain<T>;
+    #[inline]
+    fn recursion(&self) -> Bilinear<'_, T> {
+        Bilinear {
+            convention: self.convention,
+            constant: self.constant,
+            state_lags: &self.state_lags,
+            a: &self.a,
+            product_lags: &self.product_lags,
+            b: &self.b,
+            c: &self.c,
+        }
+    }
+    #[inline]
+    fn delay(&self) -> &AnyDelay<T> {
+        &self.delay
+    }
+    #[inline]
+    fn effects(&self) -> &Chain<T> {
+        &self.effects
+    }
+    #[inline]
+    fn averaging(&self) -> Averaging {
+        self.averaging
+    }
+}
+
+/// Any delay law of `model-core`, chosen at run time.
+#[derive(Clone, Debug)]
+pub enum AnyDelay<T> {
+    /// Constant delays.
+    Fixed(FixedDelay<Vec<u16>>),
+    /// Eq. (2).
+    StateDependent(StateDependentDelay<T, Vec<T>>),
+    /// Rising and falling edges apart.
+    EdgeDependent(EdgeDependentDelay<T>),
+}
+
+impl<T: Real> DelayLaw<T> for AnyDelay<T> {
+    type State = Run;
+    const INTERPOLATES: bool = true;
+    fn start(&self) -> Run {
+        match self {
+            Self::EdgeDependent(law) => law.start(),
+            Self::Fixed(_) | Self::StateDependent(_) => Run::default(),
+        }
+    }
+    #[inline]
+    fn command(&self, run: &mut Run, command: T) -> T {
+        match self {
+            Self::EdgeDependent(law) => law.command(run, command),
+            Self::Fixed(_) | Self::StateDependent(_) => command,
+        }
+    }
+    #[inline]
+    fn evaluate(&self, output: T) -> T {
+        match self {
+            Self::Fixed(law) => law.evaluate(output),
+            Self::StateDependent(law) => law.evaluate(output),
+            Self::EdgeDependent(law) => law.evaluate(output),
+        }
+    }
+    #[inline]
+    fn tap(&self, l: usize, evaluated: T) -> Tap<T> {
+        match self {
+            Self::Fixed(law) => law.tap(l, evaluated),
+            Self::StateDependent(law) => law.tap(l, evaluated),
+            Self::EdgeDependent(law) => law.tap(l, evaluated),
+        }
+    }
+}
+
+/// Effects one after the other, chosen at run time.
+#[derive(Clone, Debug)]
+pub struct Chain<T: Real> {
+    effects: Vec<AnyEffect<T>>,
+    drives: bool,
+}
+
+impl<T: Real> Effect<T> for Chain<T> {
+    type State = Vec<effects::AnyState<T>>;
+    fn start(&self) -> Self::State {
+        self.effects.iter().map(Effect::start).collect()
+    }
+    #[inline]
+    fn jet(&self, states: &mut Self::State, jet: T, at: &Instant<'_, T>) -> T {
+        let each = self.effects.iter().zip(states);
+        each.fold(jet, |jet, (effect, state)| effect.jet(state, jet, at))
+    }
+    #[inline]
+    fn drives(&self) -> bool {
+        self.drives
+    }
+    #[inline]
+    fn drive(&self, states: &mut Self::State, flow: &Flow<T>, at: &Instant<'_, T>) -> T {
+        let each = self.effects.iter().zip(states);
+        each.fold(T::ZERO, |sum, (effect, state)| sum + effect.drive(state, flow, at))
+    }
+    #[inline]
+    fn sense(&self, states: &mut Self::State, signal: T, at: &Instant<'_, T>) -> T {
+        let each = self.effects.iter().zip(states);
+        each.fold(signal, |signal, (effect, state)| effect.sense(state, signal, at))
+    }
+}
+
+impl Model {
+    /// The model in numbers of type `T`, as it is.
+    #[must_use]
+    pub fn prepare<T: Real>(&self) -> Prepared<T> {
+        let values: Vec<T> = self.values().into_iter().map(T::from_f64).collect();
+        self.prepare_with(&values)
+    }
+
+    /// The model with other parameter values, in the order of
+    /// [`coordinates`](Self::coordinates); missing ones count as 0.
+    #[must_use]
+    pub fn prepare_with<T: Real>(&self, values: &[T]) -> Prepared<T> {
+        let mut rest = values.iter().copied();
+        let mut next = || rest.next().unwrap_or(T::ZERO);
+        let mut many = |n: usize| -> Vec<T> { (0..n).map(|_| next()).collect() };
+        let constant = many(1)[0];
+        let a = many(self.a.len());
+        let b = many(self.b.len());
+        let c = many(self.c.len());
+        let period = T::from_f64(self.sample_period_s);
+        let delay = match &self.delay {
+            Delay::Fixed { delays } => AnyDelay::Fixed(FixedDelay {
+                delays: delays.clone(),
+            }),
+            Delay::StateDependent { factors, .. } => {
+                let law = many(3);
+                AnyDelay::StateDependent(StateDependentDelay {
+                    floor: law[0],
+                    rise: law[1],
+                    rate: law[2],
+                    factors: factors.iter().map(|f| T::from_f64(*f)).collect(),
+                })
+            }
+            Delay::EdgeDependent { .. } => {
+                let setting = Setting {
+                    period,
+                    channel: 0,
+                    reference: T::ONE,
+                };
+                AnyDelay::EdgeDependent(EdgeDependentDelay::new(&many(2), &setting))
+            }
+        };
+        let channels = self.channels();
+        let effects: Vec<AnyEffect<T>> = self
+            .effects
+            .iter()
+            .filter_map(|added| {
+                let index = |name: &String| channels.iter().position(|c| c == name);
+                let setting = Setting {
+                    period,
+                    channel: added.channel.as_ref().and_then(index).unwrap_or(0),
+                    reference: T::from_f64(added.reference.unwrap_or(1.0)),
+                };
+                let parameters = many(added.parameters.len());
+                AnyEffect::new(&added.name, &parameters, &setting)
+            })
+            .collect();
+        Prepared {
+            convention: self.convention,
+            averaging: self.averaging,
+            state_lags: self.state_lags.clone(),
+            product_lags: self.product_lags.clone(),
+            constant,
+            a,
+            b,
+            c,
+            delay,
+            effects: Chain {
+                drives: effects.iter().any(Effect::drives),
+                effects,
+            },
+        }
+    }
+}

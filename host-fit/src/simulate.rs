@@ -1,0 +1,291 @@
+//! Free runs and one-step predictions of a model over recorded signals.
+
+use crate::data::Record;
+use crate::model::{Delay, Model, Prepared, Start};
+use model_core::history::{Memory, Past};
+use model_core::model::{Averaging, StateOf, observe};
+use model_core::{Input, Output, Parts, Real, State};
+use std::ops::ControlFlow;
+use thiserror::Error;
+
+/// A free run whose flow exceeds this many times the measured range has diverged.
+const DIVERGED: f64 = 1e3;
+
+/// Why a free run could not be made or finished.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum SimulateError {
+    /// An effect needs a channel that the record does not have.
+    #[error(
+        "record `{record}` has no channel `{channel}`, which the model's effects need. \
+         Add the column `{channel}` to the record's CSV file, or use a model without that effect."
+    )]
+    MissingChannel {
+        /// The record.
+        record: String,
+        /// The channel.
+        channel: String,
+    },
+    /// The model is unstable on this input.
+    #[error(
+        "the model's free run of record `{record}` diverges at sample {sample} (t = {time} s). \
+         The model is unstable for this input; identify it again, with fewer lags or `--objective free-run`."
+    )]
+    Diverged {
+        /// The record.
+        record: String,
+        /// Where the run left all bounds.
+        sample: usize,
+        /// The same as time, s.
+        time: f64,
+    },
+}
+
+/// The signals a model runs on.
+#[derive(Clone, Debug)]
+pub struct Signals<'a> {
+    /// The command.
+    pub u: &'a [f64],
+    /// The measured output, where there is one: needed by [`Start::Measured`]
+    /// and for the divergence guard's scale.
+    pub y: Option<&'a [f64]>,
+    /// The channels in the order of [`Model::channels`].
+    pub channels: Vec<&'a [f64]>,
+}
+
+impl<'a> Signals<'a> {
+    /// The signals of `record` that `model` needs.
+    ///
+    /// # Errors
+    /// [`SimulateError::MissingChannel`].
+    pub fn of(model: &Model, record: &'a Record) -> Result<Self, SimulateError> {
+        let channels = model.channels().into_iter().map(|channel| {
+            let found = record.channels.get(&channel).map(Vec::as_slice);
+            found.ok_or_else(|| SimulateError::MissingChannel {
+                record: record.name.clone(),
+                channel,
+            })
+        });
+        Ok(Self {
+            u: &record.u,
+            y: Some(&record.y),
+            channels: channels.collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// How far the measured output strays from 0; 1 where nothing was measured.
+    fn scale(&self) -> f64 {
+        let largest = |y: &[f64]| y.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
+        self.y.map_or(1.0, largest).max(1e-9)
+    }
+}
+
+/// A ring buffer with a size chosen at run time: the host's counterpart of
+/// `model_core::history::DelayLine`.
+#[derive(Clone, Debug)]
+pub struct Ring<T> {
+    samples: Vec<T>,
+    newest: usize,
+}
+
+impl<T: Real> Ring<T> {
+    /// A ring that reaches back at least `lag` samples.
+    #[must_use]
+    pub fn reaching(lag: usize) -> Self {
+        Self {
+            samples: vec![T::ZERO; (lag + 1).next_power_of_two()],
+            newest: 0,
+        }
+    }
+}
+
+impl<T: Real> Past<T> for Ring<T> {
+    #[inline]
+    fn back(&self, lag: usize) -> T {
+        let mask = self.samples.len() - 1;
+        if lag > mask {
+            return T::ZERO;
+        }
+        self.samples[self.newest.wrapping_sub(lag) & mask]
+    }
+}
+
+impl<T: Real> Memory<T> for Ring<T> {
+    #[inline]
+    fn push(&mut self, value: T) {
+        self.newest = (self.newest + 1) & (self.samples.len() - 1);
+        self.samples[self.newest] = value;
+    }
+    #[inline]
+    fn capacity(&self) -> usize {
+        self.samples.len()
+    }
+}
+
+/// A model ready to be run over records, in numbers of type `T`.
+#[derive(Clone, Debug)]
+pub struct Simulator<T: Real> {
+    prepared: Prepared<T>,
+    start: Start,
+    outputs: usize,
+    jets: usize,
+    followed: usize,
+}
+
+impl<T: Real> Simulator<T> {
+    /// A simulator of `model` with other parameter `values` (see
+    /// [`Model::coordinates`]).
+    #[must_use]
+    pub fn with_values(model: &Model, values: &[T]) -> Self {
+        let Averaging {
+            window,
+            averaged_model,
+        } = model.averaging;
+        let mut jets = model.longest_delay() + 2;
+        if matches!(model.delay, Delay::StateDependent { .. } | Delay::EdgeDependent { .. }) {
+            // Room for a search to move the law.
+            jets = jets.max(1023);
+        }
+        if averaged_model {
+            jets += window as usize;
+        }
+        Self {
+            prepared: model.prepare_with(values),
+            start: model.start,
+            outputs: model.longest_lag().max(window as usize),
+            jets,
+            followed: model.warm_up(),
+        }
+    }
+
+    /// Runs free over `signals`, handing every sample to `sink` until it breaks off.
+    ///
+    /// Gives the sample at which the run left all bounds, if it did.
+    pub fn run(
+        &self,
+        signals: &Signals<'_>,
+        mut sink: impl FnMut(usize, &Output<T>) -> ControlFlow<()>,
+    ) -> Option<usize> {
+        let mut state = self.state();
+        let bound = DIVERGED * signals.scale();
+        let window = self.prepared.averaging().window;
+        let mut channels = vec![T::ZERO; signals.channels.len()];
+        if self.start == Start::Measured {
+            self.hold_first(signals, &mut state, &mut channels);
+        }
+        for (k, u) in signals.u.iter().enumerate() {
+            let output = self.observe(signals, &mut state, &mut channels, k, *u);
+            if sink(k, &output).is_break() {
+                return None;
+            }
+            let follows = self.start == Start::Measured && k + 1 < self.followed;
+            let measured = signals.y.and_then(|y| y.get(k + 1)).filter(|_| follows);
+            let next = measured.map_or(output.next, |y| T::from_f64(*y));
+            // NaN is caught as well.
+            if !(next.value().abs() <= bound) {
+                return Some(k + 1);
+            }
+            state.advance(next, window);
+        }
+        None
+    }
+
+    /// Predicts y_{k+1} from measured y up to y_k, for every k but the last.
+    /// Sensor effects are left out: the recursion reads the sensor.
+    pub fn predict(&self, signals: &Signals<'_>, mut sink: impl FnMut(usize, T)) {
+        let mut state = self.state();
+        let window = self.prepared.averaging().window;
+        let mut channels = vec![T::ZERO; signals.channels.len()];
+        let y = signals.y.unwrap_or(&[]);
+        if let Some(first) = y.first() {
+            if self.start == Start::Measured {
+                self.hold_first(signals, &mut state, &mut channels);
+            } else {
+                state.advance(T::from_f64(*first), window);
+            }
+        }
+        for (k, u) in signals.u.iter().enumerate() {
+            let Some(measured) = y.get(k + 1) else {
+                return;
+            };
+            let output = self.observe(signals, &mut state, &mut channels, k, *u);
+            sink(k + 1, output.next);
+            state.advance(T::from_f64(*measured), window);
+        }
+    }
+
+    fn state(&self) -> StateOf<T, Prepared<T>, Ring<T>, Ring<T>> {
+        let (outputs, jets) = (Ring::reaching(self.outputs), Ring::reaching(self.jets));
+        State::at_rest(&self.prepared, outputs, jets)
+    }
+
+    #[inline]
+    fn observe(
+        &self,
+        signals: &Signals<'_>,
+        state: &mut StateOf<T, Prepared<T>, Ring<T>, Ring<T>>,
+        channels: &mut [T],
+        k: usize,
+        u: f64,
+    ) -> Output<T> {
+        for (now, series) in channels.iter_mut().zip(&signals.channels) {
+            *now = series.get(k).map_or(T::ZERO, |value| T::from_f64(*value));
+        }
+        let input = Input {
+            command: T::from_f64(u),
+            channels,
+        };
+        observe(&self.prepared, state, &input)
+    }
+
+    /// Lives through the first sample until the memories are full of it.
+    fn hold_first(
+        &self,
+        signals: &Signals<'_>,
+        state: &mut StateOf<T, Prepared<T>, Ring<T>, Ring<T>>,
+        channels: &mut [T],
+    ) {
+        let (Some(u), Some(y)) = (signals.u.first(), signals.y.and_then(<[f64]>::first)) else {
+            return;
+        };
+        let window = self.prepared.averaging().window;
+        for _ in 0..self.outputs.max(self.jets) {
+            state.advance(T::from_f64(*y), window);
+            self.observe(signals, state, channels, 0, *u);
+        }
+    }
+}
+
+impl Model {
+    /// How many samples at a record's start follow the measurement and are not
+    /// judged: none unless the model starts from measurements.
+    #[must_use]
+    pub fn warm_up(&self) -> usize {
+        match self.start {
+            Start::Rest => 0,
+            Start::Measured => self.longest_lag().max(self.longest_delay()) + 1,
+        }
+    }
+
+    /// The free run over a record: what the sensor would have shown, y_sim.
+    ///
+    /// # Errors
+    /// A missing channel, or divergence.
+    pub fn free_run(&self, record: &Record) -> Result<Vec<f64>, SimulateError> {
+        let signals = Signals::of(self, record)?;
+        let simulator = Simulator::with_values(self, &self.values());
+        let mut y = Vec::with_capacity(signals.u.len());
+        let left = simulator.run(&signals, |_, output: &Output<f64>| {
+            y.push(output.measured);
+            ControlFlow::Continue(())
+        });
+        match left {
+            None => Ok(y),
+            Some(sample) => Err(SimulateError::Diverged {
+                record: record.name.clone(),
+                sample,
+                time: record.t0 + sample as f64 * record.sample_period_s,
+            }),
+        }
+    }
+}

@@ -145,14 +145,17 @@ pub fn score(model: &Model, records: &[Record]) -> Result<(Scores, Vec<Vec<f64>>
     for record in records {
         let run = model.free_run(record)?;
         let sums = Sums::of(record, &run, model.warm_up());
-        scores.records.push(sums.indicators(&record.name, record.role));
+        scores
+            .records
+            .push(sums.indicators(&record.name, record.role));
         match record.role {
             Use::Identify => identify.add(&sums),
             Use::Validate => validate.add(&sums),
         }
         runs.push(run);
     }
-    let together = |sums: &Sums, name, role| (sums.samples > 0.0).then(|| sums.indicators(name, role));
+    let together =
+        |sums: &Sums, name, role| (sums.samples > 0.0).then(|| sums.indicators(name, role));
     scores.identify = together(&identify, "identify", Use::Identify);
     scores.validate = together(&validate, "validate", Use::Validate);
     Ok((scores, runs))

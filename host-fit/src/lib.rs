@@ -1,5 +1,12 @@
 //! Host side: recordings to models.
 
 pub mod data;
+pub mod dual;
+pub mod fit;
+pub mod indicators;
+pub mod model;
 pub mod output;
 pub mod search;
+pub mod simulate;
+
+mod linalg;

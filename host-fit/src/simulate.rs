@@ -142,7 +142,10 @@ impl<T: Real> Simulator<T> {
             averaged_model,
         } = model.averaging;
         let mut jets = model.longest_delay() + 2;
-        if matches!(model.delay, Delay::StateDependent { .. } | Delay::EdgeDependent { .. }) {
+        if matches!(
+            model.delay,
+            Delay::StateDependent { .. } | Delay::EdgeDependent { .. }
+        ) {
             // Room for a search to move the law.
             jets = jets.max(1023);
         }
@@ -181,8 +184,8 @@ impl<T: Real> Simulator<T> {
             let follows = self.start == Start::Measured && k + 1 < self.followed;
             let measured = signals.y.and_then(|y| y.get(k + 1)).filter(|_| follows);
             let next = measured.map_or(output.next, |y| T::from_f64(*y));
-            // NaN is caught as well.
-            if !(next.value().abs() <= bound) {
+            let size = next.value().abs();
+            if size > bound || size.is_nan() {
                 return Some(k + 1);
             }
             state.advance(next, window);

@@ -157,9 +157,17 @@ impl Problem<'_> {
                     sum += error * error;
                 }
                 // NaN breaks off too.
-                if sum <= enough { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+                if sum <= enough {
+                    ControlFlow::Continue(())
+                } else {
+                    ControlFlow::Break(())
+                }
             });
-            if left.is_some() || sum.is_nan() { f64::INFINITY } else { sum }
+            if left.is_some() || sum.is_nan() {
+                f64::INFINITY
+            } else {
+                sum
+            }
         };
         let sums: Vec<f64> = (0..self.signals.len()).into_par_iter().map(each).collect();
         sums.iter().sum()
@@ -169,12 +177,17 @@ impl Problem<'_> {
         let simulated = self.run(values, record)?;
         let measured = self.measured[record];
         let residual = |(k, sim): (usize, &f64)| {
-            if k < self.warm_up { 0.0 } else { measured[k] - sim }
+            if k < self.warm_up {
+                0.0
+            } else {
+                measured[k] - sim
+            }
         };
         let residual: Vec<f64> = simulated.iter().enumerate().map(residual).collect();
         let mut jacobian: Vec<Vec<f64>> = vec![Vec::new(); self.axes.len()];
-        let smooth: Vec<usize> =
-            (0..self.axes.len()).filter(|axis| self.axes[*axis].secant.is_none()).collect();
+        let smooth: Vec<usize> = (0..self.axes.len())
+            .filter(|axis| self.axes[*axis].secant.is_none())
+            .collect();
         for chunk in smooth.chunks(CHUNK) {
             let mut duals: Vec<Dual<CHUNK>> = values.iter().map(|v| Dual::constant(*v)).collect();
             for (slot, axis) in chunk.iter().enumerate() {
@@ -205,7 +218,13 @@ impl Problem<'_> {
             let scale = axis.slope(values[axis.index]) / width;
             let slopes = high.iter().zip(&low).enumerate();
             *column = slopes
-                .map(|(k, (high, low))| if k < self.warm_up { 0.0 } else { (high - low) * scale })
+                .map(|(k, (high, low))| {
+                    if k < self.warm_up {
+                        0.0
+                    } else {
+                        (high - low) * scale
+                    }
+                })
                 .collect();
         }
         // A run with derivatives breaks off where the plain one would not.
@@ -244,7 +263,12 @@ fn normal_equations(parts: &[Linearised], n: usize) -> (Vec<f64>, Vec<f64>) {
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
+    let rest: f64 = a4
+        .remainder()
+        .iter()
+        .zip(b4.remainder())
+        .map(|(a, b)| a * b)
+        .sum();
     for (a, b) in a4.zip(b4) {
         for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
             *sum += a * b;
@@ -278,7 +302,10 @@ pub fn fit(model: &Model, records: &[&Record], options: &FitOptions) -> Result<F
         warm_up: model.warm_up(),
     };
     let n = problem.axes.len();
-    let samples: usize = records.iter().map(|r| r.y.len().saturating_sub(problem.warm_up)).sum();
+    let samples: usize = records
+        .iter()
+        .map(|r| r.y.len().saturating_sub(problem.warm_up))
+        .sum();
     let mut values = model.values();
     let mut cost = problem.cost(&values, f64::INFINITY);
     if !cost.is_finite() {

@@ -198,7 +198,11 @@ impl Model {
     #[must_use]
     pub fn channels(&self) -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
-        for name in self.effects.iter().filter_map(|added| added.channel.as_ref()) {
+        for name in self
+            .effects
+            .iter()
+            .filter_map(|added| added.channel.as_ref())
+        {
             if !names.contains(name) {
                 names.push(name.clone());
             }

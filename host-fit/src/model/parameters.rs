@@ -121,7 +121,9 @@ impl Model {
                 delay_rise,
                 delay_rate,
                 ..
-            } => [delay_floor, delay_rise, delay_rate].into_iter().for_each(&mut set),
+            } => [delay_floor, delay_rise, delay_rate]
+                .into_iter()
+                .for_each(&mut set),
             Delay::EdgeDependent {
                 rise_delay,
                 fall_delay,

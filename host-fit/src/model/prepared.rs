@@ -122,12 +122,16 @@ impl<T: Real> Effect<T> for Chain<T> {
     #[inline]
     fn drive(&self, states: &mut Self::State, flow: &Flow<T>, at: &Instant<'_, T>) -> T {
         let each = self.effects.iter().zip(states);
-        each.fold(T::ZERO, |sum, (effect, state)| sum + effect.drive(state, flow, at))
+        each.fold(T::ZERO, |sum, (effect, state)| {
+            sum + effect.drive(state, flow, at)
+        })
     }
     #[inline]
     fn sense(&self, states: &mut Self::State, signal: T, at: &Instant<'_, T>) -> T {
         let each = self.effects.iter().zip(states);
-        each.fold(signal, |signal, (effect, state)| effect.sense(state, signal, at))
+        each.fold(signal, |signal, (effect, state)| {
+            effect.sense(state, signal, at)
+        })
     }
 }
 

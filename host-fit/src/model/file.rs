@@ -1,0 +1,488 @@
+//! The model file `model.toml`.
+
+use super::{Added, Delay, Model, Start, Training};
+use crate::output::{self, OutputError};
+use model_core::effects;
+use model_core::model::Averaging;
+use model_core::recursion::LagConvention;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Version of the file format that this tool writes and reads.
+pub const FORMAT_VERSION: u32 = 1;
+
+/// Why a model file was refused.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// The file could not be read.
+    #[error("{}: cannot read the model file: {source}. Check the path and its permissions.", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is not a model file of this version.
+    #[error(
+        "{place}: `format_version` is {found}, but this tool reads version {FORMAT_VERSION}. \
+             Identify the model again with this tool, or use the version that wrote it."
+    )]
+    Version {
+        /// The file.
+        place: String,
+        /// What was found.
+        found: i64,
+    },
+    /// It cannot be understood.
+    #[error("{place}: {problem}")]
+    Syntax {
+        /// The file.
+        place: String,
+        /// What is wrong, with line and key.
+        problem: String,
+    },
+    /// Parts of it contradict each other.
+    #[error("{place}: key `{key}`: {problem}. Correct the key, or identify the model again.")]
+    Inconsistent {
+        /// The file.
+        place: String,
+        /// The key.
+        key: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// It could not be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    format_version: u32,
+    sample_period_s: f64,
+    lag_convention: Convention,
+    #[serde(default)]
+    start: Start,
+    structure: Structure,
+    coefficients: Coefficients,
+    delay: Delay,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    effect: Vec<EffectTable>,
+    #[serde(default)]
+    training: Training,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Convention {
+    Literal,
+    OneStep,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Structure {
+    averaged: bool,
+    window: u32,
+    state_lags: Vec<u16>,
+    product_lags: Vec<u16>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Coefficients {
+    #[serde(default)]
+    constant: f64,
+    a: Vec<f64>,
+    b: Vec<f64>,
+    /// One row of N2 numbers for each input.
+    c: Vec<Vec<f64>>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EffectTable {
+    name: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    channel: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    reference: Option<f64>,
+    /// Parameter values by name, in the units of the catalogue.
+    #[serde(default)]
+    parameters: toml::map::Map<String, toml::Value>,
+}
+
+impl Model {
+    /// Reads a model file.
+    ///
+    /// # Errors
+    /// [`ModelError`] names the file and the key.
+    pub fn load(path: &Path) -> Result<Self, ModelError> {
+        let text = std::fs::read_to_string(path).map_err(|source| ModelError::Unreadable {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::from_toml(&text, &path.display().to_string())
+    }
+
+    /// Reads a model from the text of a model file; `place` names it in errors.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn from_toml(text: &str, place: &str) -> Result<Self, ModelError> {
+        let syntax = |error: toml::de::Error| {
+            let line = error.span().map_or(1, |span| {
+                1 + text
+                    .bytes()
+                    .take(span.start)
+                    .filter(|b| *b == b'\n')
+                    .count()
+            });
+            ModelError::Syntax {
+                place: format!("{place}, line {line}"),
+                problem: format!(
+                    "{}. A model file is written by `host-fit identify`; compare with one of those.",
+                    error.message()
+                ),
+            }
+        };
+        // The version first: other versions may have other keys.
+        let table: toml::Table = toml::from_str(text).map_err(syntax)?;
+        if let Some(found) = table
+            .get("format_version")
+            .and_then(toml::Value::as_integer)
+            && found != i64::from(FORMAT_VERSION)
+        {
+            return Err(ModelError::Version {
+                place: place.to_owned(),
+                found,
+            });
+        }
+        let file: File = toml::from_str(text).map_err(syntax)?;
+        file.into_model()
+            .map_err(|(key, problem)| ModelError::Inconsistent {
+                place: place.to_owned(),
+                key,
+                problem,
+            })
+    }
+
+    /// The text of the model's file: the same bytes for the same model.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let text = toml::to_string_pretty(&File::from_model(self));
+        // Numbers, strings and tables of them can always be written.
+        text.unwrap_or_default()
+    }
+
+    /// Writes the model file, whole or not at all.
+    ///
+    /// # Errors
+    /// [`ModelError::Output`].
+    pub fn save(&self, path: &Path) -> Result<(), ModelError> {
+        let text = self.to_toml();
+        output::write_atomic(path, |file| file.write_all(text.as_bytes()))?;
+        Ok(())
+    }
+}
+
+impl File {
+    fn from_model(model: &Model) -> Self {
+        let lags = model.product_lags.len();
+        Self {
+            format_version: FORMAT_VERSION,
+            sample_period_s: model.sample_period_s,
+            lag_convention: match model.convention {
+                LagConvention::Literal => Convention::Literal,
+                LagConvention::OneStep => Convention::OneStep,
+            },
+            start: model.start,
+            structure: Structure {
+                averaged: model.averaging.averaged_model,
+                window: model.averaging.window,
+                state_lags: model.state_lags.clone(),
+                product_lags: model.product_lags.clone(),
+            },
+            coefficients: Coefficients {
+                constant: model.constant,
+                a: model.a.clone(),
+                b: model.b.clone(),
+                c: (0..model.b.len())
+                    .map(|l| model.c.iter().copied().skip(l * lags).take(lags).collect())
+                    .collect(),
+            },
+            delay: model.delay.clone(),
+            effect: model.effects.iter().map(EffectTable::of).collect(),
+            training: model.training.clone(),
+        }
+    }
+
+    /// The model, or the key and what is wrong with it.
+    fn into_model(self) -> Result<Model, (String, String)> {
+        fn wrong<T>(key: &str, problem: String) -> Result<T, (String, String)> {
+            Err((key.to_owned(), problem))
+        }
+        let finite = |key: &str, values: &[f64]| match values.iter().find(|v| !v.is_finite()) {
+            Some(value) => wrong(key, format!("{value} is not a finite number")),
+            None => Ok(()),
+        };
+        let (structure, coefficients) = (&self.structure, &self.coefficients);
+        if !(self.sample_period_s.is_finite() && self.sample_period_s > 0.0) {
+            return wrong(
+                "sample_period_s",
+                "the sample period must be above 0".into(),
+            );
+        }
+        if structure.window < 2 {
+            return wrong(
+                "structure.window",
+                "the averaging window is at least 2".into(),
+            );
+        }
+        let pairs = [
+            (
+                "coefficients.a",
+                coefficients.a.len(),
+                "structure.state_lags",
+                structure.state_lags.len(),
+            ),
+            (
+                "coefficients.c",
+                coefficients.c.len(),
+                "coefficients.b",
+                coefficients.b.len(),
+            ),
+        ];
+        for (key, found, other, expected) in pairs {
+            if found != expected {
+                return wrong(
+                    key,
+                    format!("has {found} entries, but `{other}` has {expected}"),
+                );
+            }
+        }
+        if coefficients.b.is_empty() {
+            return wrong("coefficients.b", "a model has at least one input".into());
+        }
+        if let Some(row) = coefficients
+            .c
+            .iter()
+            .find(|r| r.len() != structure.product_lags.len())
+        {
+            return wrong(
+                "coefficients.c",
+                format!(
+                    "a row has {} numbers, but `structure.product_lags` has {}",
+                    row.len(),
+                    structure.product_lags.len()
+                ),
+            );
+        }
+        finite("coefficients.constant", &[coefficients.constant])?;
+        finite("coefficients.a", &coefficients.a)?;
+        finite("coefficients.b", &coefficients.b)?;
+        let c: Vec<f64> = coefficients.c.iter().flatten().copied().collect();
+        finite("coefficients.c", &c)?;
+        let convention = match self.lag_convention {
+            Convention::Literal => LagConvention::Literal,
+            Convention::OneStep => LagConvention::OneStep,
+        };
+        for (key, lags) in [
+            ("structure.state_lags", &structure.state_lags),
+            ("structure.product_lags", &structure.product_lags),
+        ] {
+            if convention == LagConvention::OneStep && lags.contains(&0) {
+                return wrong(
+                    key,
+                    "a lag of 0 is the future; one-step lags begin at 1".into(),
+                );
+            }
+        }
+        let per_input = |key: &str, found: usize| {
+            if found == coefficients.b.len() {
+                return Ok(());
+            }
+            let inputs = coefficients.b.len();
+            wrong(
+                key,
+                format!("has {found} entries, but `coefficients.b` has {inputs}"),
+            )
+        };
+        match &self.delay {
+            Delay::Fixed { delays } => per_input("delay.delays", delays.len())?,
+            Delay::StateDependent {
+                delay_floor,
+                delay_rise,
+                delay_rate,
+                factors,
+            } => {
+                per_input("delay.factors", factors.len())?;
+                finite("delay", &[*delay_floor, *delay_rise, *delay_rate])?;
+                finite("delay.factors", factors)?;
+            }
+            Delay::EdgeDependent {
+                rise_delay,
+                fall_delay,
+            } => {
+                finite("delay", &[*rise_delay, *fall_delay])?;
+                if *rise_delay < 0.0 || *fall_delay < 0.0 {
+                    return wrong("delay", "a delay cannot be negative".into());
+                }
+            }
+        }
+        let added = self.effect.into_iter().map(EffectTable::into_added);
+        Ok(Model {
+            sample_period_s: self.sample_period_s,
+            convention,
+            averaging: Averaging {
+                window: self.structure.window,
+                averaged_model: self.structure.averaged,
+            },
+            start: self.start,
+            constant: self.coefficients.constant,
+            state_lags: self.structure.state_lags,
+            a: self.coefficients.a,
+            product_lags: self.structure.product_lags,
+            b: self.coefficients.b,
+            c,
+            delay: self.delay,
+            effects: added.collect::<Result<_, _>>()?,
+            training: self.training,
+        })
+    }
+}
+
+impl EffectTable {
+    fn of(added: &Added) -> Self {
+        let names = effects::spec(&added.name).map_or(&[][..], |spec| spec.parameters);
+        let pairs = names.iter().zip(&added.parameters);
+        Self {
+            name: added.name.clone(),
+            channel: added.channel.clone(),
+            reference: added.reference,
+            parameters: pairs
+                .map(|(parameter, value)| (parameter.name.to_owned(), (*value).into()))
+                .collect(),
+        }
+    }
+
+    fn into_added(self) -> Result<Added, (String, String)> {
+        let key = format!("effect.{}", self.name);
+        let Some(spec) = effects::spec(&self.name) else {
+            let problem = "no such effect in the catalogue; `host-fit effects` lists them";
+            return Err((key, problem.to_owned()));
+        };
+        if spec.channel.is_some() && (self.channel.is_none() || self.reference.is_none()) {
+            let problem = "this effect needs `channel` and `reference`".to_owned();
+            return Err((key, problem));
+        }
+        let known = |name: &String| spec.parameters.iter().any(|p| p.name == name);
+        if let Some(name) = self.parameters.keys().find(|name| !known(name)) {
+            return Err((key, format!("it has no parameter `{name}`")));
+        }
+        let number = |value: &toml::Value| {
+            let integer = || value.as_integer().map(|whole| whole as f64);
+            value.as_float().or_else(integer).filter(|v| v.is_finite())
+        };
+        let parameters = spec.parameters.iter().map(|parameter| {
+            let value = self.parameters.get(parameter.name).and_then(number);
+            value.ok_or_else(|| {
+                let problem = format!(
+                    "parameter `{}` ({}) is missing or no finite number",
+                    parameter.name, parameter.unit
+                );
+                (key.clone(), problem)
+            })
+        });
+        Ok(Added {
+            parameters: parameters.collect::<Result<_, _>>()?,
+            name: self.name,
+            channel: self.channel,
+            reference: self.reference,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn example() -> Model {
+        let mut model = Model {
+            sample_period_s: 0.001,
+            convention: LagConvention::OneStep,
+            averaging: Averaging {
+                window: 250,
+                averaged_model: false,
+            },
+            start: Start::Rest,
+            constant: 0.0,
+            state_lags: vec![1, 44],
+            a: vec![0.9, 0.01],
+            product_lags: vec![1],
+            b: vec![0.1, 1.0 / 3.0],
+            c: vec![-0.02, 0.01],
+            delay: Delay::Fixed {
+                delays: vec![49, 417],
+            },
+            effects: Vec::new(),
+            training: Training::default(),
+        };
+        for name in ["hot-film-lag", "valve-lag"] {
+            let spec = effects::spec(name).expect("in the catalogue");
+            let values: Vec<f64> = spec.parameters.iter().map(|p| p.starts[0]).collect();
+            model.add(spec, &values, None);
+        }
+        model
+    }
+
+    #[test]
+    fn a_model_survives_its_file_bit_for_bit() {
+        let model = example();
+        let text = model.to_toml();
+        assert_eq!(Model::from_toml(&text, "m").expect("own file"), model);
+        assert_eq!(model.effect_names(), ["valve-lag", "hot-film-lag"]);
+        let moved = model.with_values(&model.values());
+        assert_eq!(moved, model);
+        assert_eq!(model.values().len(), model.coordinates().len());
+    }
+
+    #[test]
+    fn faults_are_named_by_key() {
+        let text = example().to_toml();
+        let cases = [
+            (
+                "format_version = 1",
+                "format_version = 9",
+                "`format_version` is 9",
+            ),
+            ("window = 250", "window = 1", "structure.window"),
+            ("window = 250", "windoe = 250", "windoe"),
+            ("valve-lag", "valve-lug", "effect.valve-lug"),
+            ("opening_time", "opening_tim", "opening_tim"),
+            (
+                "sample_period_s = 0.001",
+                "sample_period_s = -1.0",
+                "sample_period_s",
+            ),
+            (
+                "lag_convention = \"one-step\"",
+                "lag_convention = \"two-step\"",
+                "line 3",
+            ),
+            ("    49,\n", "", "delay.delays"),
+        ];
+        for (from, to, expected) in cases {
+            let broken = text.replacen(from, to, 1);
+            assert_ne!(broken, text, "{from} is not in the file:\n{text}");
+            let error = Model::from_toml(&broken, "m.toml")
+                .expect_err(to)
+                .to_string();
+            assert!(error.contains(expected), "{error} does not name {expected}");
+            assert!(error.starts_with("m.toml"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! The base plant: the flow every hidden effect is added to.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+/// How long the flow takes to notice the jet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DelayLaw {
+    /// The same transport delay always, in seconds (0–0.5).
+    Fixed {
+        /// Transport delay (s).
+        delay_s: f64,
+    },
+    /// h(ỹ) = floor + rise·exp(−rate·ỹ), ỹ the mean friction of the last 250 ms, evaluated when the
+    /// jet *arrives* (law (2) of the ECC 2016 paper, in seconds instead of samples).
+    StateDependent {
+        /// Delay of the attached flow, p0 (s).
+        floor_s: f64,
+        /// Extra delay of the fully separated flow, p1 (s).
+        rise_s: f64,
+        /// How fast the extra delay vanishes with the mean friction, p2 (1/y).
+        rate: f64,
+    },
+    /// Each rising edge of the command takes one time to arrive, each falling edge another.
+    EdgeDependent {
+        /// Delay of a rising edge (s).
+        rise_s: f64,
+        /// Delay of a falling edge (s).
+        fall_s: f64,
+    },
+}
+
+/// What a jet between off and on does to the *rate* of the flow. An on/off jet makes no difference
+/// between the three; jets of intermediate strength (a lagging valve, a drooping plenum) do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum RateLaw {
+    /// The rate is the attaching one while a jet of at least half strength arrives, otherwise the
+    /// separating one; the equilibrium is gain × jet.
+    #[default]
+    Switched,
+    /// The rate is interpolated linearly in the jet, the equilibrium is gain × jet.
+    Interpolated,
+    /// The *velocity* of the friction is interpolated linearly in the jet, which keeps the flow
+    /// inside the bilinear class for every jet strength.
+    Bilinear,
+}
+
+/// Separated flow behind a ramp with fluidic actuation: ṡ = rate(j)·(gain·j − s), j the arriving jet.
+///
+/// Attachment and separation have time constants of their own, which the bilinear class contains
+/// exactly (the term u·y) as long as the jet is on/off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BasePlant {
+    /// Time constant of attachment, while the jet arrives (s, 0.001–10).
+    pub attach_s: f64,
+    /// Time constant of separation, without a jet (s, 0.001–10).
+    pub separate_s: f64,
+    /// Friction the flow settles at under steady blowing (y).
+    pub gain: f64,
+    /// Transport delay.
+    pub delay: DelayLaw,
+    /// Rate of the flow for jets between off and on.
+    pub rate_law: RateLaw,
+}
+
+/// Log-uniform draw: every octave of the range is equally likely.
+pub(crate) fn log_uniform(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
+    rng.random_range(low.ln()..high.ln()).exp()
+}
+
+impl BasePlant {
+    /// A rig at random: time constants 20–150 ms that differ by at least a quarter, gain 0.85–1.15,
+    /// state-dependent delay between 20 and 60 ms.
+    ///
+    /// rise·rate stays below 0.2 s so that the delay never grows faster than time (|dỹ/dt| ≤ 4 /s).
+    pub fn draw(rng: &mut ChaCha8Rng) -> Self {
+        let (attach_s, separate_s) = loop {
+            let a = log_uniform(rng, 0.020, 0.150);
+            let b = log_uniform(rng, 0.020, 0.150);
+            if (a / b).ln().abs() > 1.25_f64.ln() {
+                break (a, b);
+            }
+        };
+        let floor_s = rng.random_range(0.020..0.045);
+        let rise_s = rng.random_range(0.006..0.015);
+        let rate = log_uniform(rng, 3.0, 20.0_f64.min(0.2 / rise_s));
+        Self {
+            attach_s,
+            separate_s,
+            gain: rng.random_range(0.85..1.15),
+            delay: DelayLaw::StateDependent {
+                floor_s,
+                rise_s,
+                rate,
+            },
+            rate_law: RateLaw::default(),
+        }
+    }
+
+    /// The same rig with a delay that does not depend on the flow: drawn from 20–60 ms.
+    pub fn with_fixed_delay(mut self, rng: &mut ChaCha8Rng) -> Self {
+        self.delay = DelayLaw::Fixed {
+            delay_s: rng.random_range(0.020..0.060),
+        };
+        self
+    }
+
+    /// The same rig with equal time constants: the linear base for commands of many levels, where
+    /// "attaching" and "separating" have no switch between them.
+    pub fn with_one_time_constant(mut self) -> Self {
+        self.separate_s = self.attach_s;
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+
+    #[test]
+    fn draws_stay_in_their_ranges_and_repeat() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for _ in 0..500 {
+            let base = BasePlant::draw(&mut rng);
+            for tau in [base.attach_s, base.separate_s] {
+                assert!((0.020..=0.150).contains(&tau));
+            }
+            let DelayLaw::StateDependent {
+                floor_s,
+                rise_s,
+                rate,
+            } = base.delay
+            else {
+                panic!("the base plant has a state-dependent delay");
+            };
+            assert!(floor_s >= 0.020 && floor_s + rise_s <= 0.060);
+            assert!(rise_s * rate <= 0.2 + 1e-12);
+        }
+        let once = BasePlant::draw(&mut ChaCha8Rng::seed_from_u64(9));
+        assert_eq!(once, BasePlant::draw(&mut ChaCha8Rng::seed_from_u64(9)));
+    }
+}

@@ -1,0 +1,64 @@
+//! Misbehaviour of a rig that no effect of the catalogue describes.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+/// A fault that repeats in every repeat of a record, so that averaging does not remove it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fault {
+    /// The valve ignores every n-th pulse of the record.
+    MissingPulse {
+        /// n, at least 2.
+        every: u32,
+    },
+    /// The sensor holds its last value for a while.
+    FreezingSensor {
+        /// When it freezes (s from the record's start).
+        from_s: f64,
+        /// When it works again (s from the record's start).
+        to_s: f64,
+    },
+    /// A valve that was open for long closes only half way and stays there before it shuts.
+    StickingValve {
+        /// Shortest opening after which it sticks (s).
+        after_open_s: f64,
+        /// How long it stays half open (s).
+        stuck_s: f64,
+    },
+}
+
+impl Fault {
+    /// The names [`Fault::draw`] knows.
+    pub const NAMES: &'static [&'static str] =
+        &["missing-pulse", "freezing-sensor", "sticking-valve"];
+
+    /// Name for reports and command lines.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::MissingPulse { .. } => "missing-pulse",
+            Self::FreezingSensor { .. } => "freezing-sensor",
+            Self::StickingValve { .. } => "sticking-valve",
+        }
+    }
+
+    /// A visible fault of that name at random; `None` for an unknown name.
+    pub fn draw(name: &str, rng: &mut ChaCha8Rng) -> Option<Self> {
+        match name {
+            "missing-pulse" => Some(Self::MissingPulse {
+                every: rng.random_range(3..=5),
+            }),
+            "freezing-sensor" => {
+                let from_s = rng.random_range(3.0..6.0);
+                Some(Self::FreezingSensor {
+                    from_s,
+                    to_s: from_s + rng.random_range(0.8..2.0),
+                })
+            }
+            "sticking-valve" => Some(Self::StickingValve {
+                after_open_s: rng.random_range(0.075..0.140),
+                stuck_s: rng.random_range(0.060..0.150),
+            }),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! Plants: the rig as physics, stepped far below the sample period, with delays that are true delays.
+//!
+//! Nothing here is shared with `model-core`: these plants judge the model, so they must not repeat its
+//! discretisation. The signals run command → valve → plenum → jet → transport → flow → film → reading.
+
+mod base;
+mod draw;
+mod effect;
+mod fault;
+mod flow;
+mod free_stream;
+mod jet;
+mod rig;
+mod sensor;
+mod transport;
+
+pub use base::{BasePlant, DelayLaw, RateLaw};
+pub use effect::{Effect, EffectError, Parameter};
+pub use fault::Fault;
+pub use free_stream::{FreeStream, MEAN_FREE_STREAM};
+pub use rig::{PlantSpec, Rig};
+
+/// Sample period of commands and readings (s).
+pub const SAMPLE_PERIOD_S: f64 = 0.001;
+
+/// Sub-steps per sample: the physics runs at 20 kHz.
+pub const SUBSTEPS: u32 = 20;
+
+/// Length of a sub-step (s).
+pub const SUBSTEP_S: f64 = SAMPLE_PERIOD_S / SUBSTEPS as f64;
+
+/// How much of the past the jet remembers (s); every delay is far shorter.
+const LONGEST_DELAY_S: f64 = 2.5;
+
+/// Time differences below this are the same instant (s).
+const SHORTEST_PIECE_S: f64 = 1e-12;
+
+/// What a controller can be connected to: one command in, one reading out, every millisecond.
+pub trait Plant {
+    /// Holds the valve command for one sample period, then reads the sensor (y, with noise and
+    /// converter where the plant has them).
+    fn step(&mut self, command: bool) -> f64;
+}

@@ -1,0 +1,414 @@
+//! The whole rig: jet, transport, flow and sensor, advanced together.
+
+use super::base::{BasePlant, DelayLaw};
+use super::effect::{Effect, EffectError};
+use super::fault::Fault;
+use super::flow::Flow;
+use super::free_stream::FreeStream;
+use super::jet::Jet;
+use super::sensor::Sensor;
+use super::transport::{ArrivalClock, EdgeTravel, MeanFriction};
+use super::{Plant, SAMPLE_PERIOD_S, SHORTEST_PIECE_S, SUBSTEP_S, SUBSTEPS};
+use crate::waveform::Cursor;
+
+/// Everything that defines a rig.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlantSpec {
+    /// The flow to which the rest is added.
+    pub base: BasePlant,
+    /// Effects, in any order; the physics orders them.
+    pub effects: Vec<Effect>,
+    /// Faults.
+    pub faults: Vec<Fault>,
+}
+
+impl PlantSpec {
+    /// The base plant with these effects and no fault.
+    pub fn new(base: BasePlant, effects: &[Effect]) -> Self {
+        Self {
+            base,
+            effects: effects.to_vec(),
+            faults: Vec::new(),
+        }
+    }
+
+    /// The delay in force: an effect's, if one is about the delay, otherwise the base plant's.
+    pub fn delay(&self) -> DelayLaw {
+        self.effects
+            .iter()
+            .fold(self.base.delay, |law, effect| match *effect {
+                Effect::StateDependentDelay {
+                    delay_floor,
+                    delay_rise,
+                    delay_rate,
+                } => DelayLaw::StateDependent {
+                    floor_s: delay_floor * SAMPLE_PERIOD_S,
+                    rise_s: delay_rise * SAMPLE_PERIOD_S,
+                    rate: delay_rate,
+                },
+                Effect::EdgeDependentDelay {
+                    rise_delay,
+                    fall_delay,
+                } => DelayLaw::EdgeDependent {
+                    rise_s: rise_delay,
+                    fall_s: fall_delay,
+                },
+                _ => law,
+            })
+    }
+}
+
+/// A rig at 20 kHz inside and 1 kHz outside, without noise. It starts separated, at rest, with a full
+/// plenum and a closed valve.
+#[derive(Debug, Clone)]
+pub struct Rig {
+    edges: Option<EdgeTravel>,
+    jet: Jet,
+    clock: ArrivalClock,
+    cursor: Cursor,
+    mean: MeanFriction,
+    flow: Flow,
+    sensor: Sensor,
+    command: f64,
+    substeps: u64,
+}
+
+impl Rig {
+    /// Builds the rig; `free_stream` is what the tunnel does during the record, steady when `None`.
+    ///
+    /// # Errors
+    /// [`EffectError::OutOfRange`] when an effect's parameter is physically impossible.
+    pub fn new(spec: &PlantSpec, free_stream: Option<FreeStream>) -> Result<Self, EffectError> {
+        for effect in &spec.effects {
+            effect.validate()?;
+        }
+        let law = spec.delay();
+        Ok(Self {
+            edges: EdgeTravel::new(law),
+            jet: Jet::new(&spec.effects, &spec.faults, free_stream),
+            clock: ArrivalClock::new(law),
+            cursor: Cursor::default(),
+            mean: MeanFriction::at_rest(),
+            flow: Flow::new(&spec.base, &spec.effects),
+            sensor: Sensor::new(&spec.effects, &spec.faults),
+            command: 0.0,
+            substeps: 0,
+        })
+    }
+
+    /// Time since the start (s).
+    pub fn time(&self) -> f64 {
+        self.substeps as f64 * SUBSTEP_S
+    }
+
+    /// The friction s of the flow now (y), before film and cable.
+    pub fn friction(&self) -> f64 {
+        self.flow.friction()
+    }
+
+    /// Tells the valve `level` (0 closed, 1 open) from now on.
+    pub fn command(&mut self, level: f64) {
+        self.command_at(self.time(), level);
+    }
+
+    fn command_at(&mut self, t: f64, level: f64) {
+        self.command = level;
+        match &mut self.edges {
+            Some(edges) => edges.send(t, level),
+            None => self.jet.command(level),
+        }
+    }
+
+    /// The reading now (y), without noise.
+    pub fn read(&mut self) -> f64 {
+        let t = self.time();
+        self.sensor.read(t, self.command)
+    }
+
+    /// Lets one sample period pass with the command held.
+    pub fn advance_sample(&mut self) {
+        self.advance_sample_with(&[]);
+    }
+
+    /// Lets one sample period pass in which the command changes at `(offset, level)`, offsets in
+    /// seconds from its beginning, ascending, within the period: edges need not fall on samples.
+    pub fn advance_sample_with(&mut self, changes: &[(f64, f64)]) {
+        let begin = self.time();
+        let mut changes = changes.iter().map(|(offset, level)| (begin + offset, *level)).peekable();
+        for _ in 0..SUBSTEPS {
+            let start = self.time();
+            self.substeps += 1;
+            let end = self.time();
+            while let Some((t, level)) = changes.next_if(|c| c.0 < end) {
+                if self.edges.is_none() && t - start > SHORTEST_PIECE_S {
+                    self.jet.advance(t);
+                }
+                self.command_at(t.max(start), level);
+            }
+            while let Some((t, level)) = self.edges.as_mut().and_then(|e| e.next_before(end)) {
+                self.jet.advance(t);
+                self.jet.command(level);
+            }
+            self.jet.advance(end);
+            self.flow_substep(start, end);
+        }
+    }
+
+    /// The flow and the film over one sub-step, split wherever an edge arrives.
+    fn flow_substep(&mut self, start: f64, end: f64) {
+        let (from, to) = self.clock.stretch(end, &self.mean);
+        let (mut t, mut read) = (start, from);
+        let mut jet = self.jet.out.at(from, &mut self.cursor);
+        let mut area = 0.0;
+        self.arrive(jet);
+        while let Some((knot, before, after)) = self.jet.out.jump_inside(read, to, &mut self.cursor)
+        {
+            let arrival = start + (end - start) * (knot - from) / (to - from);
+            area += self.piece(arrival - t, jet, before);
+            self.arrive(after);
+            (t, read, jet) = (arrival, knot, after);
+        }
+        let last = self.jet.out.before(to, &mut self.cursor);
+        area += self.piece(end - t, jet, last);
+        // An edge that arrives at this very instant already counts for a reading taken now.
+        let now = self.jet.out.at(to, &mut self.cursor);
+        self.arrive(now);
+        self.mean.push(area, self.flow.friction());
+    }
+
+    fn piece(&mut self, dt: f64, j0: f64, j1: f64) -> f64 {
+        if dt <= SHORTEST_PIECE_S {
+            return 0.0;
+        }
+        let area = self.flow.advance(dt, j0, j1);
+        self.sensor.advance(dt, self.flow.at_the_film());
+        area
+    }
+
+    fn arrive(&mut self, jet: f64) {
+        self.flow.jump(jet);
+        self.sensor.jump(self.flow.at_the_film());
+    }
+
+    /// Plays a command of one level per sample; the k-th reading is taken when the k-th level has just
+    /// been set.
+    pub fn play(&mut self, levels: &[f64]) -> Vec<f64> {
+        levels
+            .iter()
+            .map(|&level| {
+                self.command(level);
+                let y = self.read();
+                self.advance_sample();
+                y
+            })
+            .collect()
+    }
+}
+
+impl Plant for Rig {
+    fn step(&mut self, command: bool) -> f64 {
+        self.command(f64::from(u8::from(command)));
+        self.advance_sample();
+        self.read()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::RateLaw;
+
+    fn base(delay: DelayLaw) -> BasePlant {
+        BasePlant {
+            attach_s: 0.04,
+            separate_s: 0.1,
+            gain: 1.0,
+            delay,
+            rate_law: RateLaw::Switched,
+        }
+    }
+
+    fn rig(delay: DelayLaw, effects: &[Effect]) -> Rig {
+        Rig::new(&PlantSpec::new(base(delay), effects), None).unwrap()
+    }
+
+    #[test]
+    fn an_edge_between_samples_arrives_between_samples() {
+        let delay_s = 0.030_37;
+        let mut rig = rig(DelayLaw::Fixed { delay_s }, &[]);
+        // On at 1.23 ms, off at 61.66 ms.
+        let (on, off) = (0.001_23, 0.061_66);
+        for k in 0..150 {
+            let t0 = f64::from(k) * 0.001;
+            let changes: Vec<(f64, f64)> = [(on, 1.0), (off, 0.0)]
+                .iter()
+                .filter(|c| c.0 >= t0 && c.0 < t0 + 0.001)
+                .map(|c| (c.0 - t0, c.1))
+                .collect();
+            let (up, down) = (on + delay_s, off + delay_s);
+            let rising = |t: f64| 1.0 - (-(t - up).max(0.0) / 0.04).exp();
+            let expected = if t0 < down {
+                rising(t0)
+            } else {
+                rising(down) * (-(t0 - down) / 0.1).exp()
+            };
+            assert!(
+                (rig.read() - expected).abs() < 1e-8,
+                "at {t0} s: {} instead of {expected}",
+                rig.read()
+            );
+            rig.advance_sample_with(&changes);
+        }
+    }
+
+    #[test]
+    fn the_state_dependent_delay_is_the_law_at_the_arrival() {
+        let (floor_s, rise_s, rate) = (0.030, 0.012, 8.0);
+        let mut rig = rig(
+            DelayLaw::StateDependent {
+                floor_s,
+                rise_s,
+                rate,
+            },
+            &[],
+        );
+        // From rest the mean is 0: the first edge takes floor + rise.
+        rig.command(1.0);
+        for _ in 0..42 {
+            rig.advance_sample();
+        }
+        assert!(rig.friction() < 1e-9, "not before 42 ms: {}", rig.friction());
+        rig.advance_sample();
+        let expected = 1.0 - (-0.001_f64 / 0.04).exp();
+        assert!((rig.friction() - expected).abs() < 1e-3 * expected + 2e-4);
+        // After long blowing the mean is 1: the falling edge takes floor + rise·exp(−rate).
+        for _ in 0..2000 {
+            rig.advance_sample();
+        }
+        rig.command(0.0);
+        let h = floor_s + rise_s * (-rate).exp();
+        for _ in 0..60 {
+            rig.advance_sample();
+        }
+        let expected = (-(0.060 - h) / 0.1_f64).exp();
+        assert!((rig.friction() - expected).abs() < 1e-6);
+    }
+
+    #[test]
+    fn edges_with_delays_of_their_own_lengthen_the_pulse_by_the_difference() {
+        let effect = Effect::EdgeDependentDelay {
+            rise_delay: 0.025,
+            fall_delay: 0.0405,
+        };
+        let mut rig = rig(DelayLaw::Fixed { delay_s: 0.05 }, &[effect]);
+        let mut command = vec![1.0; 50];
+        command.resize(200, 0.0);
+        let y = rig.play(&command);
+        let peak = 1.0 - (-(0.050 + 0.0155) / 0.04_f64).exp();
+        assert!(y[25] == 0.0 && y[26] > 0.0);
+        assert!((y[150] - peak * (-(0.150 - 0.0905) / 0.1_f64).exp()).abs() < 1e-8);
+    }
+
+    #[test]
+    fn pickup_is_read_with_the_command_before_the_flow_moves() {
+        let effect = Effect::ElectricalPickup { gain: 0.2 };
+        let mut rig = rig(DelayLaw::Fixed { delay_s: 0.03 }, &[effect]);
+        let y = rig.play(&[0.0, 1.0, 1.0, 0.0, 0.0]);
+        assert_eq!(y, [0.0, 0.2, 0.2, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn free_stream_changes_the_level_by_its_gain() {
+        use rand::SeedableRng;
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let stream = FreeStream::draw(&mut rng, 10_000);
+        let spec = PlantSpec::new(
+            BasePlant {
+                attach_s: 0.002,
+                ..base(DelayLaw::Fixed { delay_s: 0.02 })
+            },
+            &[Effect::FreeStreamVariation { gain: -2.0 }],
+        );
+        let mut rig = Rig::new(&spec, Some(stream.clone())).unwrap();
+        let y = rig.play(&vec![1.0; 10_000]);
+        for k in (100..10_000).step_by(100) {
+            // A 2 ms flow follows the jet of 22 ms ago closely.
+            let expected = 1.0 - 2.0 * (stream.velocity(k as f64 * 1e-3 - 0.022) / 10.0 - 1.0);
+            assert!((y[k] - expected).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn every_effect_changes_the_reading_and_stays_finite() {
+        use rand::SeedableRng;
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(11);
+        for name in Effect::NAMES {
+            let plain = BasePlant::draw(&mut rng).with_fixed_delay(&mut rng);
+            let effect = Effect::draw(name, &plain, &mut rng).unwrap();
+            let plain = if effect.needs_levels() {
+                plain.with_one_time_constant()
+            } else {
+                plain
+            };
+            let command: Vec<f64> = (0..4000)
+                .map(|k| match (effect.needs_levels(), (k / 125) % 4) {
+                    (false, phase) => f64::from(u8::from(phase % 2 == 0 && k < 3000)),
+                    (true, phase) => [1.0, -0.7, 0.4, 0.0][phase],
+                })
+                .collect();
+            let stream = FreeStream::draw(&mut rng, command.len());
+            let play = |effects: &[Effect]| {
+                Rig::new(&PlantSpec::new(plain, effects), Some(stream.clone()))
+                    .unwrap()
+                    .play(&command)
+            };
+            let (without, with) = (play(&[]), play(&[effect]));
+            let rms = (with
+                .iter()
+                .zip(&without)
+                .map(|(a, b)| (a - b) * (a - b))
+                .sum::<f64>()
+                / 4000.0)
+                .sqrt();
+            assert!(rms > 0.015 && rms < 1.0, "{name}: rms change {rms}, {effect:?}");
+        }
+    }
+
+    #[test]
+    fn effects_add_up_in_the_physical_order() {
+        // A lagging valve, a drooping plenum and King's law at once, at steady blowing.
+        let (ratio, offset) = (1.5, 0.05);
+        let effects = [
+            Effect::HotFilmNonlinearity {
+                king_ratio: ratio,
+                king_offset: offset,
+            },
+            Effect::PlenumDroop {
+                recovery_time: 0.5,
+                depletion_rate: 0.5,
+            },
+            Effect::ValveLag {
+                opening_time: 0.01,
+                closing_time: 0.01,
+            },
+        ];
+        let mut rig = rig(DelayLaw::Fixed { delay_s: 0.03 }, &effects);
+        let y = rig.play(&vec![1.0; 8000]);
+        let e = |s: f64| (1.0 + ratio * (s + offset).cbrt()).sqrt();
+        let expected = (e(0.8) - e(0.0)) / (e(1.0) - e(0.0));
+        assert!((y[7999] - expected).abs() < 1e-5);
+    }
+
+    #[test]
+    fn the_same_rig_answers_the_loop_one_sample_later_than_the_record() {
+        let law = DelayLaw::Fixed { delay_s: 0.0317 };
+        let command: Vec<f64> = (0..500)
+            .map(|k| f64::from(u8::from((k / 70) % 2 == 0)))
+            .collect();
+        let recorded = rig(law, &[]).play(&command);
+        let mut looped = rig(law, &[]);
+        for (k, level) in command.iter().enumerate().take(499) {
+            assert_eq!(looped.step(*level == 1.0), recorded[k + 1]);
+        }
+    }
+}

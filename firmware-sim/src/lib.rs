@@ -4,4 +4,10 @@
 
 mod waveform;
 
+pub mod command;
+pub mod dataset;
+pub mod dde;
+pub mod hidden_set;
+pub mod instrument;
+pub mod paper_like;
 pub mod plant;

@@ -6,9 +6,9 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::SAMPLE_PERIOD_S;
 use super::base::{BasePlant, log_uniform};
 use super::effect::{Effect, EffectError};
-use super::SAMPLE_PERIOD_S;
 
 fn signed(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
     let size = rng.random_range(low..high);

@@ -19,9 +19,7 @@ pub enum EffectError {
         known: String,
     },
     /// A parameter is not a usable number.
-    #[error(
-        "`{parameter}` of `{effect}` is {value}, it must be {requirement}; give another value"
-    )]
+    #[error("`{parameter}` of `{effect}` is {value}, it must be {requirement}; give another value")]
     OutOfRange {
         /// Name of the effect.
         effect: &'static str,

@@ -125,20 +125,23 @@ impl Flow {
 
     /// What the film feels: friction with the shedding superposed (y).
     pub(crate) fn at_the_film(&self) -> f64 {
-        self.friction
-            + self
-                .shedding
-                .map_or(0.0, |w| w.gain * (w.q - self.jet))
+        self.friction + self.shedding.map_or(0.0, |w| w.gain * (w.q - self.jet))
     }
 
     /// ṡ and ż at friction `s`, hysteretic memory `z`, arriving jet `j`.
     fn velocity(&self, s: f64, z: f64, j: f64) -> (f64, f64) {
-        let extra = self.relay.map_or(0.0, |r| if r.attached { r.gain } else { 0.0 })
+        let extra = self
+            .relay
+            .map_or(0.0, |r| if r.attached { r.gain } else { 0.0 })
             - self.cubic * s * s * s
             - self.bouc_wen.map_or(0.0, |b| b.alpha * z);
         let push = match self.rate_law {
             RateLaw::Switched => {
-                let rate = if j >= 0.5 { self.rate_on } else { self.rate_off };
+                let rate = if j >= 0.5 {
+                    self.rate_on
+                } else {
+                    self.rate_off
+                };
                 rate * (self.gain * j + extra - s)
             }
             RateLaw::Interpolated => {
@@ -194,9 +197,8 @@ impl Flow {
             }
         }
         if let Some(w) = &mut self.shedding {
-            let pull = |q: f64, v: f64, j: f64| {
-                w.omega * (w.omega * (j - q) - 2.0 * w.damping_ratio * v)
-            };
+            let pull =
+                |q: f64, v: f64, j: f64| w.omega * (w.omega * (j - q) - 2.0 * w.damping_ratio * v);
             let (q, v) = (w.q, w.q_dot);
             let k1 = (v, pull(q, v, j0));
             let k2 = (
@@ -314,7 +316,10 @@ mod tests {
         let z = (1.0 - (-4.0 * s).exp()) / 4.0;
         assert!((flow.hysteretic - z).abs() < 1e-6);
         assert!((s + 0.5 * z - 1.0).abs() < 1e-6);
-        assert!(hold(&mut flow, 0.0, 5.0) > 0.01, "it does not come back to 0");
+        assert!(
+            hold(&mut flow, 0.0, 5.0) > 0.01,
+            "it does not come back to 0"
+        );
     }
 
     #[test]

@@ -243,7 +243,10 @@ impl Jet {
             if let Some(t) = self.stuck_until {
                 stop = stop.min(t.max(self.time));
             }
-            let returning = self.echo.as_ref().and_then(|e| e.returning.front().copied());
+            let returning = self
+                .echo
+                .as_ref()
+                .and_then(|e| e.returning.front().copied());
             if let Some(t) = returning {
                 stop = stop.min(t.max(self.time));
             }
@@ -267,7 +270,11 @@ impl Jet {
     fn piece(&mut self, dt: f64, to: f64) {
         let start = self.opening;
         if let Some((opening, closing)) = self.lag {
-            let tau = if self.target > start { opening } else { closing };
+            let tau = if self.target > start {
+                opening
+            } else {
+                closing
+            };
             self.opening = self.target + (start - self.target) * (-dt / tau).exp();
         }
         if let Some((recovery, depletion)) = self.plenum {
@@ -281,7 +288,10 @@ impl Jet {
         let jet = match &mut self.echo {
             Some(e) => {
                 e.direct.line_to(to, direct);
-                direct + e.gain * e.direct.before(to - e.delay_s - RETURN_SLACK_S, &mut e.cursor)
+                direct
+                    + e.gain
+                        * e.direct
+                            .before(to - e.delay_s - RETURN_SLACK_S, &mut e.cursor)
             }
             None => direct,
         };
@@ -355,7 +365,10 @@ mod tests {
         let (t, before, after) = jet.out.jump_inside(0.0, 1.0, &mut c).unwrap();
         assert!((t - 0.080_013).abs() < 1e-11 && before == 1.0 && (after - 0.7).abs() < 1e-12);
         jet.command(0.0);
-        assert!((run(&mut jet, 0.1) + 0.3).abs() < 1e-12, "only the echo is left");
+        assert!(
+            (run(&mut jet, 0.1) + 0.3).abs() < 1e-12,
+            "only the echo is left"
+        );
         assert!(run(&mut jet, 0.2).abs() < 1e-12);
     }
 
@@ -369,7 +382,10 @@ mod tests {
         assert!((run(&mut start, 0.02) - (1.0 + 0.8 * (-1.0_f64).exp())).abs() < 1e-9);
         run(&mut start, 1.0);
         start.command(0.0);
-        assert!(run(&mut start, 1.001).abs() < 1e-9, "switching off sheds nothing");
+        assert!(
+            run(&mut start, 1.001).abs() < 1e-9,
+            "switching off sheds nothing"
+        );
 
         let mut stop = with(Effect::StoppingVortex {
             gain: 0.5,

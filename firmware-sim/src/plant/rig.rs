@@ -134,7 +134,10 @@ impl Rig {
     /// seconds from its beginning, ascending, within the period: edges need not fall on samples.
     pub fn advance_sample_with(&mut self, changes: &[(f64, f64)]) {
         let begin = self.time();
-        let mut changes = changes.iter().map(|(offset, level)| (begin + offset, *level)).peekable();
+        let mut changes = changes
+            .iter()
+            .map(|(offset, level)| (begin + offset, *level))
+            .peekable();
         for _ in 0..SUBSTEPS {
             let start = self.time();
             self.substeps += 1;
@@ -277,7 +280,11 @@ mod tests {
         for _ in 0..42 {
             rig.advance_sample();
         }
-        assert!(rig.friction() < 1e-9, "not before 42 ms: {}", rig.friction());
+        assert!(
+            rig.friction() < 1e-9,
+            "not before 42 ms: {}",
+            rig.friction()
+        );
         rig.advance_sample();
         let expected = 1.0 - (-0.001_f64 / 0.04).exp();
         assert!((rig.friction() - expected).abs() < 1e-3 * expected + 2e-4);
@@ -370,7 +377,10 @@ mod tests {
                 .sum::<f64>()
                 / 4000.0)
                 .sqrt();
-            assert!(rms > 0.015 && rms < 1.0, "{name}: rms change {rms}, {effect:?}");
+            assert!(
+                rms > 0.015 && rms < 1.0,
+                "{name}: rms change {rms}, {effect:?}"
+            );
         }
     }
 

@@ -155,7 +155,9 @@ mod tests {
 
     #[test]
     fn the_film_lags_by_its_time_constant() {
-        let mut film = with(Effect::HotFilmLag { time_constant: 0.02 });
+        let mut film = with(Effect::HotFilmLag {
+            time_constant: 0.02,
+        });
         film.jump(1.0);
         for _ in 0..400 {
             film.advance(5e-5, 1.0);

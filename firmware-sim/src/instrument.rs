@@ -1,0 +1,318 @@
+//! What happens between the film's voltage and a phase-averaged data column: noise, converter, repeats.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use thiserror::Error;
+
+use crate::plant::{Plant, Rig, SAMPLE_PERIOD_S};
+
+/// Why an instrument is refused.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum InstrumentError {
+    /// Fewer than two repeats have no scatter.
+    #[error("{0} repeats have no standard error; use at least 2 (20 is usual)")]
+    TooFewRepeats(usize),
+}
+
+/// An analogue-to-digital converter; readings beyond its range stay at the ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Converter {
+    /// Number of bits (1–24).
+    pub bits: u32,
+    /// Reading of code 0 (y).
+    pub low: f64,
+    /// Reading of the highest code (y).
+    pub high: f64,
+}
+
+impl Converter {
+    /// 12 bits over −0.5 … 2 (one step is 0.0006 in y).
+    pub const TWELVE_BIT: Self = Self {
+        bits: 12,
+        low: -0.5,
+        high: 2.0,
+    };
+
+    /// The code a converter would give for `y`.
+    pub fn code(&self, y: f64) -> u32 {
+        let top = f64::from((1_u32 << self.bits.clamp(1, 24)) - 1);
+        let scaled = (y - self.low) / (self.high - self.low) * top;
+        // A saturating cast: beyond the range the code stays at its end.
+        scaled.round().clamp(0.0, top) as u32
+    }
+
+    /// The reading a code stands for (y).
+    pub fn reading(&self, code: u32) -> f64 {
+        let top = f64::from((1_u32 << self.bits.clamp(1, 24)) - 1);
+        self.low + (self.high - self.low) * f64::from(code) / top
+    }
+}
+
+/// Sensor noise of one repeat: white plus first-order coloured, both Gaussian.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// Standard deviation of the white part (y).
+    pub white: f64,
+    /// Standard deviation of the coloured part (y).
+    pub coloured: f64,
+    /// Correlation time of the coloured part (s): its autocorrelation is exp(−t/time).
+    pub correlation_s: f64,
+}
+
+impl Noise {
+    /// A hot film in a turbulent flow: white 0.03, coloured 0.035 over 20 ms.
+    pub const HOT_FILM: Self = Self {
+        white: 0.03,
+        coloured: 0.035,
+        correlation_s: 0.020,
+    };
+
+    /// Standard deviation of one sample of one repeat (y).
+    pub fn standard_deviation(&self) -> f64 {
+        self.white.hypot(self.coloured)
+    }
+}
+
+/// A running noise signal at 1 kHz, stationary from its first sample.
+#[derive(Debug, Clone)]
+pub struct NoiseSource {
+    noise: Noise,
+    memory: f64,
+    coloured: f64,
+    rng: ChaCha8Rng,
+}
+
+impl NoiseSource {
+    /// Starts the noise.
+    pub fn new(noise: Noise, mut rng: ChaCha8Rng) -> Self {
+        let first: f64 = StandardNormal.sample(&mut rng);
+        Self {
+            noise,
+            memory: (-SAMPLE_PERIOD_S / noise.correlation_s).exp(),
+            coloured: noise.coloured * first,
+            rng,
+        }
+    }
+
+    /// The next sample (y).
+    pub fn sample(&mut self) -> f64 {
+        let white: f64 = StandardNormal.sample(&mut self.rng);
+        let drive: f64 = StandardNormal.sample(&mut self.rng);
+        let now = self.noise.white * white + self.coloured;
+        let fresh = (1.0 - self.memory * self.memory).sqrt();
+        self.coloured = self.memory * self.coloured + self.noise.coloured * fresh * drive;
+        now
+    }
+}
+
+/// How a record is measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instrument {
+    /// Noise of each repeat.
+    pub noise: Noise,
+    /// Converter of each repeat; `None` for readings in full precision.
+    pub converter: Option<Converter>,
+    /// Repeats that are averaged (at least 2).
+    pub repeats: usize,
+    /// Relative scatter of the level from repeat to repeat, as the tunnel's speed never comes back
+    /// exactly (0 for none).
+    pub level_scatter: f64,
+}
+
+impl Default for Instrument {
+    /// 20 repeats of the hot film on a 12-bit converter.
+    fn default() -> Self {
+        Self {
+            noise: Noise::HOT_FILM,
+            converter: Some(Converter::TWELVE_BIT),
+            repeats: 20,
+            level_scatter: 0.0,
+        }
+    }
+}
+
+/// A phase average with its scatter, one value per sample.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PhaseAverage {
+    /// Mean over the repeats (y).
+    pub mean: Vec<f64>,
+    /// Standard error of the mean, estimated from the scatter (y).
+    pub standard_error: Vec<f64>,
+    /// Smallest repeat (y).
+    pub min: Vec<f64>,
+    /// Largest repeat (y).
+    pub max: Vec<f64>,
+}
+
+impl Instrument {
+    /// Measures the noise-free readings `truth` as often as there are repeats and averages.
+    ///
+    /// # Errors
+    /// [`InstrumentError::TooFewRepeats`] below two repeats.
+    pub fn measure(&self, truth: &[f64], seed: u64) -> Result<PhaseAverage, InstrumentError> {
+        if self.repeats < 2 {
+            return Err(InstrumentError::TooFewRepeats(self.repeats));
+        }
+        let n = truth.len();
+        let mut sum = vec![0.0; n];
+        let mut square = vec![0.0; n];
+        let mut min = vec![f64::INFINITY; n];
+        let mut max = vec![f64::NEG_INFINITY; n];
+        for repeat in 0..self.repeats {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            rng.set_stream(repeat as u64);
+            let scatter: f64 = StandardNormal.sample(&mut rng);
+            let level = 1.0 + self.level_scatter * scatter;
+            let mut noise = NoiseSource::new(self.noise, rng);
+            for (k, &y) in truth.iter().enumerate() {
+                let analogue = y * level + noise.sample();
+                let reading = self
+                    .converter
+                    .map_or(analogue, |c| c.reading(c.code(analogue)));
+                // Scatter is summed about the truth, where the squares lose no digits.
+                let off = reading - y;
+                sum[k] += off;
+                square[k] += off * off;
+                min[k] = min[k].min(reading);
+                max[k] = max[k].max(reading);
+            }
+        }
+        let r = self.repeats as f64;
+        let mean = truth.iter().zip(&sum).map(|(y, s)| y + s / r).collect();
+        let standard_error = sum
+            .iter()
+            .zip(&square)
+            .map(|(s, q)| ((q - s * s / r).max(0.0) / (r - 1.0) / r).sqrt())
+            .collect();
+        Ok(PhaseAverage {
+            mean,
+            standard_error,
+            min,
+            max,
+        })
+    }
+}
+
+/// The rig on the bench, measured once and live: noise and converter on every reading.
+#[derive(Debug, Clone)]
+pub struct BenchRig {
+    rig: Rig,
+    noise: NoiseSource,
+    converter: Option<Converter>,
+}
+
+impl BenchRig {
+    /// Connects noise and converter to a rig.
+    pub fn new(rig: Rig, noise: Noise, converter: Option<Converter>, seed: u64) -> Self {
+        Self {
+            rig,
+            noise: NoiseSource::new(noise, ChaCha8Rng::seed_from_u64(seed)),
+            converter,
+        }
+    }
+
+    /// The friction of the flow now, without film, noise and converter (y): what control is about.
+    pub fn friction(&self) -> f64 {
+        self.rig.friction()
+    }
+}
+
+impl Plant for BenchRig {
+    fn step(&mut self, command: bool) -> f64 {
+        let analogue = self.rig.step(command) + self.noise.sample();
+        self.converter
+            .map_or(analogue, |c| c.reading(c.code(analogue)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::{BasePlant, PlantSpec};
+
+    fn variance(x: &[f64]) -> f64 {
+        x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64
+    }
+
+    #[test]
+    fn noise_has_the_stated_size_and_correlation() {
+        let mut source = NoiseSource::new(Noise::HOT_FILM, ChaCha8Rng::seed_from_u64(4));
+        let x: Vec<f64> = (0..2_000_000).map(|_| source.sample()).collect();
+        let expected = Noise::HOT_FILM.standard_deviation().powi(2);
+        assert!((variance(&x) / expected - 1.0).abs() < 0.02);
+        for lag in [1_usize, 20, 40] {
+            let covariance =
+                x.iter().zip(&x[lag..]).map(|(a, b)| a * b).sum::<f64>() / (x.len() - lag) as f64;
+            let expected = 0.035_f64.powi(2) * (-(lag as f64) / 20.0).exp();
+            assert!(
+                (covariance - expected).abs() < 0.03 * 0.035_f64.powi(2),
+                "lag {lag}: {covariance} instead of {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_standard_error_is_calibrated() {
+        // (mean − truth)/standard error follows Student's t with 19 degrees of freedom: 5 % of the
+        // samples lie beyond 2.093.
+        let truth: Vec<f64> = (0..10_000)
+            .map(|k| 0.5 + 0.4 * (k as f64 * 0.01).sin())
+            .collect();
+        let (mut beyond, mut total, mut square) = (0_usize, 0_usize, 0.0);
+        for seed in 0..20 {
+            let m = Instrument::default().measure(&truth, seed).unwrap();
+            for (k, &y) in truth.iter().enumerate() {
+                beyond += usize::from((m.mean[k] - y).abs() > 2.093 * m.standard_error[k]);
+                square += m.standard_error[k].powi(2);
+                total += 1;
+                assert!(m.min[k] <= m.mean[k] && m.mean[k] <= m.max[k]);
+            }
+        }
+        let rate = beyond as f64 / total as f64;
+        assert!((rate - 0.05).abs() < 0.005, "false alarms: {rate}");
+        let expected = Noise::HOT_FILM.standard_deviation().powi(2) / 20.0;
+        assert!((square / total as f64 / expected - 1.0).abs() < 0.03);
+    }
+
+    #[test]
+    fn the_converter_rounds_to_its_steps_and_holds_at_its_ends() {
+        let c = Converter::TWELVE_BIT;
+        let step = 2.5 / 4095.0;
+        assert!((c.reading(c.code(0.7213)) - 0.7213).abs() <= step / 2.0 + 1e-12);
+        assert_eq!((c.code(-3.0), c.code(9.0), c.code(f64::NAN)), (0, 4095, 0));
+        assert_eq!(c.reading(4095), 2.0);
+    }
+
+    #[test]
+    fn measuring_repeats_bit_for_bit_and_one_repeat_is_refused() {
+        let truth = [0.0, 0.5, 1.0];
+        let instrument = Instrument::default();
+        assert_eq!(instrument.measure(&truth, 1), instrument.measure(&truth, 1));
+        assert_ne!(instrument.measure(&truth, 1), instrument.measure(&truth, 2));
+        let once = Instrument {
+            repeats: 1,
+            ..instrument
+        };
+        assert_eq!(
+            once.measure(&truth, 1),
+            Err(InstrumentError::TooFewRepeats(1))
+        );
+    }
+
+    #[test]
+    fn the_bench_reads_the_rig_through_noise() {
+        let base = BasePlant::draw(&mut ChaCha8Rng::seed_from_u64(2));
+        let rig = Rig::new(&PlantSpec::new(base, &[]), None).unwrap();
+        let mut quiet = rig.clone();
+        let mut bench = BenchRig::new(rig, Noise::HOT_FILM, Some(Converter::TWELVE_BIT), 8);
+        let off: Vec<f64> = (0..20_000)
+            .map(|k| {
+                let on = (k / 200) % 2 == 0;
+                bench.step(on) - quiet.step(on)
+            })
+            .collect();
+        let expected = Noise::HOT_FILM.standard_deviation().powi(2);
+        assert!((variance(&off) / expected - 1.0).abs() < 0.15);
+    }
+}

@@ -1,0 +1,135 @@
+//! Command line of the simulator: writes data sets with something hidden in them.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::{Parser, Subcommand, ValueEnum};
+
+use firmware_sim::dataset::write_whole;
+use firmware_sim::hidden_set::HiddenSetPlan;
+use firmware_sim::paper_like::{Disturbances, LagReading, paper_like_set};
+use firmware_sim::plant::RateLaw;
+
+/// Simulated rigs and their recordings.
+#[derive(Debug, Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Writes a data set of a random rig that hides effects or faults (none: the null case).
+    HiddenSet {
+        /// Effect to hide, by its catalogue name; may be given several times.
+        #[arg(long)]
+        effect: Vec<String>,
+        /// Fault to hide; may be given several times.
+        #[arg(long)]
+        fault: Vec<String>,
+        /// Changes a parameter of a hidden effect: EFFECT.PARAMETER=VALUE; may be given several times.
+        #[arg(long, value_name = "EFFECT.PARAMETER=VALUE")]
+        set: Vec<String>,
+        /// What jets between off and on do to the rate of the flow.
+        #[arg(long, value_enum, default_value_t = Rate::Switched)]
+        rate_law: Rate,
+        /// Repeats that are averaged.
+        #[arg(long, default_value_t = 20)]
+        repeats: usize,
+        /// Seed of the rig, the commands and the noise.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// Folder for dataset.toml and the records.
+        #[arg(long)]
+        out: PathBuf,
+        /// File for what is hidden; kept out of the data set.
+        #[arg(long)]
+        truth: Option<PathBuf>,
+    },
+    /// Writes a data set like the paper's, from its published model.
+    PaperSet {
+        /// What a printed lag means.
+        #[arg(long, value_enum, default_value_t = Lags::Literal)]
+        lags: Lags,
+        /// Seed of the disturbances.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// Folder for dataset.toml and the records.
+        #[arg(long)]
+        out: PathBuf,
+    },
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Rate {
+    Switched,
+    Interpolated,
+    Bilinear,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Lags {
+    Literal,
+    OneStep,
+}
+
+fn change(plan: &mut HiddenSetPlan, setting: &str) -> Result<()> {
+    let parsed = setting.split_once('=').and_then(|(path, value)| {
+        let (effect, parameter) = path.split_once('.')?;
+        Some((effect, parameter, value.parse::<f64>().ok()?))
+    });
+    let (effect, parameter, value) = parsed
+        .with_context(|| format!("`--set {setting}` is not of the form EFFECT.PARAMETER=VALUE"))?;
+    let hidden = plan
+        .plant
+        .effects
+        .iter_mut()
+        .find(|e| e.name() == effect)
+        .with_context(|| {
+            format!("`--set {setting}`: `{effect}` is not hidden; add --effect {effect}")
+        })?;
+    *hidden = hidden.with(parameter, value)?;
+    Ok(())
+}
+
+fn main() -> Result<()> {
+    match Arguments::parse().command {
+        Command::HiddenSet {
+            effect,
+            fault,
+            set,
+            rate_law,
+            repeats,
+            seed,
+            out,
+            truth,
+        } => {
+            let effects: Vec<&str> = effect.iter().map(String::as_str).collect();
+            let faults: Vec<&str> = fault.iter().map(String::as_str).collect();
+            let mut plan = HiddenSetPlan::draw(&effects, &faults, seed)?;
+            for setting in &set {
+                change(&mut plan, setting)?;
+            }
+            plan.plant.base.rate_law = match rate_law {
+                Rate::Switched => RateLaw::Switched,
+                Rate::Interpolated => RateLaw::Interpolated,
+                Rate::Bilinear => RateLaw::Bilinear,
+            };
+            plan.instrument.repeats = repeats;
+            let hidden = plan.build()?;
+            hidden.data.write(&out)?;
+            if let Some(path) = truth {
+                write_whole(&path, &hidden.truth.to_toml())?;
+            }
+        }
+        Command::PaperSet { lags, seed, out } => {
+            let lags = match lags {
+                Lags::Literal => LagReading::Literal,
+                Lags::OneStep => LagReading::OneStep,
+            };
+            paper_like_set(lags, Disturbances::default(), seed).write(&out)?;
+        }
+    }
+    Ok(())
+}

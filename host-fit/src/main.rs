@@ -1,2 +1,45 @@
-//! host-fit
-fn main() {}
+//! `host-fit`: from recordings of an on/off actuator and a sensor to a model with delayed inputs.
+//!
+//! Exit code 0: done. 1: something is wrong with the data, the model or the numbers; one paragraph on standard error says
+//! what and what to do. 2: wrong usage.
+
+mod commands;
+
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::Parser;
+use commands::Console;
+
+#[derive(Debug, Parser)]
+#[command(version, about, max_term_width = 100)]
+struct Cli {
+    /// Print one JSON document on standard output and nothing else.
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Command {
+    Average(commands::average::Args),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let console = Console { json: cli.json };
+    let result = match &cli.command {
+        Command::Average(args) => commands::average::run(args, console),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            // One paragraph, whatever the causes wrote.
+            let text = format!("{error:#}");
+            let paragraph = text.split_whitespace().collect::<Vec<_>>().join(" ");
+            let _ = writeln!(std::io::stderr(), "error: {paragraph}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -4,14 +4,17 @@
 //! ([`DataSet::load`]) or put together in memory ([`DataSet::from_records`]); every fault is one paragraph that names
 //! file, line and column, or the TOML key, and the remedy ([`DataError`]).
 
+mod average;
 mod error;
 mod folder;
 mod hash;
+mod raw;
 mod record;
 mod rows;
 mod sampling;
 mod table;
 
+pub use average::{Align, AverageError, AverageSummary, Averaging, Defect, Dropped, average_files};
 pub use error::{DataError, Place, Problem};
 pub use record::{DataSet, Record, Use};
 pub use table::InputFile;

@@ -19,6 +19,7 @@ pub(crate) struct RowReader<R> {
     names: Vec<String>,
     buffer: Vec<u8>,
     line: u64,
+    bytes: u64,
 }
 
 impl<R: BufRead> RowReader<R> {
@@ -30,6 +31,7 @@ impl<R: BufRead> RowReader<R> {
             names: Vec::new(),
             buffer: Vec::with_capacity(256),
             line: 0,
+            bytes: 0,
         };
         if !reader.fill_line()? {
             return Err(reader.place().error(Problem::Empty));
@@ -80,6 +82,11 @@ impl<R: BufRead> RowReader<R> {
         self.line
     }
 
+    /// Bytes read so far.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
     /// Reads the next line that is not blank; `false` at the end of the file.
     pub(crate) fn advance(&mut self) -> Result<bool, DataError> {
         loop {
@@ -108,6 +115,7 @@ impl<R: BufRead> RowReader<R> {
             return Ok(false);
         }
         self.line += 1;
+        self.bytes += count as u64;
         if self.buffer.last() == Some(&b'\n') {
             self.buffer.pop();
             if self.buffer.last() == Some(&b'\r') {

@@ -1,0 +1,151 @@
+//! `host-fit average`: raw recordings to a phase-averaged data set.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use host_fit::data::{Align, AverageSummary, Averaging, average_files};
+
+use super::Console;
+
+/// Phase-average long raw recordings, in constant memory, into a data set with y_sd, y_min and y_max.
+///
+/// Each RAW.csv (columns t,u,y and any channels; u is 0 or 1) becomes one record named by the file. Periods with
+/// missing or unreadable samples, or with another command than most, are dropped and counted.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Raw recordings; each repeats one command sequence.
+    #[arg(required = true, value_name = "RAW.csv")]
+    recordings: Vec<PathBuf>,
+    /// Length of one repeat of the command sequence, in seconds.
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    period: f64,
+    /// Folder for the data set (dataset.toml and one CSV per recording).
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Time after the first row at which the first period starts; best while the flow is at rest.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = not_negative)]
+    start: f64,
+    /// Align repeats on the command's rising edges, or on whole periods of the recording's clock.
+    #[arg(long, value_enum, default_value_t = Alignment::Edges)]
+    align: Alignment,
+    /// Samples by which an edge may be off between repeats.
+    #[arg(long, value_name = "SAMPLES", default_value_t = 1)]
+    edge_jitter: usize,
+    /// Name of a recording (file name without .csv) to hold out for validation; repeatable.
+    #[arg(long, value_name = "NAME")]
+    validate: Vec<String>,
+    /// Title of the data set.
+    #[arg(long)]
+    title: Option<String>,
+}
+
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Alignment {
+    Edges,
+    Grid,
+}
+
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
+        _ => Err("a finite number above 0 is needed".into()),
+    }
+}
+
+pub(super) fn not_negative(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x.is_finite() && x >= 0.0 => Ok(x),
+        _ => Err("a finite number, 0 or above, is needed".into()),
+    }
+}
+
+#[derive(serde::Serialize)]
+struct Document<'a> {
+    dataset: &'a Path,
+    hash: &'a str,
+    recordings: &'a [AverageSummary],
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
+    let paths: Vec<&Path> = args.recordings.iter().map(PathBuf::as_path).collect();
+    let stems: Vec<_> = paths.iter().filter_map(|p| p.file_stem()).collect();
+    if let Some(name) = args
+        .validate
+        .iter()
+        .find(|n| !stems.iter().any(|s| *s == n.as_str()))
+    {
+        bail!("--validate {name}: no recording has this name; give a file name without its ending");
+    }
+    let averaging = Averaging {
+        period_s: args.period,
+        start_s: args.start,
+        align: match args.align {
+            Alignment::Edges => Align::Edges,
+            Alignment::Grid => Align::Grid,
+        },
+        edge_jitter: args.edge_jitter,
+    };
+    let sizes: Vec<u64> = paths
+        .iter()
+        .map(|p| std::fs::metadata(p).map_or(0, |m| m.len()))
+        .collect();
+    let bar = console.progress(
+        sizes.iter().sum(),
+        "averaging {wide_bar} {bytes}/{total_bytes} {bytes_per_sec} {eta}",
+    );
+    let (mut set, summaries) =
+        average_files(&paths, &args.validate, &averaging, &mut |file, bytes| {
+            bar.set_position(sizes.iter().take(file).sum::<u64>() + bytes);
+        })?;
+    bar.finish_and_clear();
+    set.title.clone_from(&args.title);
+    set.save(&args.out).context("saving the data set")?;
+    for summary in &summaries {
+        console.say(&words(summary))?;
+    }
+    console.say(&format!(
+        "written to {}, hash {}",
+        args.out.display(),
+        set.hash
+    ))?;
+    console.document(&Document {
+        dataset: &args.out,
+        hash: &set.hash,
+        recordings: &summaries,
+    })
+}
+
+fn words(s: &AverageSummary) -> String {
+    let mut text = format!(
+        "{}: {} periods of {} samples ({} s) averaged, aligned on {}",
+        s.name,
+        s.periods_used,
+        s.period_samples,
+        s.period_samples as f64 * s.sample_period_s,
+        if s.aligned_on_edges {
+            "edges"
+        } else {
+            "the period"
+        },
+    );
+    match s.mean_standard_error {
+        Some(e) => text.push_str(&format!("; standard error of y {e:.2e} (rms)")),
+        None => text.push_str("; one period alone gives no standard error"),
+    }
+    for d in &s.dropped {
+        text.push_str(&format!(
+            "\n  dropped {}: {}, first at line {}",
+            d.periods,
+            d.defect.words(),
+            d.first_line
+        ));
+    }
+    if s.left_over_samples > 0 {
+        text.push_str(&format!(
+            "\n  {} samples at the end are no whole period",
+            s.left_over_samples
+        ));
+    }
+    text
+}

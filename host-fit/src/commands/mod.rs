@@ -1,0 +1,56 @@
+//! The commands of the program, one file each: arguments in, library calls, words or one JSON document out.
+
+use std::io::{self, IsTerminal, Write};
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+pub(crate) mod average;
+
+/// How a command talks to the user.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Console {
+    /// Standard output carries one JSON document and nothing else.
+    pub(crate) json: bool,
+}
+
+impl Console {
+    /// Prints a result in words; silent with `--json`.
+    pub(crate) fn say(self, text: &str) -> anyhow::Result<()> {
+        if self.json {
+            return Ok(());
+        }
+        print(text)
+    }
+
+    /// Prints the JSON document of the command; silent without `--json`.
+    pub(crate) fn document(self, value: &impl serde::Serialize) -> anyhow::Result<()> {
+        if !self.json {
+            return Ok(());
+        }
+        print(&serde_json::to_string_pretty(value)?)
+    }
+
+    /// A progress bar on standard error; invisible when that is no terminal.
+    #[allow(clippy::unused_self)]
+    pub(crate) fn progress(self, length: u64, template: &str) -> ProgressBar {
+        if !io::stderr().is_terminal() {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::new(length);
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(Duration::from_millis(200));
+        bar
+    }
+}
+
+/// Prints a text and a line end; a reader that has gone away (`| head`) is no error.
+fn print(text: &str) -> anyhow::Result<()> {
+    let mut out = io::stdout().lock();
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        other => Ok(other?),
+    }
+}

@@ -1,0 +1,902 @@
+//! Phase averages of raw recordings of any length in constant memory.
+//!
+//! A recording in which one command sequence is repeated is read once, row by row. Each repeat is laid over the others,
+//! and per sample of the period the mean, the standard error of the mean and the envelope are kept (Welford's
+//! recursion, which does not lose digits over millions of repeats). Memory is a few periods of accumulators, whatever
+//! the length of the file.
+//!
+//! Repeats are aligned on the command's own edges: the first rising edge after the start is the anchor, and in every
+//! later repeat the rising edge closest to where the period puts it. The generator of the command and the clock of the
+//! recording may therefore drift apart without smearing the average. A period with a missing or unreadable sample, with a
+//! time step off the grid, without its anchor, or with another command than most periods have is dropped and counted.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::error::{DataError, Place};
+use super::raw::{RawReader, Step};
+use super::record::{DataSet, Record, Use};
+
+/// Command sequences kept side by side until it is known which one is the rule.
+const MOST_SEQUENCES: usize = 4;
+/// Progress is reported about every so many bytes.
+const PROGRESS_BYTES: u64 = 1 << 22;
+
+/// On what the repeats are laid over each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Align {
+    /// On the command's rising edges (falls back to [`Align::Grid`] where the command never rises).
+    #[default]
+    Edges,
+    /// On whole periods counted from the start, by the recording's own clock.
+    Grid,
+}
+
+/// How recordings are averaged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Averaging {
+    /// Length of one repeat of the command sequence, s; at least two samples.
+    pub period_s: f64,
+    /// Time after the first row at which the first period starts, s, ≥ 0. It decides where in the sequence the
+    /// averaged record begins: best at rest, because history before a record counts as 0.
+    pub start_s: f64,
+    /// On what the repeats are aligned.
+    pub align: Align,
+    /// Edges of the command may be this many samples off those of the other repeats, beside the anchor.
+    pub edge_jitter: usize,
+}
+
+impl Averaging {
+    /// Averaging over `period_s` seconds with the usual choices: from the first row, on edges, one sample of jitter.
+    #[must_use]
+    pub fn over(period_s: f64) -> Self {
+        Self {
+            period_s,
+            start_s: 0.0,
+            align: Align::Edges,
+            edge_jitter: 1,
+        }
+    }
+}
+
+/// Why a period was dropped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Defect {
+    /// Samples are missing by the time column.
+    MissingSamples,
+    /// A value is missing, not a number or not finite, or the row is too short or too long.
+    UnreadableValue,
+    /// The time step is no whole number of sampling periods, or the time cannot be read.
+    UnevenTime,
+    /// The command is neither 0 nor 1.
+    CommandNotOnOff,
+    /// No rising edge of the command where the period puts it.
+    NoAnchorEdge,
+    /// The command differs from that of most periods.
+    OtherCommand,
+    /// Time went back: the recording was restarted within the period.
+    Restart,
+}
+
+impl Defect {
+    /// In words.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::MissingSamples => "samples missing",
+            Self::UnreadableValue => "a value is missing or not a finite number",
+            Self::UnevenTime => "the time step is off the sampling grid",
+            Self::CommandNotOnOff => "the command is neither 0 nor 1",
+            Self::NoAnchorEdge => "no rising edge where the period puts it",
+            Self::OtherCommand => "another command sequence than most periods",
+            Self::Restart => "time goes back",
+        }
+    }
+}
+
+/// Periods dropped for one reason.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct Dropped {
+    /// The reason.
+    pub defect: Defect,
+    /// How many periods.
+    pub periods: u64,
+    /// Line of the file where it first shows (the line after the gap for missing samples).
+    pub first_line: u64,
+}
+
+/// What became of one recording.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct AverageSummary {
+    /// Name of the record.
+    pub name: String,
+    /// Rows read.
+    pub rows: u64,
+    /// Bytes read.
+    pub bytes: u64,
+    /// Sampling period of the recording, s.
+    pub sample_period_s: f64,
+    /// Samples in one period.
+    pub period_samples: usize,
+    /// Periods in the average. With fewer than two there is no standard error.
+    pub periods_used: u64,
+    /// Periods dropped, by reason.
+    pub dropped: Vec<Dropped>,
+    /// Samples at the end that do not make a whole period.
+    pub left_over_samples: usize,
+    /// Whether the periods were aligned on edges.
+    pub aligned_on_edges: bool,
+    /// Root mean square over the period of the standard error of the mean; `None` with one period.
+    pub mean_standard_error: Option<f64>,
+}
+
+/// Why recordings could not be averaged.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum AverageError {
+    /// A recording cannot be read.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// The period does not fit the sampling.
+    #[error(
+        "the period of {period_s} s does not hold a usable number of samples at {sample_period_s} s each; give the length of one repeat of the command sequence in seconds"
+    )]
+    Period {
+        /// As asked for.
+        period_s: f64,
+        /// Of the recording.
+        sample_period_s: f64,
+    },
+    /// Not one good period.
+    #[error(
+        "{place}: no complete period to average ({found}); check --period against the recording and start it with --start at the beginning of a repeat"
+    )]
+    NothingLeft {
+        /// The recording.
+        place: Place,
+        /// What was found instead.
+        found: String,
+    },
+    /// Two recordings would make records of one name.
+    #[error(
+        "two recordings are named `{0}`; every recording becomes a record named by its file, so rename one"
+    )]
+    DoubledName(String),
+}
+
+/// Phase-averages several recordings into one data set: each file becomes one record named by its stem.
+///
+/// Records named in `held_out` are for validation, the others for identification. `progress` is called now and then
+/// with the index of the file and the bytes of it read so far.
+///
+/// # Errors
+/// [`AverageError`] when a file cannot be read, holds no complete period, or the files do not fit together.
+pub fn average_files(
+    paths: &[&Path],
+    held_out: &[String],
+    averaging: &Averaging,
+    progress: &mut dyn FnMut(usize, u64),
+) -> Result<(DataSet, Vec<AverageSummary>), AverageError> {
+    let mut records: Vec<Record> = Vec::with_capacity(paths.len());
+    let mut summaries = Vec::with_capacity(paths.len());
+    let name_of = |path: &Path| {
+        path.file_stem()
+            .map_or_else(|| "record".into(), |s| s.to_string_lossy().into_owned())
+    };
+    for (i, path) in paths.iter().enumerate() {
+        if paths.iter().take(i).any(|p| name_of(p) == name_of(path)) {
+            return Err(AverageError::DoubledName(name_of(path)));
+        }
+    }
+    for (i, path) in paths.iter().enumerate() {
+        let name = name_of(path);
+        let role = if held_out.contains(&name) {
+            Use::Validate
+        } else {
+            Use::Identify
+        };
+        let mut raw = RawReader::open(path)?;
+        let (record, summary) = average(
+            &mut raw,
+            &name,
+            role,
+            averaging,
+            Place::file(path),
+            &mut |bytes| {
+                progress(i, bytes);
+            },
+        )?;
+        records.push(record);
+        summaries.push(summary);
+    }
+    Ok((DataSet::from_records(None, records)?, summaries))
+}
+
+fn average<R: std::io::BufRead>(
+    raw: &mut RawReader<R>,
+    name: &str,
+    role: Use,
+    averaging: &Averaging,
+    place: Place,
+    progress: &mut dyn FnMut(u64),
+) -> Result<(Record, AverageSummary), AverageError> {
+    let sample_period_s = raw.sample_period_s();
+    let samples = averaging.period_s / sample_period_s;
+    if !(samples.round() >= 2.0 && samples <= 1e9 && averaging.start_s.is_finite()) {
+        return Err(AverageError::Period {
+            period_s: averaging.period_s,
+            sample_period_s,
+        });
+    }
+    let width = raw.names().len();
+    let mut folding = Folding::new(samples, width, averaging);
+    let mut values = vec![0.0; width];
+    let mut reported = 0;
+    let mut skip = (averaging.start_s / sample_period_s).round().max(0.0) as u64;
+    while let Some(row) = raw.next_row(&mut values)? {
+        folding.rows += 1;
+        let mut step = row.step;
+        if skip > 0 {
+            // Rows before the start: only their number matters.
+            let passed = match step {
+                Step::Forward(n) => n,
+                Step::OffGrid | Step::Restart => 1,
+            };
+            if folding.rows > 1 {
+                skip = skip.saturating_sub(passed);
+            }
+            if skip > 0 {
+                folding.before = row.on;
+                continue;
+            }
+            step = Step::Forward(1);
+        }
+        let defect = match (step, row.on, row.readable) {
+            (Step::OffGrid, _, _) => Some(Defect::UnevenTime),
+            (_, _, false) => Some(Defect::UnreadableValue),
+            (_, None, true) => Some(Defect::CommandNotOnOff),
+            _ => None,
+        };
+        match step {
+            Step::Forward(n) if n > 1 => folding.gap(n - 1, row.line),
+            Step::Restart => folding.restart(row.line),
+            _ => {}
+        }
+        folding.push(row.line, row.on, defect, &values);
+        if raw.bytes() - reported >= PROGRESS_BYTES {
+            reported = raw.bytes();
+            progress(reported);
+        }
+    }
+    progress(raw.bytes());
+    folding.finish(raw, name, role, place)
+}
+
+/// One sample that waits in the buffer until its period is complete.
+#[derive(Debug, Clone, Copy)]
+struct Waiting {
+    line: u64,
+    on: bool,
+    defect: Option<Defect>,
+}
+
+/// The state of an average: the samples of the running period and the sums of the complete ones.
+#[derive(Debug)]
+struct Folding {
+    /// Exact samples per period; the buffer works with whole ones.
+    exact_length: f64,
+    length: usize,
+    width: usize,
+    jitter: usize,
+    /// How far an anchor is looked for to either side.
+    slack: usize,
+    align: Align,
+    /// Sample of the anchor edge within the period, once known.
+    anchor: Option<usize>,
+    /// Command of the sample before the buffer.
+    before: Option<bool>,
+    /// Samples at the front of the buffer that belong to the period before (kept so that an anchor may come early).
+    lead_in: usize,
+    waiting: Vec<Waiting>,
+    values: Vec<f64>,
+    /// Grid alignment: the period that is running and the sample it started at, from the last restart.
+    period: u64,
+    started_at: u64,
+    sequences: Vec<Sequence>,
+    dropped: BTreeMap<Defect, (u64, u64)>,
+    rows: u64,
+    edges: Vec<(usize, bool)>,
+}
+
+/// Sums over the periods that share one command sequence.
+#[derive(Debug)]
+struct Sequence {
+    edges: Vec<(usize, bool)>,
+    first_line: u64,
+    periods: u64,
+    on_count: Vec<u32>,
+    mean: Vec<f64>,
+    m2: Vec<f64>,
+    low: Vec<f64>,
+    high: Vec<f64>,
+}
+
+impl Sequence {
+    fn new(edges: Vec<(usize, bool)>, first_line: u64, length: usize, width: usize) -> Self {
+        Self {
+            edges,
+            first_line,
+            periods: 0,
+            on_count: vec![0; length],
+            mean: vec![0.0; length * width],
+            m2: vec![0.0; length],
+            low: vec![f64::INFINITY; length],
+            high: vec![f64::NEG_INFINITY; length],
+        }
+    }
+
+    fn matches(&self, edges: &[(usize, bool)], jitter: usize) -> bool {
+        self.edges.len() == edges.len()
+            && self
+                .edges
+                .iter()
+                .zip(edges)
+                .all(|(a, b)| a.1 == b.1 && a.0.abs_diff(b.0) <= jitter)
+    }
+
+    /// Adds one period: Welford's recursion; spread and envelope are those of `y`, the first value of each sample.
+    fn add(&mut self, samples: &[Waiting], values: &[f64], width: usize) {
+        self.periods += 1;
+        let weight = 1.0 / self.periods as f64;
+        for (count, sample) in self.on_count.iter_mut().zip(samples) {
+            *count += u32::from(sample.on);
+        }
+        let rows = values
+            .chunks_exact(width)
+            .zip(self.mean.chunks_exact_mut(width));
+        let spread = self.m2.iter_mut().zip(&mut self.low).zip(&mut self.high);
+        for ((row, mean), ((m2, low), high)) in rows.zip(spread) {
+            if let (Some(&y), Some(&mean_y)) = (row.first(), mean.first()) {
+                let away = y - mean_y;
+                *m2 += away * away * (1.0 - weight);
+                *low = low.min(y);
+                *high = high.max(y);
+            }
+            for (mean, value) in mean.iter_mut().zip(row) {
+                *mean += (value - *mean) * weight;
+            }
+        }
+    }
+}
+
+impl Folding {
+    fn new(exact_length: f64, width: usize, averaging: &Averaging) -> Self {
+        let length = exact_length.round() as usize;
+        Self {
+            exact_length,
+            length,
+            width,
+            jitter: averaging.edge_jitter,
+            slack: (length / 50).clamp(2, 200).min(length / 4),
+            align: averaging.align,
+            anchor: None,
+            before: None,
+            lead_in: 0,
+            waiting: Vec::new(),
+            values: Vec::new(),
+            period: 0,
+            started_at: 0,
+            sequences: Vec::new(),
+            dropped: BTreeMap::new(),
+            rows: 0,
+            edges: Vec::new(),
+        }
+    }
+
+    fn drop_period(&mut self, defect: Defect, line: u64, periods: u64) {
+        let entry = self.dropped.entry(defect).or_insert((0, line));
+        entry.0 += periods;
+        entry.1 = entry.1.min(line);
+    }
+
+    /// `count` samples are missing before the row at `line`.
+    fn gap(&mut self, count: u64, line: u64) {
+        let placeholder = Waiting {
+            line,
+            on: self.last_on(),
+            defect: Some(Defect::MissingSamples),
+        };
+        // Whole periods inside a long gap are counted without walking through them.
+        let far = (count.saturating_sub(2 * self.length as u64) as f64 / self.exact_length) as u64;
+        let mut near = count;
+        if far > 0 {
+            self.drop_period(Defect::MissingSamples, line, far);
+            let skipped = match self.align {
+                Align::Edges => far * self.length as u64,
+                Align::Grid => {
+                    let before = self.started_at;
+                    self.period += far;
+                    self.started_at = (self.period as f64 * self.exact_length).round() as u64;
+                    self.started_at - before
+                }
+            };
+            near = count.saturating_sub(skipped);
+        }
+        for _ in 0..near {
+            self.waiting.push(placeholder);
+            self.values.extend(std::iter::repeat_n(0.0, self.width));
+            self.settle();
+        }
+    }
+
+    /// The recording starts again at the row at `line`.
+    fn restart(&mut self, line: u64) {
+        if self.waiting.len() > self.lead_in {
+            self.drop_period(Defect::Restart, line, 1);
+        }
+        self.waiting.clear();
+        self.values.clear();
+        self.lead_in = 0;
+        self.before = None;
+        self.period = 0;
+        self.started_at = 0;
+    }
+
+    fn last_on(&self) -> bool {
+        self.waiting
+            .last()
+            .map_or(self.before.unwrap_or(false), |w| w.on)
+    }
+
+    fn push(&mut self, line: u64, on: Option<bool>, defect: Option<Defect>, values: &[f64]) {
+        let on = on.unwrap_or_else(|| self.last_on());
+        self.waiting.push(Waiting { line, on, defect });
+        self.values.extend_from_slice(values);
+        self.settle();
+    }
+
+    /// Closes the running period once all of it, and the room for a late anchor, is in the buffer.
+    fn settle(&mut self) {
+        let margin = match self.align {
+            Align::Edges => self.slack,
+            Align::Grid => 0,
+        };
+        if self.waiting.len() < self.lead_in + self.length + margin {
+            return;
+        }
+        let shift = match self.align {
+            Align::Grid => Some(0),
+            Align::Edges => self.anchor_shift(),
+        };
+        let start = self.lead_in.saturating_add_signed(shift.unwrap_or(0));
+        self.close_period(start, shift.is_some());
+        let next = match self.align {
+            Align::Edges => start + self.length,
+            Align::Grid => {
+                self.period += 1;
+                let next_start = (self.period as f64 * self.exact_length).round() as u64;
+                let advance = next_start.saturating_sub(self.started_at) as usize;
+                self.started_at = next_start;
+                (start + advance).min(self.waiting.len())
+            }
+        };
+        let keep_from = next.saturating_sub(margin);
+        self.before = match keep_from.checked_sub(1) {
+            Some(last) => self.waiting.get(last).map(|w| w.on),
+            None => self.before,
+        };
+        self.lead_in = next - keep_from;
+        self.waiting.drain(..keep_from);
+        self.values.drain(..keep_from * self.width);
+    }
+
+    /// How many samples later than expected the anchor of the running period comes; `None` if it is not there.
+    fn anchor_shift(&mut self) -> Option<isize> {
+        let rises = |i: usize| -> bool {
+            let now = self.waiting.get(i).is_some_and(|w| w.on);
+            let before = match i.checked_sub(1) {
+                Some(j) => self.waiting.get(j).map(|w| w.on),
+                None => self.before,
+            };
+            now && before == Some(false)
+        };
+        let Some(anchor) = self.anchor else {
+            // The first rising edge seen becomes the anchor.
+            let first = (self.lead_in..self.lead_in + self.length).find(|&i| rises(i))?;
+            self.anchor = Some(first - self.lead_in);
+            return Some(0);
+        };
+        let expected = self.lead_in + anchor;
+        (0..=self.slack)
+            .flat_map(|d| [expected.checked_sub(d), Some(expected + d)])
+            .flatten()
+            .find(|&i| rises(i))
+            .map(|found| found as isize - expected as isize)
+            .filter(|&shift| self.lead_in as isize + shift >= 0)
+    }
+
+    fn close_period(&mut self, start: usize, anchored: bool) {
+        let end = start + self.length;
+        let (Some(samples), Some(values)) = (
+            self.waiting.get(start..end),
+            self.values.get(start * self.width..end * self.width),
+        ) else {
+            return;
+        };
+        let first_line = samples.first().map_or(0, |s| s.line);
+        if let Some(bad) = samples.iter().find(|s| s.defect.is_some()) {
+            let (defect, line) = (bad.defect, bad.line);
+            self.drop_period(defect.unwrap_or(Defect::UnreadableValue), line, 1);
+            return;
+        }
+        // Edges within the jitter of the period's ends may fall into the neighbouring period: only those between count,
+        // after the level at which the period starts.
+        self.edges.clear();
+        let inner = self.jitter..self.length.saturating_sub(self.jitter);
+        let mut level = None;
+        for (i, sample) in samples.iter().enumerate() {
+            if inner.contains(&i) && level != Some(sample.on) {
+                self.edges.push((i, sample.on));
+                level = Some(sample.on);
+            }
+        }
+        // Without any edge there is nothing to anchor, and nothing to smear.
+        if !anchored && self.anchor.is_some() {
+            self.drop_period(Defect::NoAnchorEdge, first_line, 1);
+            return;
+        }
+        let known = self
+            .sequences
+            .iter()
+            .position(|s| s.matches(&self.edges, self.jitter));
+        let index = match known {
+            Some(index) => index,
+            None => {
+                let fresh = Sequence::new(self.edges.clone(), first_line, self.length, self.width);
+                if self.sequences.len() < MOST_SEQUENCES {
+                    self.sequences.push(fresh);
+                    self.sequences.len() - 1
+                } else {
+                    // Room is made by forgetting the rarest sequence; it was no rule.
+                    let rarest = (0..self.sequences.len())
+                        .min_by_key(|&i| self.sequences.get(i).map_or(0, |s| s.periods))
+                        .unwrap_or(0);
+                    let Some(place) = self.sequences.get_mut(rarest) else {
+                        return;
+                    };
+                    let old = std::mem::replace(place, fresh);
+                    let entry = self
+                        .dropped
+                        .entry(Defect::OtherCommand)
+                        .or_insert((0, old.first_line));
+                    entry.0 += old.periods;
+                    entry.1 = entry.1.min(old.first_line);
+                    rarest
+                }
+            }
+        };
+        if let Some(sequence) = self.sequences.get_mut(index) {
+            sequence.add(samples, values, self.width);
+        }
+    }
+
+    fn finish<R: std::io::BufRead>(
+        mut self,
+        raw: &RawReader<R>,
+        name: &str,
+        role: Use,
+        place: Place,
+    ) -> Result<(Record, AverageSummary), AverageError> {
+        // A complete last period may still wait for the room of a late anchor.
+        let mut left_over = self.waiting.len().saturating_sub(self.lead_in);
+        if self.align == Align::Edges && left_over >= self.length {
+            let shift = self.anchor_shift();
+            let start = self.lead_in.saturating_add_signed(shift.unwrap_or(0));
+            if start + self.length <= self.waiting.len() {
+                self.close_period(start, shift.is_some());
+                left_over = self.waiting.len() - start - self.length;
+            }
+        }
+        // The first of the most frequent ones, so that a tie has one answer.
+        let most = self.sequences.iter().map(|s| s.periods).max().unwrap_or(0);
+        let rule = self.sequences.iter().position(|s| s.periods == most);
+        let Some(rule) = rule else {
+            let mut found: Vec<String> = self
+                .dropped
+                .iter()
+                .map(|(d, (n, line))| format!("{n} dropped: {}, first at line {line}", d.words()))
+                .collect();
+            found.push(format!(
+                "{left_over} samples left over of {} in a period",
+                self.length
+            ));
+            return Err(AverageError::NothingLeft {
+                place,
+                found: found.join("; "),
+            });
+        };
+        let rule = self.sequences.swap_remove(rule);
+        for other in std::mem::take(&mut self.sequences) {
+            self.drop_period(Defect::OtherCommand, other.first_line, other.periods);
+        }
+        let n = rule.periods as f64;
+        let column = |i: usize| -> Vec<f64> {
+            rule.mean
+                .iter()
+                .skip(i)
+                .step_by(self.width)
+                .copied()
+                .collect()
+        };
+        let mut record = Record::new(
+            name,
+            role,
+            raw.sample_period_s(),
+            rule.on_count
+                .iter()
+                .map(|&c| {
+                    if 2 * u64::from(c) >= rule.periods && c > 0 {
+                        1.0
+                    } else {
+                        0.0
+                    }
+                })
+                .collect(),
+            column(0),
+        );
+        if rule.periods > 1 {
+            record.y_sd = Some(
+                rule.m2
+                    .iter()
+                    .map(|m2| (m2.max(0.0) / (n - 1.0) / n).sqrt())
+                    .collect(),
+            );
+        }
+        record.y_min = Some(rule.low);
+        record.y_max = Some(rule.high);
+        for (i, channel) in raw.names().iter().enumerate().skip(1) {
+            record.channels.insert(channel.clone(), column(i));
+        }
+        let summary = AverageSummary {
+            name: name.to_owned(),
+            rows: self.rows,
+            bytes: raw.bytes(),
+            sample_period_s: raw.sample_period_s(),
+            period_samples: self.length,
+            periods_used: rule.periods,
+            dropped: self
+                .dropped
+                .into_iter()
+                .map(|(defect, (periods, first_line))| Dropped {
+                    defect,
+                    periods,
+                    first_line,
+                })
+                .collect(),
+            left_over_samples: left_over,
+            aligned_on_edges: self.anchor.is_some(),
+            mean_standard_error: record
+                .y_sd
+                .as_ref()
+                .map(|sd| (sd.iter().map(|s| s * s).sum::<f64>() / sd.len().max(1) as f64).sqrt()),
+        };
+        Ok((record, summary))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use std::fmt::Write as _;
+
+    /// One repeat: 100 samples, on at 10..30 and 50..60.
+    fn command(phase: usize) -> bool {
+        (10..30).contains(&phase) || (50..60).contains(&phase)
+    }
+
+    fn response(phase: usize) -> f64 {
+        (phase as f64 * 0.1).sin()
+    }
+
+    struct Row {
+        time: f64,
+        on: bool,
+        y: f64,
+    }
+
+    fn recording(repeats: usize, noise: f64, seed: u64) -> Vec<Row> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        (0..repeats * 100)
+            .map(|k| Row {
+                time: k as f64 * 0.001,
+                on: command(k % 100),
+                y: response(k % 100) + noise * (rng.random::<f64>() - 0.5) * 12f64.sqrt(),
+            })
+            .collect()
+    }
+
+    fn text(rows: &[Row]) -> String {
+        let mut text = String::from("t,u,y,temp\n");
+        for r in rows {
+            writeln!(
+                text,
+                "{:.4},{},{},{}",
+                r.time,
+                u8::from(r.on),
+                r.y,
+                20.0 + r.y
+            )
+            .unwrap();
+        }
+        text
+    }
+
+    fn run(text: &str, averaging: &Averaging) -> Result<(Record, AverageSummary), AverageError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("raw.csv");
+        std::fs::write(&path, text).unwrap();
+        let (set, mut summaries) = average_files(&[&path], &[], averaging, &mut |_, _| {})?;
+        Ok((set.records.into_iter().next().unwrap(), summaries.remove(0)))
+    }
+
+    fn dropped(summary: &AverageSummary, defect: Defect) -> Option<(u64, u64)> {
+        let found = summary.dropped.iter().find(|d| d.defect == defect)?;
+        Some((found.periods, found.first_line))
+    }
+
+    #[test]
+    fn mean_error_and_envelope_are_those_of_all_repeats_at_once() {
+        let rows = recording(40, 0.3, 1);
+        for align in [Align::Edges, Align::Grid] {
+            let averaging = Averaging {
+                align,
+                ..Averaging::over(0.1)
+            };
+            let (record, summary) = run(&text(&rows), &averaging).unwrap();
+            assert_eq!((summary.periods_used, summary.left_over_samples), (40, 0));
+            assert!(summary.dropped.is_empty());
+            assert_eq!((record.len(), record.sample_period_s), (100, 0.001));
+            for p in 0..100 {
+                let all: Vec<f64> = (0..40).map(|r| rows[r * 100 + p].y).collect();
+                let mean = all.iter().sum::<f64>() / 40.0;
+                let variance = all.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / 39.0;
+                assert!((record.y[p] - mean).abs() < 1e-14);
+                assert!(
+                    (record.y_sd.as_ref().unwrap()[p] - (variance / 40.0).sqrt()).abs() < 1e-14
+                );
+                assert_eq!(
+                    record.y_min.as_ref().unwrap()[p],
+                    all.iter().copied().fold(f64::MAX, f64::min)
+                );
+                assert_eq!(
+                    record.y_max.as_ref().unwrap()[p],
+                    all.iter().copied().fold(f64::MIN, f64::max)
+                );
+                assert!((record.channels["temp"][p] - 20.0 - mean).abs() < 1e-12);
+                assert_eq!(record.u[p] == 1.0, command(p));
+            }
+        }
+    }
+
+    #[test]
+    fn the_standard_error_is_calibrated() {
+        // Of the samples' true values, 95 % lie within t(0.975, 19) = 2.093 standard errors of the mean.
+        let mut inside = 0;
+        for seed in 0..50 {
+            let (record, _) = run(&text(&recording(20, 0.3, seed)), &Averaging::over(0.1)).unwrap();
+            let sd = record.y_sd.unwrap();
+            inside += (0..100)
+                .filter(|&p| (record.y[p] - response(p)).abs() < 2.093 * sd[p])
+                .count();
+        }
+        let share = inside as f64 / 5000.0;
+        assert!((share - 0.95).abs() < 0.012, "{share}");
+    }
+
+    #[test]
+    fn broken_periods_are_dropped_and_named_by_their_first_line() {
+        let mut rows = recording(20, 0.1, 2);
+        rows[512].on = !rows[512].on; // period 5: another command
+        rows[713].y = f64::NAN; // period 7
+        for row in &mut rows[955..] {
+            row.time += 0.0004; // period 9: off the grid once
+        }
+        rows.drain(1130..1140); // period 11: a gap
+        let (record, summary) = run(&text(&rows), &Averaging::over(0.1)).unwrap();
+        assert_eq!(summary.periods_used, 16, "{summary:?}");
+        assert_eq!(dropped(&summary, Defect::OtherCommand), Some((1, 502)));
+        assert_eq!(dropped(&summary, Defect::UnreadableValue), Some((1, 715)));
+        assert_eq!(dropped(&summary, Defect::UnevenTime), Some((1, 957)));
+        assert_eq!(dropped(&summary, Defect::MissingSamples), Some((1, 1132)));
+        assert!(
+            record
+                .y
+                .iter()
+                .zip(0..)
+                .all(|(y, p)| (y - response(p)).abs() < 0.15)
+        );
+    }
+
+    #[test]
+    fn edges_keep_the_average_sharp_when_the_two_clocks_drift() {
+        // The command's generator runs 0.5 % slow against the recording: 0.5 samples per period.
+        let n = 100 * 200;
+        let rows: Vec<Row> = (0..n)
+            .map(|k| {
+                let phase = (f64::from(k) / 1.005) as usize % 100;
+                Row {
+                    time: f64::from(k) * 0.001,
+                    on: command(phase),
+                    y: f64::from(u8::from(command(phase))),
+                }
+            })
+            .collect();
+        let (record, summary) = run(&text(&rows), &Averaging::over(0.1)).unwrap();
+        assert!(
+            summary.aligned_on_edges && summary.periods_used > 190,
+            "{summary:?}"
+        );
+        let blurred = record.y.iter().filter(|&&y| y > 0.02 && y < 0.98).count();
+        assert!(
+            blurred <= 3,
+            "{blurred}: one sample of jitter at the other three edges"
+        );
+        let grid = Averaging {
+            align: Align::Grid,
+            ..Averaging::over(0.1)
+        };
+        let (_, summary) = run(&text(&rows), &grid).unwrap();
+        assert!(summary.periods_used < 20, "{summary:?}");
+    }
+
+    #[test]
+    fn start_restart_and_rest_are_handled() {
+        let mut rows = recording(10, 0.0, 3);
+        let later = Averaging {
+            start_s: 0.035,
+            ..Averaging::over(0.1)
+        };
+        let (record, summary) = run(&text(&rows), &later).unwrap();
+        assert_eq!(summary.periods_used, 9);
+        assert!((record.y[0] - response(35)).abs() < 1e-12);
+        // A second recording appended after 5.4 periods.
+        rows.truncate(540);
+        rows.extend(recording(4, 0.0, 4));
+        let (record, summary) = run(&text(&rows), &Averaging::over(0.1)).unwrap();
+        assert_eq!(summary.periods_used, 9);
+        assert_eq!(dropped(&summary, Defect::Restart), Some((1, 542)));
+        assert!((record.y[35] - response(35)).abs() < 1e-12);
+        // No edge at all: natural flow.
+        rows.iter_mut().for_each(|r| r.on = false);
+        let (record, summary) = run(&text(&rows), &Averaging::over(0.1)).unwrap();
+        assert!(!summary.aligned_on_edges && record.u.iter().all(|&u| u == 0.0));
+    }
+
+    #[test]
+    fn a_gap_of_years_takes_no_time_and_alignment_goes_on() {
+        let mut rows = recording(10, 0.0, 5);
+        rows[450..].iter_mut().for_each(|r| r.time += 1e8);
+        let (record, summary) = run(&text(&rows), &Averaging::over(0.1)).unwrap();
+        assert_eq!(summary.periods_used, 9, "{summary:?}");
+        assert!((record.y[35] - response(35)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_cannot_be_averaged_says_why() {
+        let rows = recording(3, 0.0, 6);
+        let message =
+            |averaging: &Averaging, text: &str| run(text, averaging).unwrap_err().to_string();
+        assert!(message(&Averaging::over(0.0), &text(&rows)).contains("period of 0 s"));
+        assert!(message(&Averaging::over(f64::NAN), &text(&rows)).contains("period of NaN s"));
+        let found = message(&Averaging::over(1.0), &text(&rows));
+        assert!(
+            found.contains("raw.csv") && found.contains("300 samples left over of 1000"),
+            "{found}"
+        );
+        assert!(message(&Averaging::over(0.1), "t,u,y\n0,0,0\n").contains("raw.csv"));
+        assert!(message(&Averaging::over(0.1), "t,u,y,y_sd\n0,0,0,0\n1,0,0,0\n").contains("y_sd"));
+    }
+}

@@ -154,7 +154,7 @@ pub enum AverageError {
     )]
     NothingLeft {
         /// The recording.
-        place: Place,
+        place: Box<Place>,
         /// What was found instead.
         found: String,
     },
@@ -586,7 +586,7 @@ impl Folding {
         raw: &RawReader<R>,
         name: &str,
         role: Use,
-        place: Place,
+        place: Box<Place>,
     ) -> Result<(Record, AverageSummary), AverageError> {
         // A complete last period may still wait for the room of a late anchor.
         let mut left_over = self.waiting.len().saturating_sub(self.lead_in);
@@ -612,7 +612,7 @@ impl Folding {
                 self.length
             ));
             return Err(AverageError::NothingLeft {
-                place,
+                place: Box::new(place),
                 found: found.join("; "),
             });
         };

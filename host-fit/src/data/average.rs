@@ -586,7 +586,7 @@ impl Folding {
         raw: &RawReader<R>,
         name: &str,
         role: Use,
-        place: Box<Place>,
+        place: Place,
     ) -> Result<(Record, AverageSummary), AverageError> {
         // A complete last period may still wait for the room of a late anchor.
         let mut left_over = self.waiting.len().saturating_sub(self.lead_in);

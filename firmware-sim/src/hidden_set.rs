@@ -11,16 +11,19 @@ use crate::command::Command;
 use crate::dataset::{DataSet, Record, Use};
 use crate::instrument::{Instrument, InstrumentError};
 use crate::plant::{
-    BasePlant, DelayLaw, Effect, EffectError, Fault, FreeStream, PlantSpec, RateLaw, Rig,
-    SAMPLE_PERIOD_S,
+    BasePlant, DelayLaw, Effect, EffectError, Fault, FreeStream, PlantError, PlantSpec, RateLaw,
+    Rig, SAMPLE_PERIOD_S,
 };
 
 /// Why a data set could not be made.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum HiddenSetError {
-    /// An effect is unknown or impossible.
+    /// An effect is unknown.
     #[error(transparent)]
     Effect(#[from] EffectError),
+    /// The rig is impossible.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
     /// The instrument is impossible.
     #[error(transparent)]
     Instrument(#[from] InstrumentError),

@@ -2,6 +2,19 @@
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use thiserror::Error;
+
+/// A property of the base plant that no rig can have.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error("the base plant's `{property}` is {value}; it must be {requirement}")]
+pub struct BasePlantError {
+    /// Which property.
+    pub property: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What is allowed.
+    pub requirement: &'static str,
+}
 
 /// How long the flow takes to notice the jet.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,6 +110,46 @@ impl BasePlant {
         }
     }
 
+    /// Checks that the rig is physically possible.
+    ///
+    /// # Errors
+    /// [`BasePlantError`] naming the first bad property.
+    pub fn validate(&self) -> Result<(), BasePlantError> {
+        let within = |property, value: f64, low: f64, high: f64, requirement| {
+            // Written so that NaN is refused too.
+            if value >= low && value <= high {
+                Ok(())
+            } else {
+                Err(BasePlantError {
+                    property,
+                    value,
+                    requirement,
+                })
+            }
+        };
+        let time = |property, value| within(property, value, 1e-3, 10.0, "0.001 to 10 s");
+        let delay = |property, value| within(property, value, 0.0, 0.5, "0 to 0.5 s");
+        time("attach_s", self.attach_s)?;
+        time("separate_s", self.separate_s)?;
+        within("gain", self.gain, -100.0, 100.0, "within ±100")?;
+        match self.delay {
+            DelayLaw::Fixed { delay_s } => delay("delay_s", delay_s),
+            DelayLaw::StateDependent {
+                floor_s,
+                rise_s,
+                rate,
+            } => {
+                delay("floor_s", floor_s)?;
+                delay("rise_s", rise_s)?;
+                within("rate", rate, 0.0, 1000.0, "0 to 1000 per y")
+            }
+            DelayLaw::EdgeDependent { rise_s, fall_s } => {
+                delay("rise_s", rise_s)?;
+                delay("fall_s", fall_s)
+            }
+        }
+    }
+
     /// The same rig with a delay that does not depend on the flow: drawn from 20–60 ms.
     pub fn with_fixed_delay(mut self, rng: &mut ChaCha8Rng) -> Self {
         self.delay = DelayLaw::Fixed {
@@ -136,7 +189,12 @@ mod tests {
             };
             assert!(floor_s >= 0.020 && floor_s + rise_s <= 0.060);
             assert!(rise_s * rate <= 0.2 + 1e-12);
+            base.validate().unwrap();
         }
+        let mut bad = BasePlant::draw(&mut rng);
+        bad.separate_s = f64::NAN;
+        let message = bad.validate().unwrap_err().to_string();
+        assert!(message.contains("`separate_s`"), "{message}");
         let once = BasePlant::draw(&mut ChaCha8Rng::seed_from_u64(9));
         assert_eq!(once, BasePlant::draw(&mut ChaCha8Rng::seed_from_u64(9)));
     }

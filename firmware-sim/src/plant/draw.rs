@@ -64,12 +64,12 @@ impl Effect {
                 echo_delay: log_uniform(rng, 0.060, 0.350),
             },
             "starting-vortex" => Self::StartingVortex {
-                gain: rng.random_range(0.5..1.3),
-                decay_time: log_uniform(rng, 0.020, 0.090),
+                gain: rng.random_range(0.4..1.0),
+                decay_time: log_uniform(rng, 0.020, 0.080),
             },
             "stopping-vortex" => Self::StoppingVortex {
-                gain: rng.random_range(0.5..1.3),
-                decay_time: log_uniform(rng, 0.020, 0.100),
+                gain: rng.random_range(0.4..1.0),
+                decay_time: log_uniform(rng, 0.020, 0.080),
             },
             "attachment-hysteresis" => {
                 let lower_threshold = rng.random_range(0.25..0.40) * base.gain;
@@ -115,9 +115,14 @@ impl Effect {
                 coefficient: rng.random_range(0.5..1.5) * fast / SAMPLE_PERIOD_S,
             },
             "rectifying-sensor" => Self::RectifyingSensor {},
-            "input-nonlinearity" => Self::InputNonlinearity {
-                quadratic: signed(rng, 0.25, 0.60),
-                cubic: signed(rng, 0.10, 0.30),
+            "input-nonlinearity" => loop {
+                let quadratic = signed(rng, 0.20, 0.50);
+                let cubic = signed(rng, 0.08, 0.25);
+                // A valve opened further never blows less.
+                let steepness = |v: f64| 1.0 + v * (2.0 * quadratic + 3.0 * v * cubic);
+                if steepness(0.5).min(steepness(1.0)) > 0.15 {
+                    break Self::InputNonlinearity { quadratic, cubic };
+                }
             },
             "bouc-wen-hysteresis" => Self::BoucWenHysteresis {
                 stiffness: 1.0,

@@ -14,11 +14,11 @@ mod rig;
 mod sensor;
 mod transport;
 
-pub use base::{BasePlant, DelayLaw, RateLaw};
+pub use base::{BasePlant, BasePlantError, DelayLaw, RateLaw};
 pub use effect::{Effect, EffectError, Parameter};
 pub use fault::Fault;
 pub use free_stream::{FreeStream, MEAN_FREE_STREAM};
-pub use rig::{PlantSpec, Rig};
+pub use rig::{PlantError, PlantSpec, Rig};
 
 /// Sample period of commands and readings (s).
 pub const SAMPLE_PERIOD_S: f64 = 0.001;
@@ -33,7 +33,7 @@ pub const SUBSTEP_S: f64 = SAMPLE_PERIOD_S / SUBSTEPS as f64;
 const LONGEST_DELAY_S: f64 = 2.5;
 
 /// Time differences below this are the same instant (s).
-const SHORTEST_PIECE_S: f64 = 1e-12;
+const SHORTEST_PIECE_S: f64 = 1e-9;
 
 /// What a controller can be connected to: one command in, one reading out, every millisecond.
 pub trait Plant {

@@ -1,6 +1,8 @@
 //! The whole rig: jet, transport, flow and sensor, advanced together.
 
-use super::base::{BasePlant, DelayLaw};
+use thiserror::Error;
+
+use super::base::{BasePlant, BasePlantError, DelayLaw};
 use super::effect::{Effect, EffectError};
 use super::fault::Fault;
 use super::flow::Flow;
@@ -10,6 +12,17 @@ use super::sensor::Sensor;
 use super::transport::{ArrivalClock, EdgeTravel, MeanFriction};
 use super::{Plant, SAMPLE_PERIOD_S, SHORTEST_PIECE_S, SUBSTEP_S, SUBSTEPS};
 use crate::waveform::Cursor;
+
+/// Why a rig cannot be built.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum PlantError {
+    /// The flow is impossible.
+    #[error(transparent)]
+    Base(#[from] BasePlantError),
+    /// An effect is impossible.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+}
 
 /// Everything that defines a rig.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,8 +90,9 @@ impl Rig {
     /// Builds the rig; `free_stream` is what the tunnel does during the record, steady when `None`.
     ///
     /// # Errors
-    /// [`EffectError::OutOfRange`] when an effect's parameter is physically impossible.
-    pub fn new(spec: &PlantSpec, free_stream: Option<FreeStream>) -> Result<Self, EffectError> {
+    /// [`PlantError`] when the base plant or a parameter of an effect is physically impossible.
+    pub fn new(spec: &PlantSpec, free_stream: Option<FreeStream>) -> Result<Self, PlantError> {
+        spec.base.validate()?;
         for effect in &spec.effects {
             effect.validate()?;
         }
@@ -220,6 +234,7 @@ impl Plant for Rig {
 mod tests {
     use super::*;
     use crate::plant::RateLaw;
+    use proptest::prelude::*;
 
     fn base(delay: DelayLaw) -> BasePlant {
         BasePlant {
@@ -407,6 +422,45 @@ mod tests {
         let e = |s: f64| (1.0 + ratio * (s + offset).cbrt()).sqrt();
         let expected = (e(0.8) - e(0.0)) / (e(1.0) - e(0.0));
         assert!((y[7999] - expected).abs() < 1e-5);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(40))]
+        /// A later edge and a longer delay are the same thing, wherever between samples they fall.
+        #[test]
+        fn shifting_every_edge_is_the_same_as_a_longer_delay(
+            dwells in prop::collection::vec(0.000_05_f64..0.030, 1..20),
+            shift in 0.0_f64..0.020,
+        ) {
+            let effects = [Effect::EchoPath { gain: 0.4, echo_delay: 0.033_3 }];
+            let play = |delay_s: f64, offset: f64| {
+                let mut rig = rig(DelayLaw::Fixed { delay_s }, &effects);
+                let mut at = offset;
+                let edges: Vec<(f64, f64)> = dwells
+                    .iter()
+                    .enumerate()
+                    .map(|(i, dwell)| {
+                        at += dwell;
+                        (at, f64::from(u8::from(i % 2 == 0)))
+                    })
+                    .collect();
+                (0..800)
+                    .map(|k| {
+                        let (from, to) = (f64::from(k) * 0.001, f64::from(k + 1) * 0.001);
+                        let now: Vec<(f64, f64)> = edges
+                            .iter()
+                            .filter(|e| e.0 >= from && e.0 < to)
+                            .map(|e| (e.0 - from, e.1))
+                            .collect();
+                        rig.advance_sample_with(&now);
+                        rig.read()
+                    })
+                    .collect::<Vec<f64>>()
+            };
+            for (a, b) in play(0.025 + shift, 0.0).iter().zip(play(0.025, shift)) {
+                prop_assert!((a - b).abs() < 1e-6, "{a} {b}");
+            }
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Command line of the simulator: writes data sets with something hidden in them.
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand, ValueEnum};
@@ -93,8 +94,19 @@ fn change(plan: &mut HiddenSetPlan, setting: &str) -> Result<()> {
     Ok(())
 }
 
-fn main() -> Result<()> {
-    match Arguments::parse().command {
+/// Exit 0 done, 1 with a message, 2 wrong usage; never a stack trace, whatever the environment asks for.
+fn main() -> ExitCode {
+    match run(Arguments::parse().command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(command: Command) -> Result<()> {
+    match command {
         Command::HiddenSet {
             effect,
             fault,

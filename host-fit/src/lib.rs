@@ -6,6 +6,7 @@ pub mod fit;
 pub mod indicators;
 pub mod model;
 pub mod output;
+pub mod picture;
 pub mod search;
 pub mod simulate;
 

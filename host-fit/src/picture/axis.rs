@@ -1,0 +1,243 @@
+//! Axes: safe ranges, round ticks, readable labels.
+
+use super::format::{fixed, power_of_ten};
+
+/// Magnitudes beyond this are left out of a range: no measurement reaches them, and
+/// their differences overflow.
+const LARGEST: f64 = 1e150;
+
+/// A range of values and how it maps to [0, 1]. Always `lo < hi`, both finite; on a
+/// logarithmic axis both are positive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Axis {
+    lo: f64,
+    hi: f64,
+    log: bool,
+}
+
+/// One tick: where it is and what it says.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Tick {
+    pub(super) value: f64,
+    pub(super) label: String,
+}
+
+/// Smallest and largest usable value, if there is one.
+pub(super) fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+    values
+        .into_iter()
+        .filter(|v| v.abs() <= LARGEST)
+        .fold(None, |range, v| match range {
+            None => Some((v, v)),
+            Some((lo, hi)) => Some((f64::min(lo, v), f64::max(hi, v))),
+        })
+}
+
+impl Axis {
+    /// Linear axis over `range`, exactly; widened where it is too narrow to draw and
+    /// [0, 1] where there is none.
+    pub(super) fn linear(range: Option<(f64, f64)>) -> Self {
+        let (lo, hi) = match range {
+            Some((a, b)) if a.abs() <= LARGEST && b.abs() <= LARGEST => (a.min(b), a.max(b)),
+            _ => (0.0, 1.0),
+        };
+        let magnitude = lo.abs().max(hi.abs());
+        let narrowest = (magnitude * 1e-9).max(1.0 / LARGEST);
+        let (lo, hi) = if hi - lo >= narrowest {
+            (lo, hi)
+        } else {
+            let half = if magnitude > 1.0 / LARGEST {
+                magnitude * 0.1
+            } else {
+                0.5
+            };
+            (lo - half, hi + half)
+        };
+        Self { lo, hi, log: false }
+    }
+
+    /// Linear axis with a margin of `share` of the range at both ends.
+    pub(super) fn padded(range: Option<(f64, f64)>, share: f64) -> Self {
+        let Self { lo, hi, .. } = Self::linear(range);
+        let margin = (hi - lo) * share;
+        Self::linear(Some((lo - margin, hi + margin)))
+    }
+
+    /// Logarithmic axis over the positive part of `range`; linear when that is empty.
+    pub(super) fn logarithmic(range: Option<(f64, f64)>) -> Self {
+        match range {
+            Some((lo, hi)) if lo > 1.0 / LARGEST && hi > lo * 1.001 && hi <= LARGEST => {
+                Self { lo, hi, log: true }
+            }
+            Some((lo, _)) if lo > 1.0 / LARGEST && lo < LARGEST / 10.0 => Self {
+                lo: lo / 3.0,
+                hi: lo * 3.0,
+                log: true,
+            },
+            _ => Self::linear(range),
+        }
+    }
+
+    /// Lower and upper end.
+    pub(super) fn ends(&self) -> (f64, f64) {
+        (self.lo, self.hi)
+    }
+
+    /// Place of `value` on the axis, 0 at the lower end and 1 at the upper, clamped;
+    /// `None` for NaN.
+    pub(super) fn place(&self, value: f64) -> Option<f64> {
+        if value.is_nan() {
+            return None;
+        }
+        let value = value.clamp(self.lo, self.hi);
+        let place = if self.log {
+            (value / self.lo).ln() / (self.hi / self.lo).ln()
+        } else {
+            (value - self.lo) / (self.hi - self.lo)
+        };
+        Some(place.clamp(0.0, 1.0))
+    }
+
+    /// About `count` ticks at round values.
+    pub(super) fn ticks(&self, count: usize) -> Vec<Tick> {
+        if self.log {
+            self.log_ticks(count)
+        } else {
+            self.linear_ticks(count)
+        }
+    }
+
+    fn linear_ticks(&self, count: usize) -> Vec<Tick> {
+        let rough = (self.hi - self.lo) / count.clamp(1, 50) as f64;
+        let decade = 10f64.powi(rough.log10().floor() as i32);
+        let step = [1.0, 2.0, 5.0, 10.0]
+            .into_iter()
+            .map(|m| m * decade)
+            .find(|step| *step >= rough * 0.999)
+            .unwrap_or(10.0 * decade);
+        let first = (self.lo / step - 1e-6).ceil();
+        let last = (self.hi / step + 1e-6).floor();
+        let values: Vec<f64> = (0..=60)
+            .map(|i| first + f64::from(i))
+            .take_while(|multiple| *multiple <= last)
+            .map(|multiple| multiple * step)
+            .collect();
+        let largest = values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let exponent = step.log10().floor() as i32;
+        // Steps of 0.05 need two decimals, which is their exponent; nothing finer occurs.
+        let decimals = (-exponent).clamp(0, 12) as usize;
+        let plain = largest < 1e6 && (exponent >= -4 || largest >= 0.1);
+        values
+            .into_iter()
+            .map(|value| Tick {
+                value,
+                label: if value == 0.0 {
+                    "0".to_owned()
+                } else if plain {
+                    fixed(value, decimals, false)
+                } else {
+                    let span = (value.abs().log10() - f64::from(exponent)).ceil();
+                    power_of_ten(value, span.clamp(0.0, 12.0) as usize)
+                },
+            })
+            .collect()
+    }
+
+    fn log_ticks(&self, count: usize) -> Vec<Tick> {
+        let (from, to) = (
+            self.lo.log10().floor() as i32,
+            self.hi.log10().ceil() as i32,
+        );
+        let decades = (self.hi / self.lo).log10();
+        let multiples: &[f64] = if decades < 2.5 {
+            &[1.0, 2.0, 5.0]
+        } else {
+            &[1.0]
+        };
+        let stride = ((decades / count.max(1) as f64).ceil() as usize).max(1);
+        let inside = |value: &f64| (self.lo * 0.999..=self.hi * 1.001).contains(value);
+        let ticks: Vec<Tick> = (from..=to)
+            .step_by(stride)
+            .flat_map(|decade| multiples.iter().map(move |m| m * 10f64.powi(decade)))
+            .filter(inside)
+            .map(|value| Tick {
+                value,
+                label: super::significant(value, 2),
+            })
+            .collect();
+        // Less than a factor of two may hold no such value at all.
+        if ticks.len() < 2 {
+            return Self {
+                log: false,
+                ..*self
+            }
+            .linear_ticks(count);
+        }
+        ticks
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn labels(axis: Axis, count: usize) -> Vec<String> {
+        axis.ticks(count).into_iter().map(|t| t.label).collect()
+    }
+
+    #[test]
+    fn ticks_are_round_and_evenly_written() {
+        assert_eq!(
+            labels(Axis::linear(Some((-0.07, 1.12))), 6),
+            ["0", "0.2", "0.4", "0.6", "0.8", "1.0"]
+        );
+        assert_eq!(
+            labels(Axis::linear(Some((-0.06, 0.06))), 4),
+            ["−0.05", "0", "0.05"]
+        );
+        assert_eq!(
+            labels(Axis::linear(Some((0.0, 4e-5))), 4),
+            ["0", "10⁻⁵", "2×10⁻⁵", "3×10⁻⁵", "4×10⁻⁵"]
+        );
+        assert_eq!(
+            labels(Axis::logarithmic(Some((1.0, 5000.0))), 6),
+            ["1", "10", "100", "1000"]
+        );
+        assert_eq!(
+            labels(Axis::logarithmic(Some((0.9, 30.0))), 6),
+            ["1", "2", "5", "10", "20"]
+        );
+    }
+
+    #[test]
+    fn constants_and_nothing_still_make_an_axis() {
+        assert_eq!(Axis::linear(None).ends(), (0.0, 1.0));
+        assert_eq!(Axis::linear(Some((0.0, 0.0))).ends(), (-0.5, 0.5));
+        let (lo, hi) = Axis::linear(Some((7.0, 7.0))).ends();
+        assert!(lo < 7.0 && hi > 7.0);
+        assert_eq!(extent([f64::NAN, f64::INFINITY, 1e300]), None);
+        assert_eq!(extent([3.0, f64::NAN, -1.0]), Some((-1.0, 3.0)));
+    }
+
+    proptest! {
+        #[test]
+        fn any_range_gives_few_ordered_ticks_inside(a: f64, b: f64, count in 0usize..20) {
+            for axis in [Axis::linear(Some((a, b))), Axis::logarithmic(Some((a, b)))] {
+                let (lo, hi) = axis.ends();
+                prop_assert!(lo < hi && lo.is_finite() && hi.is_finite());
+                let ticks = axis.ticks(count);
+                prop_assert!(ticks.len() <= 61);
+                let slack = (hi - lo) * 0.01;
+                for pair in ticks.windows(2) {
+                    prop_assert!(pair[0].value < pair[1].value);
+                }
+                for tick in &ticks {
+                    prop_assert!(tick.value >= lo - slack && tick.value <= hi + slack);
+                }
+                let place = axis.place(a);
+                prop_assert!(a.is_nan() || place.is_some_and(|p| (0.0..=1.0).contains(&p)));
+            }
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! Numbers as a reader wants them.
+
+/// `value` with `digits` significant digits, no trailing zeros, a true minus sign and
+/// powers of ten outside 10⁻⁴…10⁶; an en dash when it is not finite.
+///
+/// ```
+/// use host_fit::picture::significant;
+/// assert_eq!(significant(0.041_26, 3), "0.0413");
+/// assert_eq!(significant(-12.0, 3), "−12");
+/// assert_eq!(significant(1.5e-7, 3), "1.5×10⁻⁷");
+/// assert_eq!(significant(f64::NAN, 3), "–");
+/// ```
+#[must_use]
+pub fn significant(value: f64, digits: usize) -> String {
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    let digits = digits.clamp(1, 17);
+    // Rounding first: 0.99996 to three digits is 1, one decade up.
+    let rounded: f64 = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
+    if rounded == 0.0 {
+        return "0".to_owned();
+    }
+    let magnitude = rounded.abs().log10().floor() as i32;
+    if (-4..6).contains(&magnitude) {
+        let decimals = (digits as i32 - 1 - magnitude).max(0) as usize;
+        fixed(rounded, decimals, true)
+    } else {
+        power_of_ten(rounded, digits - 1)
+    }
+}
+
+/// `value` with a fixed number of decimals and a true minus sign; `trim` drops
+/// trailing zeros.
+pub(super) fn fixed(value: f64, decimals: usize, trim: bool) -> String {
+    let mut text = format!("{value:.decimals$}");
+    if trim && text.contains('.') {
+        let kept = text.trim_end_matches('0').trim_end_matches('.').len();
+        text.truncate(kept);
+    }
+    match text.strip_prefix('-') {
+        // "−0" is what rounding leaves of a tiny negative number.
+        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
+        Some(rest) => format!("−{rest}"),
+        None => text,
+    }
+}
+
+/// `value` as mantissa × 10 to a power.
+pub(super) fn power_of_ten(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$e}");
+    let Some((mantissa, exponent)) = text.split_once('e') else {
+        return text;
+    };
+    let mantissa = mantissa.replacen('-', "−", 1);
+    let mantissa = if mantissa.contains('.') {
+        mantissa.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        mantissa.as_str()
+    };
+    let exponent: String = exponent.chars().map(superscript).collect();
+    match mantissa {
+        "1" => format!("10{exponent}"),
+        "−1" => format!("−10{exponent}"),
+        _ => format!("{mantissa}×10{exponent}"),
+    }
+}
+
+fn superscript(c: char) -> char {
+    const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    match c {
+        '-' => '⁻',
+        _ => c
+            .to_digit(10)
+            .and_then(|d| DIGITS.get(d as usize).copied())
+            .unwrap_or(c),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn significant_digits_round_across_decades_and_keep_signs() {
+        assert_eq!(significant(0.999_96, 3), "1");
+        assert_eq!(significant(123_456.0, 3), "123000");
+        assert_eq!(significant(1_234_567.0, 3), "1.23×10⁶");
+        assert_eq!(significant(-0.000_012, 2), "−1.2×10⁻⁵");
+        assert_eq!(significant(1e9, 3), "10⁹");
+        assert_eq!(significant(-0.0, 3), "0");
+        assert_eq!(significant(f64::INFINITY, 3), "–");
+    }
+
+    #[test]
+    fn fixed_never_prints_minus_zero() {
+        assert_eq!(fixed(-0.0004, 2, false), "0.00");
+        assert_eq!(fixed(-1.5, 2, true), "−1.5");
+        assert_eq!(fixed(-1.5, 2, false), "−1.50");
+    }
+}

@@ -1,0 +1,221 @@
+//! Candidate effects ranked by the held-out error they leave.
+
+use super::axis::{Axis, extent};
+use super::canvas::{Anchor, Ink, MARGIN, WIDTH, Words, draw, fit, text_width};
+use super::legend::{Swatch, heading, nothing};
+use super::overlay::union;
+use super::palette::{BLUE, FLOOR, GRID, INK, MUTED, VERMILLION};
+use super::panel::{FOOT, Panel};
+
+/// One candidate.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Candidate<'a> {
+    /// Name of the effect, or of the group that cannot be told apart.
+    pub name: &'a str,
+    /// Held-out free-run RMSE with the candidate added and everything refitted, unit of y.
+    pub rmse: f64,
+    /// Lower end of the interval of `rmse`; NaN for none.
+    pub low: f64,
+    /// Upper end of the interval.
+    pub high: f64,
+    /// A decoy: time-shifted or taken from another record, so that it can win by chance only.
+    pub decoy: bool,
+    /// Accepted as missing effect.
+    pub accepted: bool,
+    /// A few words at the right, for example `"p < 0.001"`; empty for none.
+    pub note: &'a str,
+}
+
+/// What [`ranking`] draws.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ranking<'a> {
+    /// Title; empty for none.
+    pub title: &'a str,
+    /// Unit of y; empty for a normalised output.
+    pub y_unit: &'a str,
+    /// Candidates in any order; the best comes first in the picture.
+    pub candidates: &'a [Candidate<'a>],
+    /// RMSE of the model as given.
+    pub base_rmse: Option<f64>,
+    /// RMSE that the noise alone causes.
+    pub noise_rmse: Option<f64>,
+}
+
+const ROW: f64 = 25.0;
+const SIZE: f64 = 14.5;
+/// Rows drawn; a longer list is cut at the bad end.
+const MOST: usize = 60;
+
+/// Draws candidates as dots with intervals, the best on top, between the noise floor and
+/// the model as given. Returns SVG.
+#[must_use]
+pub fn ranking(plot: &Ranking<'_>) -> String {
+    let description = format!("{}: candidate effects by held-out error", plot.title);
+    draw(&description, |canvas| {
+        let mut order: Vec<&Candidate<'_>> = plot.candidates.iter().collect();
+        order.sort_by(|a, b| a.rmse.total_cmp(&b.rmse));
+        order.truncate(MOST);
+        if extent(order.iter().map(|c| c.rmse)).is_none() {
+            return nothing(canvas, plot.title, "No candidate was tried.");
+        }
+        let base = plot.base_rmse.filter(|v| v.is_finite());
+        let noise = plot.noise_rmse.filter(|v| v.is_finite());
+        let mut entries = Vec::new();
+        if order.iter().any(|c| c.accepted) {
+            entries.push((Swatch::Dot(VERMILLION), "accepted".to_owned()));
+        }
+        if order.iter().any(|c| !c.decoy && !c.accepted) {
+            entries.push((Swatch::Dot(BLUE), "candidate".to_owned()));
+        }
+        if order.iter().any(|c| c.decoy) {
+            entries.push((Swatch::Ring(FLOOR), "decoy".to_owned()));
+        }
+        if noise.is_some() {
+            entries.push((Swatch::Dashes(INK), "noise floor".to_owned()));
+        }
+        if base.is_some() {
+            entries.push((Swatch::Line(MUTED), "model as given".to_owned()));
+        }
+        let top = heading(canvas, plot.title, &entries);
+
+        let ends = |pick: fn(&Candidate<'_>) -> f64| extent(order.iter().map(|c| pick(c)));
+        let lines = extent(base.into_iter().chain(noise));
+        let all = union(
+            union(ends(|c| c.rmse), lines),
+            union(ends(|c| c.low), ends(|c| c.high)),
+        );
+        // A candidate that made everything worse may lie far to the right.
+        let shown = match (all, base) {
+            (Some((low, high)), Some(base)) => {
+                let low = low.max(0.0);
+                Some((low, high.min(base + 0.6 * (base - low).abs()).max(base)))
+            }
+            (all, _) => all,
+        };
+        let left = order
+            .iter()
+            .map(|c| text_width(c.name, SIZE))
+            .fold(60.0, f64::max)
+            .min(320.0)
+            + MARGIN
+            + 12.0;
+        let right = order
+            .iter()
+            .map(|c| text_width(c.note, SIZE - 1.0))
+            .fold(0.0, f64::max)
+            .min(200.0);
+        let panel = Panel {
+            left,
+            top,
+            width: WIDTH - left - right - MARGIN - 24.0,
+            height: ROW * order.len() as f64 + 8.0,
+            x: Axis::padded(shown, 0.05),
+            y: Axis::linear(None),
+        };
+        panel.uprights(canvas);
+        if let Some(base) = base {
+            panel.curve(canvas, [(base, 0.0), (base, 1.0)], Ink::new(MUTED, 1.5));
+        }
+        if let Some(noise) = noise {
+            panel.upright(canvas, noise, Ink::new(INK, 1.5));
+        }
+        for (row, candidate) in order.iter().enumerate() {
+            let middle = panel.top + 4.0 + ROW * (row as f64 + 0.5);
+            let colour = match (candidate.accepted, candidate.decoy) {
+                (true, _) => VERMILLION,
+                (false, true) => FLOOR,
+                (false, false) => BLUE,
+            };
+            canvas.line(
+                &[(panel.left, middle), (panel.left + panel.width, middle)],
+                Ink::new(GRID, 1.0),
+            );
+            let place = |value: f64| Some(panel.point(value, 0.0)?.0);
+            let interval = place(candidate.low).zip(place(candidate.high));
+            if let Some((from, to)) = interval {
+                canvas.line(
+                    &[(from, middle), (to, middle)],
+                    Ink::new(colour, 2.5).faint(0.6),
+                );
+            }
+            if let Some(at) = place(candidate.rmse) {
+                let filled = !candidate.decoy;
+                let radius = if filled { 5.0 } else { 4.25 };
+                canvas.dot((at, middle), radius, Ink::new(colour, 1.75), filled);
+            }
+            let name = Words::new(SIZE, if candidate.decoy { MUTED } else { INK });
+            let name = if candidate.accepted {
+                name.bold()
+            } else {
+                name
+            };
+            let text = fit(candidate.name, SIZE, left - MARGIN - 12.0);
+            canvas.text(name.at(Anchor::End), (panel.left - 12.0, middle), &text);
+            let note = fit(candidate.note, SIZE - 1.0, right);
+            let at = (panel.left + panel.width + 12.0, middle);
+            canvas.text(Words::new(SIZE - 1.0, MUTED), at, &note);
+        }
+        let unit = match plot.y_unit {
+            "" => String::new(),
+            unit => format!(" ({unit})"),
+        };
+        panel.foot(
+            canvas,
+            &format!("Held-out free-run RMSE after refitting{unit}"),
+        );
+        panel.bottom() + FOOT
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::testing::{absurd_series, check, words};
+
+    #[test]
+    fn the_best_candidate_comes_first() {
+        let named = |name, rmse| Candidate {
+            name,
+            rmse,
+            low: rmse - 0.001,
+            high: rmse + 0.001,
+            ..Candidate::default()
+        };
+        let svg = ranking(&Ranking {
+            candidates: &[named("valve-lag", 0.05), named("plenum-droop", 0.02)],
+            base_rmse: Some(0.05),
+            noise_rmse: Some(0.018),
+            ..Ranking::default()
+        });
+        check(&svg);
+        let words = words(&svg);
+        let at = |name| words.find(name).unwrap();
+        assert!(at("plenum-droop") < at("valve-lag"));
+    }
+
+    #[test]
+    fn absurd_input_never_panics() {
+        for values in absurd_series() {
+            let candidates: Vec<_> = values
+                .iter()
+                .map(|v| Candidate {
+                    name: "<b>",
+                    rmse: *v,
+                    low: v * 2.0,
+                    high: f64::NAN,
+                    decoy: *v > 0.0,
+                    accepted: *v < 0.0,
+                    note: "p < 0.05 & <more>",
+                })
+                .collect();
+            for line in [None, Some(f64::NAN), Some(f64::MAX), Some(0.0)] {
+                check(&ranking(&Ranking {
+                    candidates: &candidates,
+                    base_rmse: line,
+                    noise_rmse: line,
+                    ..Ranking::default()
+                }));
+            }
+        }
+    }
+}

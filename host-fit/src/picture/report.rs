@@ -1,0 +1,408 @@
+//! A report: one HTML page that carries its pictures and styles and fetches nothing.
+
+use std::fmt::Write as _;
+
+use super::palette;
+
+/// What a verdict box announces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tone {
+    /// All is as it should be.
+    Good,
+    /// Something was found.
+    Finding,
+    /// Something is wrong or remains unexplained.
+    Warning,
+}
+
+/// One number worth a tile.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct KeyNumber {
+    /// What it is, for example `"Held-out FIT"`.
+    pub label: String,
+    /// The number with its unit, as it is to be read.
+    pub value: String,
+    /// A few words of comparison; empty for none.
+    pub note: String,
+}
+
+impl KeyNumber {
+    /// A tile with `label`, `value` and `note`.
+    #[must_use]
+    pub fn new(
+        label: impl Into<String>,
+        value: impl Into<String>,
+        note: impl Into<String>,
+    ) -> Self {
+        Self {
+            label: label.into(),
+            value: value.into(),
+            note: note.into(),
+        }
+    }
+}
+
+/// A column of a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Column<'a> {
+    /// Words, set left.
+    Text(&'a str),
+    /// Numbers, set right.
+    Number(&'a str),
+}
+
+/// Builder of a report. All text is escaped; `` `code` `` between backticks is set as code.
+///
+/// ```
+/// use host_fit::picture::{Report, Tone};
+/// let mut report = Report::new("Diagnosis", "ramp, U = 10 m/s");
+/// report
+///     .verdict(Tone::Finding, "plenum-droop is missing", "It removes 71 % of the error.")
+///     .section("What was tried")
+///     .paragraph("Every effect of `host-fit effects` was refitted.");
+/// let html = report.html();
+/// assert!(html.starts_with("<!doctype html>"));
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    title: String,
+    subtitle: String,
+    body: String,
+    sections: Vec<String>,
+    open: bool,
+    provenance: Vec<(String, String)>,
+}
+
+impl Report {
+    /// An empty report; `subtitle` says of what, in a line.
+    #[must_use]
+    pub fn new(title: &str, subtitle: &str) -> Self {
+        Self {
+            title: title.to_owned(),
+            subtitle: subtitle.to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// The outcome, in a box: a headline and what it means in plain words.
+    pub fn verdict(&mut self, tone: Tone, headline: &str, meaning: &str) -> &mut Self {
+        let class = match tone {
+            Tone::Good => "good",
+            Tone::Finding => "finding",
+            Tone::Warning => "warning",
+        };
+        self.push(format_args!(
+            "<div class=\"verdict {class}\"><p class=\"headline\">{}</p><p>{}</p></div>\n",
+            inline(headline),
+            inline(meaning)
+        ))
+    }
+
+    /// Starts a section; the page lists them when there are several.
+    pub fn section(&mut self, heading: &str) -> &mut Self {
+        let close = if self.open { "</section>\n" } else { "" };
+        self.open = true;
+        self.sections.push(heading.to_owned());
+        let number = self.sections.len();
+        self.push(format_args!(
+            "{close}<section id=\"s{number}\"><h2>{}</h2>\n",
+            inline(heading)
+        ))
+    }
+
+    /// Starts a part of a section.
+    pub fn subsection(&mut self, heading: &str) -> &mut Self {
+        self.push(format_args!("<h3>{}</h3>\n", inline(heading)))
+    }
+
+    /// A paragraph.
+    pub fn paragraph(&mut self, text: &str) -> &mut Self {
+        self.push(format_args!("<p>{}</p>\n", inline(text)))
+    }
+
+    /// A list of points.
+    pub fn list<S: AsRef<str>>(&mut self, points: &[S]) -> &mut Self {
+        self.push(format_args!("<ul>"));
+        for point in points {
+            self.push(format_args!("<li>{}</li>", inline(point.as_ref())));
+        }
+        self.push(format_args!("</ul>\n"))
+    }
+
+    /// Tiles with the numbers that matter.
+    pub fn key_numbers(&mut self, numbers: &[KeyNumber]) -> &mut Self {
+        self.push(format_args!("<dl class=\"numbers\">"));
+        for KeyNumber { label, value, note } in numbers {
+            self.push(format_args!(
+                "<div><dt>{}</dt><dd>{}</dd>",
+                inline(label),
+                inline(value)
+            ));
+            if !note.is_empty() {
+                self.push(format_args!("<dd class=\"note\">{}</dd>", inline(note)));
+            }
+            self.push(format_args!("</div>"));
+        }
+        self.push(format_args!("</dl>\n"))
+    }
+
+    /// A table with a caption (empty for none). Rows may be shorter than `columns`;
+    /// cells beyond them are dropped.
+    pub fn table<S: AsRef<str>>(
+        &mut self,
+        caption: &str,
+        columns: &[Column<'_>],
+        rows: &[Vec<S>],
+    ) -> &mut Self {
+        self.push(format_args!("<div class=\"table\"><table>"));
+        if !caption.is_empty() {
+            self.push(format_args!("<caption>{}</caption>", inline(caption)));
+        }
+        self.push(format_args!("<thead><tr>"));
+        for column in columns {
+            match column {
+                Column::Text(name) => {
+                    self.push(format_args!("<th scope=\"col\">{}</th>", inline(name)))
+                }
+                Column::Number(name) => self.push(format_args!(
+                    "<th scope=\"col\" class=\"n\">{}</th>",
+                    inline(name)
+                )),
+            };
+        }
+        self.push(format_args!("</tr></thead><tbody>"));
+        for row in rows {
+            self.push(format_args!("<tr>"));
+            for (index, column) in columns.iter().enumerate() {
+                let cell = inline(row.get(index).map_or("", AsRef::as_ref));
+                match column {
+                    Column::Text(_) => self.push(format_args!("<td>{cell}</td>")),
+                    Column::Number(_) => self.push(format_args!("<td class=\"n\">{cell}</td>")),
+                };
+            }
+            self.push(format_args!("</tr>\n"));
+        }
+        self.push(format_args!("</tbody></table></div>\n"))
+    }
+
+    /// A picture made by this module, with a caption (empty for none). Text that is not
+    /// an SVG document is shown as text.
+    pub fn figure(&mut self, svg: &str, caption: &str) -> &mut Self {
+        if !svg.trim_start().starts_with("<svg") {
+            return self.code(svg);
+        }
+        self.push(format_args!("<figure>{svg}"));
+        if !caption.is_empty() {
+            self.push(format_args!("<figcaption>{}</figcaption>", inline(caption)));
+        }
+        self.push(format_args!("</figure>\n"))
+    }
+
+    /// Commands, generated code or a model, letter by letter.
+    pub fn code(&mut self, text: &str) -> &mut Self {
+        self.push(format_args!("<pre>{}</pre>\n", escape(text)))
+    }
+
+    /// A line at the foot of the page: tool version, data hash, seed, command.
+    pub fn provenance(&mut self, name: &str, value: &str) -> &mut Self {
+        self.provenance.push((name.to_owned(), value.to_owned()));
+        self
+    }
+
+    /// The whole page.
+    #[must_use]
+    pub fn html(&self) -> String {
+        let mut page = String::with_capacity(self.body.len() + 8192);
+        let title = escape(&self.title);
+        let _ = write!(
+            page,
+            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <meta name=\"color-scheme\" content=\"light dark\">\n\
+             <meta http-equiv=\"Content-Security-Policy\" \
+             content=\"default-src 'none'; style-src 'unsafe-inline'\">\n\
+             <title>{title}</title>\n<style>{STYLE}\
+             @media screen and (prefers-color-scheme:dark){{{DARK}{}}}</style></head>\n\
+             <body><main>\n<header><h1>{title}</h1>",
+            palette::dark_rules("figure svg"),
+        );
+        if !self.subtitle.is_empty() {
+            let _ = write!(page, "<p class=\"subtitle\">{}</p>", inline(&self.subtitle));
+        }
+        page.push_str("</header>\n");
+        if self.sections.len() > 3 {
+            page.push_str("<nav><ul>");
+            for (index, heading) in self.sections.iter().enumerate() {
+                let _ = write!(
+                    page,
+                    "<li><a href=\"#s{}\">{}</a></li>",
+                    index + 1,
+                    inline(heading)
+                );
+            }
+            page.push_str("</ul></nav>\n");
+        }
+        page.push_str(&self.body);
+        if self.open {
+            page.push_str("</section>\n");
+        }
+        if !self.provenance.is_empty() {
+            page.push_str("<footer><dl>");
+            for (name, value) in &self.provenance {
+                let _ = write!(page, "<dt>{}</dt><dd>{}</dd>", inline(name), inline(value));
+            }
+            page.push_str("</dl></footer>\n");
+        }
+        page.push_str("</main></body></html>\n");
+        page
+    }
+
+    fn push(&mut self, text: std::fmt::Arguments<'_>) -> &mut Self {
+        // Writing to a string cannot fail.
+        let _ = self.body.write_fmt(text);
+        self
+    }
+}
+
+/// `text` for HTML and XML; characters those forbid become U+FFFD.
+pub(super) fn escape(text: &str) -> String {
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '<' => safe.push_str("&lt;"),
+            '>' => safe.push_str("&gt;"),
+            '&' => safe.push_str("&amp;"),
+            '"' => safe.push_str("&quot;"),
+            '\'' => safe.push_str("&#39;"),
+            c if !allowed(c) => safe.push('\u{fffd}'),
+            c => safe.push(c),
+        }
+    }
+    safe
+}
+
+/// Whether XML 1.0 allows the character (its `Char` production).
+pub(super) fn allowed(c: char) -> bool {
+    matches!(c, '\t' | '\n' | '\r' | '\u{20}'..='\u{d7ff}' | '\u{e000}'..='\u{fffd}' | '\u{10000}'..)
+}
+
+/// Escaped text with `` `code` `` marked; a backtick without a partner stays.
+fn inline(text: &str) -> String {
+    let mut marked = String::with_capacity(text.len() + 16);
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once('`') {
+        let Some((code, tail)) = after.split_once('`') else {
+            break;
+        };
+        let _ = write!(marked, "{}<code>{}</code>", escape(before), escape(code));
+        rest = tail;
+    }
+    marked.push_str(&escape(rest));
+    marked
+}
+
+const STYLE: &str = "\
+:root{--paper:#fff;--ink:#1f2328;--muted:#656d76;--rule:#d8dee4;--soft:#f6f8fa;--link:#0072b2;\
+--good:#007a59;--finding:#0072b2;--warning:#b34e00}\
+*{box-sizing:border-box}\
+body{margin:0;background:var(--paper);color:var(--ink);\
+font:16px/1.55 system-ui,-apple-system,'Segoe UI',Helvetica,Arial,sans-serif}\
+main{max-width:948px;margin:0 auto;padding:28px 24px 48px}\
+h1{font-size:1.75rem;line-height:1.2;margin:0}\
+h2{font-size:1.25rem;margin:2.2em 0 .5em;padding-bottom:.25em;border-bottom:1px solid var(--rule)}\
+h3{font-size:1.05rem;margin:1.6em 0 .4em}\
+p,ul{margin:.6em 0;max-width:46em}\
+.subtitle{color:var(--muted);margin:.3em 0 0}\
+a{color:var(--link)}\
+nav ul{display:flex;flex-wrap:wrap;gap:.2em 1.2em;list-style:none;padding:0;margin:1em 0;font-size:.92rem;max-width:none}\
+code,pre{font-family:ui-monospace,'SF Mono',Menlo,Consolas,monospace;font-size:.88em}\
+code{background:var(--soft);padding:.1em .3em;border-radius:4px}\
+pre{background:var(--soft);border:1px solid var(--rule);border-radius:6px;padding:12px 14px;overflow-x:auto;line-height:1.4}\
+.verdict{border:1px solid var(--rule);border-left:5px solid var(--tone);border-radius:6px;background:var(--soft);padding:12px 18px;margin:20px 0}\
+.verdict p{margin:.25em 0}.verdict .headline{font-size:1.15rem;font-weight:600;color:var(--tone)}\
+.good{--tone:var(--good)}.finding{--tone:var(--finding)}.warning{--tone:var(--warning)}\
+.numbers{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:10px;margin:18px 0}\
+.numbers div{border:1px solid var(--rule);border-radius:6px;padding:10px 14px}\
+.numbers dt{color:var(--muted);font-size:.85rem}\
+.numbers dd{margin:0;font-size:1.4rem;font-weight:600;font-variant-numeric:tabular-nums}\
+.numbers dd.note{font-size:.85rem;font-weight:400;color:var(--muted)}\
+.table{overflow-x:auto;margin:14px 0}\
+table{border-collapse:collapse;font-size:.94rem;font-variant-numeric:tabular-nums}\
+caption{text-align:left;color:var(--muted);padding-bottom:.4em}\
+th,td{padding:5px 14px 5px 0;text-align:left;border-bottom:1px solid var(--rule);vertical-align:top}\
+th{font-weight:600;border-bottom-width:2px}\
+.n{text-align:right;padding:5px 8px 5px 14px;white-space:nowrap}\
+figure{margin:18px 0}\
+figure svg{display:block;width:100%;max-width:900px;height:auto}\
+figcaption{color:var(--muted);font-size:.92rem;max-width:48em;margin-top:4px}\
+footer{margin-top:3em;border-top:1px solid var(--rule);padding-top:10px;color:var(--muted);font-size:.85rem}\
+footer dl{display:grid;grid-template-columns:max-content 1fr;gap:2px 14px;margin:0}\
+footer dd{margin:0;overflow-wrap:anywhere}\
+@media print{main{max-width:none;padding:0}body{font-size:11pt}nav{display:none}\
+figure,.verdict,.numbers,tr{break-inside:avoid}h2,h3{break-after:avoid}.table,pre{overflow:visible}pre{white-space:pre-wrap}}\
+";
+
+const DARK: &str = "\
+:root{--paper:#161b22;--ink:#e6edf3;--muted:#9aa3ad;--rule:#30363d;--soft:#1c2330;--link:#4daae8;\
+--good:#3ccf9e;--finding:#4daae8;--warning:#ff8a4c}\
+";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample() -> String {
+        let mut report = Report::new("A <b> & \"c\"", "of `data.csv`");
+        report
+            .verdict(Tone::Warning, "x < y", "because & so")
+            .section("One")
+            .paragraph("`host-fit <x>` and a lone ` tick \u{0}")
+            .key_numbers(&[KeyNumber::new("FIT", "<97 %>", "")])
+            .table(
+                "t",
+                &[Column::Text("a<"), Column::Number("b")],
+                &[vec!["<i>"], vec!["x", "1", "dropped"]],
+            )
+            .figure("<svg xmlns=\"http://www.w3.org/2000/svg\"/>", "c & d")
+            .figure("<script>alert(1)</script>", "")
+            .code("if a < b {}")
+            .list(&["p", "<q>"])
+            .provenance("seed", "<1>");
+        for heading in ["Two", "Three", "Four"] {
+            report.section(heading).subsection("sub");
+        }
+        report.html()
+    }
+
+    #[test]
+    fn everything_is_escaped() {
+        let html = sample();
+        for raw in ["<b>", "<i>", "<script", "<q>", "<97", "<1>", "\u{0}"] {
+            assert!(!html.contains(raw), "{raw}");
+        }
+        assert!(html.contains("<code>host-fit &lt;x&gt;</code> and a lone ` tick \u{fffd}"));
+        assert!(html.contains("&lt;script&gt;"));
+        assert!(!html.contains("dropped"));
+    }
+
+    #[test]
+    fn the_page_is_well_formed_and_fetches_nothing() {
+        let html = sample();
+        // Void elements aside, the page is XML too: every tag is closed, in order.
+        let body = html.split_once("<body>").unwrap().1;
+        let body = body.split_once("</body>").unwrap().0;
+        let document = roxmltree::Document::parse(body).expect("balanced tags");
+        let sections = document.descendants().filter(|n| n.has_tag_name("section"));
+        assert_eq!(sections.count(), 4);
+        for link in document.descendants().filter_map(|n| n.attribute("href")) {
+            let target = link.strip_prefix('#').expect("links stay on the page");
+            assert!(
+                document
+                    .descendants()
+                    .any(|n| n.attribute("id") == Some(target))
+            );
+        }
+        assert!(!html.contains("src=") && !html.contains("url(") && !html.contains("@import"));
+        assert!(html.contains("default-src 'none'"));
+    }
+}

@@ -1,0 +1,274 @@
+//! Where a model fails: the residual's size along one coordinate after another.
+
+use super::axis::{Axis, extent};
+use super::canvas::{Anchor, Canvas, Ink, MARGIN, WIDTH, Words, draw, fit, text_width};
+use super::format::fixed;
+use super::legend::{Swatch, heading, nothing};
+use super::palette::{BLUE, INK, MUTED, VERMILLION};
+use super::panel::{Panel, left_edge};
+
+/// One bin of a coordinate. A bin with `from == to` stands for that one value.
+#[derive(Clone, Copy, Debug)]
+pub struct FailureBin {
+    /// Lower end, in the coordinate's unit.
+    pub from: f64,
+    /// Upper end.
+    pub to: f64,
+    /// RMS of the free-run residual in the bin, unit of y; NaN for an empty bin.
+    pub rmse: f64,
+    /// RMS that the noise alone causes there; NaN when unknown.
+    pub noise_rmse: f64,
+}
+
+/// The residual along one coordinate.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FailureView<'a> {
+    /// What the coordinate is, for example `"time since rising edge"`.
+    pub coordinate: &'a str,
+    /// Its unit; empty for none.
+    pub unit: &'a str,
+    /// Share of the excess error the coordinate explains, cross-validated, 0 to 1.
+    pub explained_fraction: Option<f64>,
+    /// Bins in ascending order; they are drawn equally wide, whatever they span.
+    pub bins: &'a [FailureBin],
+}
+
+/// What [`where_it_fails`] draws.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct WhereItFails<'a> {
+    /// Title; empty for none.
+    pub title: &'a str,
+    /// Unit of y; empty for a normalised output.
+    pub y_unit: &'a str,
+    /// One panel each, in this order.
+    pub views: &'a [FailureView<'a>],
+}
+
+const COLUMNS: usize = 2;
+const PANEL: f64 = 118.0;
+const HEAD: f64 = 30.0;
+const TICKS: f64 = 26.0;
+
+/// Draws one small panel per coordinate on a common scale, with the noise floor and the
+/// bin that stands out most above it. Returns SVG.
+#[must_use]
+pub fn where_it_fails(plot: &WhereItFails<'_>) -> String {
+    let description = format!("{}: residual along each coordinate", plot.title);
+    draw(&description, |canvas| {
+        let bins = || plot.views.iter().flat_map(|v| v.bins);
+        let Some((_, highest)) = extent(bins().map(|b| b.rmse)) else {
+            return nothing(canvas, plot.title, "No residual to draw.");
+        };
+        let mut entries = vec![
+            (Swatch::Band(BLUE), "RMS residual".to_owned()),
+            (Swatch::Band(VERMILLION), "worst bin".to_owned()),
+        ];
+        if bins().any(|b| b.noise_rmse.is_finite()) {
+            entries.push((Swatch::Line(INK), "noise floor".to_owned()));
+        }
+        let top = heading(canvas, plot.title, &entries);
+        let upper = if highest > 0.0 { highest * 1.12 } else { 1.0 };
+        let y = Axis::linear(Some((0.0, upper)));
+        let left = left_edge([&y]);
+        let gap = left - 22.0;
+        let width = (WIDTH - left - MARGIN - gap) / COLUMNS as f64;
+        let mut bottom = top;
+        for (index, view) in plot.views.iter().enumerate() {
+            let row = (index / COLUMNS) as f64;
+            let column = (index % COLUMNS) as f64;
+            let panel = Panel {
+                left: left + column * (width + gap),
+                top: top + row * (HEAD + PANEL + TICKS + 12.0) + HEAD,
+                width,
+                height: PANEL,
+                x: Axis::linear(Some((0.0, view.bins.len().max(1) as f64))),
+                y,
+            };
+            small(
+                canvas,
+                &panel,
+                view,
+                if index % COLUMNS == 0 {
+                    plot.y_unit
+                } else {
+                    ""
+                },
+            );
+            bottom = panel.bottom() + TICKS;
+        }
+        bottom + MARGIN
+    })
+}
+
+fn small(canvas: &mut Canvas<'_>, panel: &Panel, view: &FailureView<'_>, y_unit: &str) {
+    panel.frame(canvas, y_unit);
+    title(canvas, panel, view);
+    let worst = worst(view.bins);
+    let slot = panel.width / view.bins.len().max(1) as f64;
+    let inset = (slot * 0.08).min(2.0);
+    let place = |i: usize| panel.left + slot * i as f64;
+    for (i, bin) in view
+        .bins
+        .iter()
+        .enumerate()
+        .filter(|(_, b)| b.rmse.is_finite())
+    {
+        let Some((_, top)) = panel.point(0.0, bin.rmse) else {
+            continue;
+        };
+        let colour = if worst == Some(i) { VERMILLION } else { BLUE };
+        canvas.rectangle(
+            (place(i) + inset, panel.bottom()),
+            (place(i + 1) - inset, top),
+            Ink::new(colour, 1.0).faint(0.8),
+        );
+    }
+    let floor = view
+        .bins
+        .iter()
+        .enumerate()
+        .flat_map(|(i, bin)| [i as f64, i as f64 + 1.0].map(|x| (x, bin.noise_rmse)));
+    panel.curve(canvas, floor, Ink::new(INK, 1.75));
+    edges(canvas, panel, view.bins, slot);
+}
+
+/// Name, unit and explained share above a panel.
+fn title(canvas: &mut Canvas<'_>, panel: &Panel, view: &FailureView<'_>) {
+    let at = panel.top - 14.0;
+    let mut room = panel.width;
+    if let Some(share) = view.explained_fraction.filter(|s| s.is_finite()) {
+        let text = format!(
+            "explains {} %",
+            fixed(100.0 * share.clamp(-9.99, 9.99), 0, false)
+        );
+        let colour = if share >= 0.2 { VERMILLION } else { MUTED };
+        let right = (panel.left + panel.width, at);
+        canvas.text(Words::new(13.5, colour).at(Anchor::End), right, &text);
+        room -= text_width(&text, 13.5) + 10.0;
+    }
+    let name = match view.unit {
+        "" => view.coordinate.to_owned(),
+        unit => format!("{} ({unit})", view.coordinate),
+    };
+    let name = fit(&name, 14.5, room);
+    canvas.text(Words::new(14.5, INK).bold(), (panel.left, at), &name);
+}
+
+/// Bin limits below a panel, as many as fit; a bin of one value has its label in the middle.
+fn edges(canvas: &mut Canvas<'_>, panel: &Panel, bins: &[FailureBin], slot: f64) {
+    const SIZE: f64 = 12.5;
+    let single = bins.iter().all(|b| b.from == b.to);
+    let mut labels: Vec<(f64, String)> = bins
+        .iter()
+        .enumerate()
+        .map(|(i, bin)| {
+            let at = i as f64 + if single { 0.5 } else { 0.0 };
+            (panel.left + slot * at, super::significant(bin.from, 3))
+        })
+        .collect();
+    if let (false, Some(last)) = (single, bins.last()) {
+        labels.push((panel.left + panel.width, super::significant(last.to, 3)));
+    }
+    let widest = labels
+        .iter()
+        .map(|(_, text)| text_width(text, SIZE))
+        .fold(1.0, f64::max);
+    let stride = ((widest + 8.0) / slot.max(1e-3)).ceil().max(1.0) as usize;
+    for (at, text) in labels.iter().step_by(stride) {
+        canvas.text(
+            Words::new(SIZE, MUTED).at(Anchor::Middle),
+            (*at, panel.bottom() + 13.0),
+            text,
+        );
+    }
+}
+
+/// Bin whose mean square is farthest above its floor.
+fn worst(bins: &[FailureBin]) -> Option<usize> {
+    let floor = |b: &FailureBin| {
+        if b.noise_rmse.is_finite() {
+            b.noise_rmse
+        } else {
+            0.0
+        }
+    };
+    bins.iter()
+        .enumerate()
+        .filter(|(_, b)| b.rmse.is_finite() && b.rmse > floor(b))
+        .max_by(|(_, a), (_, b)| {
+            let excess = |b: &FailureBin| b.rmse * b.rmse - floor(b) * floor(b);
+            excess(a).total_cmp(&excess(b))
+        })
+        .map(|(i, _)| i)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::palette::hex;
+    use crate::picture::testing::{absurd_series, check, words};
+
+    fn bin(from: f64, rmse: f64) -> FailureBin {
+        FailureBin {
+            from,
+            to: from + 10.0,
+            rmse,
+            noise_rmse: 0.01,
+        }
+    }
+
+    #[test]
+    fn the_worst_bin_is_marked_once_and_the_share_is_written() {
+        let bins = [bin(0.0, 0.02), bin(10.0, 0.09), bin(20.0, 0.03)];
+        let svg = where_it_fails(&WhereItFails {
+            views: &[FailureView {
+                coordinate: "time since rising edge",
+                unit: "ms",
+                explained_fraction: Some(0.74),
+                bins: &bins,
+            }],
+            ..WhereItFails::default()
+        });
+        check(&svg);
+        assert!(words(&svg).contains("time since rising edge (ms)"));
+        assert!(words(&svg).contains("explains 74 %"));
+        assert_eq!(worst(&bins), Some(1));
+        // One bar and the legend.
+        let fill = format!("fill=\"{}\" stroke=\"none\"", hex(VERMILLION));
+        assert_eq!(svg.matches(&fill).count(), 2);
+    }
+
+    #[test]
+    fn bins_at_the_floor_have_no_worst() {
+        assert_eq!(
+            worst(&[bin(0.0, 0.01), bin(1.0, 0.009), bin(2.0, f64::NAN)]),
+            None
+        );
+    }
+
+    #[test]
+    fn absurd_input_never_panics() {
+        for values in absurd_series() {
+            let bins: Vec<_> = values
+                .iter()
+                .take(500)
+                .map(|v| FailureBin {
+                    from: *v,
+                    to: *v,
+                    rmse: *v,
+                    noise_rmse: -*v,
+                })
+                .collect();
+            let view = FailureView {
+                coordinate: "<u>",
+                unit: "&",
+                explained_fraction: values.first().copied(),
+                bins: &bins,
+            };
+            check(&where_it_fails(&WhereItFails {
+                views: &[view; 3],
+                ..WhereItFails::default()
+            }));
+        }
+    }
+}

@@ -45,7 +45,7 @@ pub fn bars(plot: &Bars<'_>) -> String {
             .iter()
             .enumerate()
             .filter(|_| plot.series.len() > 1)
-            .map(|(i, name)| (Swatch::Band(series(i)), (*name).to_owned()))
+            .map(|(i, name)| (Swatch::Bar(series(i)), (*name).to_owned()))
             .collect();
         let top = heading(canvas, plot.title, &entries);
         let count = plot

@@ -145,7 +145,7 @@ impl Canvas<'_> {
 
     /// A dashed line through `points`; solid where it would take thousands of dashes.
     pub(super) fn dashes(&mut self, points: &[(f64, f64)], ink: Ink, dash: f64) {
-        let length: f64 = points.windows(2).map(|w| distance(w)).sum();
+        let length: f64 = points.windows(2).map(distance).sum();
         if !(dash > 0.5 && length / dash < 600.0) {
             return self.line(points, ink);
         }

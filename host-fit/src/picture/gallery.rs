@@ -307,7 +307,7 @@ fn pictures() -> Vec<(&'static str, String)> {
             "where",
             where_it_fails(&WhereItFails {
                 title: "Where the model fails",
-                y_unit: "RMS of y",
+                y_label: "",
                 views: &views,
             }),
         ),

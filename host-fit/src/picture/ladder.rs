@@ -3,7 +3,7 @@
 use super::axis::{Axis, extent};
 use super::canvas::{Anchor, Canvas, Ink, MARGIN, WIDTH, Words, draw, text_width, wrap};
 use super::legend::{Swatch, heading, nothing};
-use super::palette::{BLUE, FLOOR, INK, MUTED, VERMILLION, series};
+use super::palette::{BLUE, FLOOR, INK, MUTED, PAPER, VERMILLION, series};
 use super::panel::{LABEL_SIZE, Panel, TICK_SIZE, left_edge};
 
 /// One rung: the model after an effect was added.
@@ -51,12 +51,13 @@ pub fn ladder(plot: &Ladder<'_>) -> String {
         let Some((_, highest)) = together else {
             return nothing(canvas, plot.title, "No step has an error to draw.");
         };
-        let mut entries = vec![(Swatch::Band(BLUE), "all held-out records".to_owned())];
+        let mut entries = vec![(Swatch::Bar(BLUE), "all held-out records".to_owned())];
         for (index, record) in plot.records.iter().enumerate() {
             entries.push((Swatch::Dot(record_colour(index)), record.name.to_owned()));
         }
-        if noise.is_some() {
-            entries.push((Swatch::Dashes(INK), "noise floor".to_owned()));
+        if let Some(noise) = noise {
+            let text = format!("noise floor {}", super::significant(noise, 3));
+            entries.push((Swatch::Dashes(INK), text));
         }
         let top = heading(canvas, plot.title, &entries);
 
@@ -94,19 +95,7 @@ pub fn ladder(plot: &Ladder<'_>) -> String {
         if let Some(noise) = noise {
             floor(canvas, &panel, noise);
         }
-        for (index, record) in plot.records.iter().enumerate() {
-            let ink = Ink::new(record_colour(index), 1.5);
-            let points: Vec<(f64, f64)> = rungs
-                .iter()
-                .zip(record.rmse)
-                .filter(|(_, rmse)| rmse.is_finite())
-                .filter_map(|((x, _), rmse)| Some((*x, panel.point(0.0, *rmse)?.1)))
-                .collect();
-            canvas.line(&points, ink.faint(0.7));
-            for point in points {
-                canvas.dot(point, 4.0, ink, true);
-            }
-        }
+        dots(canvas, &panel, &rungs, half, plot.records);
         numbers(canvas, &panel, &rungs, half, plot.records);
         labels(canvas, &panel, &rungs, slot)
     })
@@ -153,6 +142,31 @@ fn floor(canvas: &mut Canvas<'_>, panel: &Panel, noise: f64) {
     panel.level(canvas, noise, Ink::new(INK, 1.5));
 }
 
+/// The error of every record, side by side within the column of its rung.
+fn dots(
+    canvas: &mut Canvas<'_>,
+    panel: &Panel,
+    rungs: &[(f64, &LadderStep<'_>)],
+    half: f64,
+    records: &[LadderRecord<'_>],
+) {
+    let pitch = (1.5 * half / records.len().max(1) as f64).min(26.0);
+    for (index, record) in records.iter().enumerate() {
+        let offset = pitch * (index as f64 - (records.len() as f64 - 1.0) / 2.0);
+        for ((x, _), rmse) in rungs.iter().zip(record.rmse).filter(|(_, r)| r.is_finite()) {
+            if let Some((_, y)) = panel.point(0.0, *rmse) {
+                canvas.dot((x + offset, y), 6.0, Ink::new(PAPER, 1.0), true);
+                canvas.dot(
+                    (x + offset, y),
+                    4.5,
+                    Ink::new(record_colour(index), 1.0),
+                    true,
+                );
+            }
+        }
+    }
+}
+
 /// The error of every rung above all that is drawn there, and its fall from the rung before.
 fn numbers(
     canvas: &mut Canvas<'_>,
@@ -174,7 +188,7 @@ fn numbers(
             continue;
         };
         // Room for both lines below the upper edge, whatever is there.
-        let at = (at - 15.0).max(panel.top + 22.0);
+        let at = (at - 17.0).max(panel.top + 22.0);
         let middle = Words::new(size, INK).at(Anchor::Middle);
         canvas.text(middle.bold(), (*x, at), &super::significant(step.rmse, 3));
         if let Some(before) = before.filter(|b| *b > 0.0 && step.rmse.is_finite()) {

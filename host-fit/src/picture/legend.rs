@@ -17,6 +17,7 @@ pub(super) enum Swatch {
     Line(RGBColor),
     Dashes(RGBColor),
     Band(RGBColor),
+    Bar(RGBColor),
     Dot(RGBColor),
     Ring(RGBColor),
 }
@@ -45,7 +46,7 @@ pub(super) fn heading(canvas: &mut Canvas<'_>, title: &str, entries: &[(Swatch, 
         left += width + GAP;
         drawn = true;
     }
-    if drawn { top + ROW + 6.0 } else { top + 2.0 }
+    if drawn { top + ROW + 10.0 } else { top + 6.0 }
 }
 
 fn sample(canvas: &mut Canvas<'_>, swatch: Swatch, left: f64, middle: f64) {
@@ -54,10 +55,13 @@ fn sample(canvas: &mut Canvas<'_>, swatch: Swatch, left: f64, middle: f64) {
     match swatch {
         Swatch::Line(colour) => canvas.line(&ends, Ink::new(colour, 2.5)),
         Swatch::Dashes(colour) => canvas.dashes(&ends, Ink::new(colour, 2.0), 6.0),
-        Swatch::Band(colour) => canvas.rectangle(
+        Swatch::Band(colour) | Swatch::Bar(colour) => canvas.rectangle(
             (left, middle - 6.0),
             (left + SWATCH, middle + 6.0),
-            Ink::new(colour, 1.0).faint(0.35),
+            Ink::new(colour, 1.0).faint(match swatch {
+                Swatch::Bar(_) => 0.85,
+                _ => 0.35,
+            }),
         ),
         Swatch::Dot(colour) => canvas.dot(centre, 5.0, Ink::new(colour, 1.0), true),
         Swatch::Ring(colour) => canvas.dot(centre, 4.5, Ink::new(colour, 1.75), false),

@@ -68,7 +68,13 @@ pub fn overlay(plot: &Overlay<'_>) -> String {
         let floor: Option<(Vec<f64>, Vec<f64>)> =
             plot.y_sd.map(|sd| around(&vec![0.0; sd.len()], sd));
         let scatter: Option<(&[f64], &[f64], &str)> = match (plot.y_min, plot.y_max, &spread) {
-            (Some(low), Some(high), _) => Some((low, high, "range over repeats")),
+            (Some(low), Some(high), None) => Some((low, high, "range over repeats")),
+            (Some(low), Some(high), _) if plot.models.is_empty() => {
+                Some((low, high, "range over repeats"))
+            }
+            (Some(low), Some(high), Some(_)) => {
+                Some((low, high, "range over repeats (below: ± 2 standard errors)"))
+            }
             (_, _, Some((low, high))) => Some((low, high, "± 2 standard errors")),
             _ => None,
         };
@@ -117,7 +123,7 @@ pub fn overlay(plot: &Overlay<'_>) -> String {
             x: clock.axis(&range),
             y: y_axis,
         };
-        let lines = 2 * plot.models.len() + 5;
+        let lines = 2 * plot.models.len() + 7;
         let columns = columns(main.width, lines);
         main.uprights(canvas);
         main.frame(canvas, named(plot.y_label, "Output y"));
@@ -167,6 +173,12 @@ pub fn overlay(plot: &Overlay<'_>) -> String {
             for (index, residual) in residuals.iter().enumerate() {
                 let ink = Ink::new(series(index), 1.25).faint(0.85);
                 panel.trace(canvas, clock, residual, range.clone(), columns, ink);
+            }
+            if let Some((low, high)) = &floor {
+                for edge in [low, high] {
+                    let ink = Ink::new(MUTED, 1.0);
+                    panel.trace(canvas, clock, edge, range.clone(), columns, ink);
+                }
             }
             panel.curve(
                 canvas,

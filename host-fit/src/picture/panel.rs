@@ -63,11 +63,9 @@ impl Clock {
         if range.is_empty() { 0..length } else { range }
     }
 
-    /// Axis from the first to the last sample of `range`.
+    /// Axis over `range`, the last sample held for its period.
     pub(super) fn axis(&self, range: &Range<usize>) -> Axis {
-        let last = range.end.saturating_sub(1).max(range.start);
-        let ends = (self.time(range.start), self.time(last));
-        Axis::linear(if last > range.start { Some(ends) } else { None })
+        Axis::linear(Some((self.time(range.start), self.time(range.end))))
     }
 }
 
@@ -87,7 +85,7 @@ impl Panel {
 
     /// Grid, lower and left axis and the ticks of y with its label.
     pub(super) fn frame(&self, canvas: &mut Canvas<'_>, y_label: &str) {
-        self.grid(canvas, y_label, (self.height / 48.0).max(2.0) as usize);
+        self.grid(canvas, y_label, (self.height / 36.0).max(2.0) as usize);
     }
 
     fn grid(&self, canvas: &mut Canvas<'_>, y_label: &str, count: usize) {

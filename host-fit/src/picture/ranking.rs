@@ -113,32 +113,39 @@ pub fn ranking(plot: &Ranking<'_>) -> String {
             y: Axis::linear(None),
         };
         panel.uprights(canvas);
+        let rows = || order.iter().enumerate();
+        let middle = |row: usize| panel.top + 4.0 + ROW * (row as f64 + 0.5);
+        for (row, _) in rows() {
+            let ends = [panel.left, panel.left + panel.width].map(|x| (x, middle(row)));
+            canvas.line(&ends, Ink::new(GRID, 1.0));
+        }
         if let Some(base) = base {
             panel.curve(canvas, [(base, 0.0), (base, 1.0)], Ink::new(MUTED, 1.5));
         }
         if let Some(noise) = noise {
             panel.upright(canvas, noise, Ink::new(INK, 1.5));
         }
-        for (row, candidate) in order.iter().enumerate() {
-            let middle = panel.top + 4.0 + ROW * (row as f64 + 0.5);
+        for (row, candidate) in rows() {
+            let middle = middle(row);
             let colour = match (candidate.accepted, candidate.decoy) {
                 (true, _) => VERMILLION,
                 (false, true) => FLOOR,
                 (false, false) => BLUE,
             };
-            canvas.line(
-                &[(panel.left, middle), (panel.left + panel.width, middle)],
-                Ink::new(GRID, 1.0),
-            );
             let place = |value: f64| Some(panel.point(value, 0.0)?.0);
+            let beyond = candidate.rmse > panel.x.ends().1;
             let interval = place(candidate.low).zip(place(candidate.high));
-            if let Some((from, to)) = interval {
+            if let Some((from, to)) = interval.filter(|_| !beyond) {
                 canvas.line(
                     &[(from, middle), (to, middle)],
                     Ink::new(colour, 2.5).faint(0.6),
                 );
             }
-            if let Some(at) = place(candidate.rmse) {
+            if let (true, Some(at)) = (beyond, place(candidate.rmse)) {
+                let words = Words::new(SIZE - 1.5, MUTED).at(Anchor::End);
+                let text = format!("{} →", super::significant(candidate.rmse, 2));
+                canvas.text(words, (at, middle), &text);
+            } else if let Some(at) = place(candidate.rmse) {
                 let filled = !candidate.decoy;
                 let radius = if filled { 5.0 } else { 4.25 };
                 canvas.dot((at, middle), radius, Ink::new(colour, 1.75), filled);

@@ -85,7 +85,8 @@ fn bars(
             (Some(first), false) => {
                 start = None;
                 let from = pixel(first);
-                let to = pixel(k).max(from + narrowest);
+                let right = panel.left + panel.width;
+                let to = pixel(k).max(from + narrowest).min(right);
                 match bars.last_mut() {
                     Some(last) if from - last.1 < narrowest * 0.5 => last.1 = last.1.max(to),
                     _ => bars.push((from, to)),

@@ -4,6 +4,7 @@ use super::axis::{Axis, extent};
 use super::canvas::{Anchor, Canvas, Ink, MARGIN, WIDTH, Words, draw, fit, text_width};
 use super::format::fixed;
 use super::legend::{Swatch, heading, nothing};
+use super::overlay::named;
 use super::palette::{BLUE, INK, MUTED, VERMILLION};
 use super::panel::{Panel, left_edge};
 
@@ -38,12 +39,14 @@ pub struct FailureView<'a> {
 pub struct WhereItFails<'a> {
     /// Title; empty for none.
     pub title: &'a str,
-    /// Unit of y; empty for a normalised output.
-    pub y_unit: &'a str,
+    /// Label of the vertical axes with the unit of y; empty means "RMS residual".
+    pub y_label: &'a str,
     /// One panel each, in this order.
     pub views: &'a [FailureView<'a>],
 }
 
+/// Explained share below which no bin is marked.
+const WORTH_MARKING: f64 = 0.05;
 const COLUMNS: usize = 2;
 const PANEL: f64 = 118.0;
 const HEAD: f64 = 30.0;
@@ -60,8 +63,8 @@ pub fn where_it_fails(plot: &WhereItFails<'_>) -> String {
             return nothing(canvas, plot.title, "No residual to draw.");
         };
         let mut entries = vec![
-            (Swatch::Band(BLUE), "RMS residual".to_owned()),
-            (Swatch::Band(VERMILLION), "worst bin".to_owned()),
+            (Swatch::Bar(BLUE), "RMS residual".to_owned()),
+            (Swatch::Bar(VERMILLION), "worst bin".to_owned()),
         ];
         if bins().any(|b| b.noise_rmse.is_finite()) {
             entries.push((Swatch::Line(INK), "noise floor".to_owned()));
@@ -71,7 +74,8 @@ pub fn where_it_fails(plot: &WhereItFails<'_>) -> String {
         let y = Axis::linear(Some((0.0, upper)));
         let left = left_edge([&y]);
         let gap = left - 22.0;
-        let width = (WIDTH - left - MARGIN - gap) / COLUMNS as f64;
+        // The last label of a panel reaches beyond its edge.
+        let width = (WIDTH - left - MARGIN - 10.0 - gap) / COLUMNS as f64;
         let mut bottom = top;
         for (index, view) in plot.views.iter().enumerate() {
             let row = (index / COLUMNS) as f64;
@@ -89,7 +93,7 @@ pub fn where_it_fails(plot: &WhereItFails<'_>) -> String {
                 &panel,
                 view,
                 if index % COLUMNS == 0 {
-                    plot.y_unit
+                    named(plot.y_label, "RMS residual")
                 } else {
                     ""
                 },
@@ -100,10 +104,14 @@ pub fn where_it_fails(plot: &WhereItFails<'_>) -> String {
     })
 }
 
-fn small(canvas: &mut Canvas<'_>, panel: &Panel, view: &FailureView<'_>, y_unit: &str) {
-    panel.frame(canvas, y_unit);
+fn small(canvas: &mut Canvas<'_>, panel: &Panel, view: &FailureView<'_>, y_label: &str) {
+    panel.frame(canvas, y_label);
     title(canvas, panel, view);
-    let worst = worst(view.bins);
+    // The largest bin of a coordinate that explains nothing is chance, not a place.
+    let worst = match view.explained_fraction {
+        Some(share) if share < WORTH_MARKING => None,
+        _ => worst(view.bins),
+    };
     let slot = panel.width / view.bins.len().max(1) as f64;
     let inset = (slot * 0.08).min(2.0);
     let place = |i: usize| panel.left + slot * i as f64;
@@ -137,10 +145,12 @@ fn title(canvas: &mut Canvas<'_>, panel: &Panel, view: &FailureView<'_>) {
     let at = panel.top - 14.0;
     let mut room = panel.width;
     if let Some(share) = view.explained_fraction.filter(|s| s.is_finite()) {
-        let text = format!(
-            "explains {} %",
-            fixed(100.0 * share.clamp(-9.99, 9.99), 0, false)
-        );
+        let percent = (100.0 * share).round();
+        let text = if percent >= 1.0 {
+            format!("explains {} %", fixed(percent.min(100.0), 0, false))
+        } else {
+            "explains nothing".to_owned()
+        };
         let colour = if share >= 0.2 { VERMILLION } else { MUTED };
         let right = (panel.left + panel.width, at);
         canvas.text(Words::new(13.5, colour).at(Anchor::End), right, &text);
@@ -158,17 +168,15 @@ fn title(canvas: &mut Canvas<'_>, panel: &Panel, view: &FailureView<'_>) {
 fn edges(canvas: &mut Canvas<'_>, panel: &Panel, bins: &[FailureBin], slot: f64) {
     const SIZE: f64 = 12.5;
     let single = bins.iter().all(|b| b.from == b.to);
-    let mut labels: Vec<(f64, String)> = bins
+    let offset = if single { 0.5 } else { 0.0 };
+    let limits: Vec<(f64, f64)> = bins
         .iter()
+        .map(|bin| bin.from)
+        .chain(bins.last().filter(|_| !single).map(|bin| bin.to))
         .enumerate()
-        .map(|(i, bin)| {
-            let at = i as f64 + if single { 0.5 } else { 0.0 };
-            (panel.left + slot * at, super::significant(bin.from, 3))
-        })
+        .map(|(i, limit)| (panel.left + slot * (i as f64 + offset), limit))
         .collect();
-    if let (false, Some(last)) = (single, bins.last()) {
-        labels.push((panel.left + panel.width, super::significant(last.to, 3)));
-    }
+    let labels = distinct(&limits);
     let widest = labels
         .iter()
         .map(|(_, text)| text_width(text, SIZE))
@@ -181,6 +189,18 @@ fn edges(canvas: &mut Canvas<'_>, panel: &Panel, bins: &[FailureBin], slot: f64)
             text,
         );
     }
+}
+
+/// Limits written with as few digits, from three on, as tell neighbours apart.
+fn distinct(limits: &[(f64, f64)]) -> Vec<(f64, String)> {
+    let written = |digits| -> Vec<(f64, String)> {
+        let label = |(at, limit): &(f64, f64)| (*at, super::significant(*limit, digits));
+        limits.iter().map(label).collect()
+    };
+    (3..7)
+        .map(written)
+        .find(|labels| labels.windows(2).all(|pair| pair[0].1 != pair[1].1))
+        .unwrap_or_else(|| written(3))
 }
 
 /// Bin whose mean square is farthest above its floor.
@@ -236,6 +256,13 @@ mod tests {
         // One bar and the legend.
         let fill = format!("fill=\"{}\" stroke=\"none\"", hex(VERMILLION));
         assert_eq!(svg.matches(&fill).count(), 2);
+    }
+
+    #[test]
+    fn neighbouring_limits_read_differently() {
+        let labels = distinct(&[(0.0, 10.0), (1.0, 10.05), (2.0, 10.1)]);
+        let labels: Vec<_> = labels.into_iter().map(|l| l.1).collect();
+        assert_eq!(labels, ["10", "10.05", "10.1"]);
     }
 
     #[test]

@@ -11,7 +11,11 @@
 //! panic. Time, noise and measurements are arguments, never read inside.
 #![no_std]
 
+#[cfg(test)]
+extern crate std;
+
 pub mod average;
+pub mod control;
 pub mod delay;
 pub mod effect;
 pub mod effects;

@@ -132,9 +132,9 @@ pub struct State<T, Y, J, D, E> {
     pub jets: J,
     /// Counts of clamped delays.
     pub clamps: Clamps,
-    average: WindowSum<T>,
-    delay: D,
-    effects: E,
+    pub(crate) average: WindowSum<T>,
+    pub(crate) delay: D,
+    pub(crate) effects: E,
 }
 
 /// The state that model `M` needs, in memories `Y` and `J`.

@@ -1,0 +1,176 @@
+//! What a valve and a compressor can give: switches and air per time.
+//!
+//! Both are stores that fill at a steady rate and are drawn from, in whole
+//! numbers, so that they neither drift nor round.
+
+use crate::control::hold::{Hold, HoldTimes};
+
+/// A limit on how often the valve switches, averaged over a while.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Switches {
+    /// Samples that one switch costs: the sample rate over the allowed switches per second.
+    pub samples_per_switch: u32,
+    /// Switches that may be saved up for busy moments, at least 2 (one pulse).
+    pub saved: u32,
+}
+
+/// A limit on the air used, averaged over a while.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Air {
+    /// Allowed long-run share of time with the valve open, in 1/1000; 1000 is no limit.
+    pub per_mille: u32,
+    /// Samples of continuous blowing that a full store of air gives beyond the allowed share.
+    pub saved: u32,
+}
+
+/// Both budgets; `None` is no limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Budget {
+    /// The valve's.
+    pub switches: Option<Switches>,
+    /// The compressor's.
+    pub air: Option<Air>,
+}
+
+/// What is left of the budgets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Purse {
+    /// In samples: a switch costs `samples_per_switch`.
+    switches: u32,
+    /// In thousandths of a sample of blowing.
+    air: u32,
+}
+
+impl Budget {
+    /// Full stores.
+    #[must_use]
+    pub fn full(&self) -> Purse {
+        Purse {
+            switches: self.switches.map_or(0, |s| s.capacity()),
+            air: self.air.map_or(0, |a| a.capacity()),
+        }
+    }
+
+    /// What the budgets make of a wish, given where the valve is.
+    ///
+    /// A pulse is only begun when there is air for its shortest length and a
+    /// switch to end it; blowing ends when the air does. Hold times come after.
+    #[must_use]
+    pub fn allow(&self, purse: &Purse, hold: &Hold, times: &HoldTimes, wanted: bool) -> bool {
+        if !hold.is_on() && wanted {
+            let switches = self
+                .switches
+                .is_none_or(|s| purse.switches >= s.samples_per_switch.saturating_mul(2));
+            let air = self.air.is_none_or(|a| {
+                purse.air >= a.drain().saturating_mul(times.of(true)).min(a.capacity())
+            });
+            return switches && air;
+        }
+        if hold.is_on() && wanted {
+            return self.air.is_none_or(|a| purse.air >= a.drain());
+        }
+        wanted
+    }
+
+    /// Books what the valve did at this sample.
+    pub fn book(&self, purse: &mut Purse, was_on: bool, is_on: bool) {
+        if let Some(s) = self.switches {
+            let spent = if was_on == is_on {
+                0
+            } else {
+                s.samples_per_switch
+            };
+            purse.switches = purse
+                .switches
+                .saturating_add(1)
+                .min(s.capacity())
+                .saturating_sub(spent);
+        }
+        if let Some(a) = self.air {
+            purse.air = if is_on {
+                purse.air.saturating_sub(a.drain())
+            } else {
+                purse.air.saturating_add(a.per_mille).min(a.capacity())
+            };
+        }
+    }
+}
+
+impl Switches {
+    fn capacity(&self) -> u32 {
+        self.samples_per_switch.saturating_mul(self.saved.max(2))
+    }
+}
+
+impl Air {
+    /// What a sample of blowing takes beyond what flows in.
+    fn drain(&self) -> u32 {
+        1000_u32.saturating_sub(self.per_mille)
+    }
+    fn capacity(&self) -> u32 {
+        self.drain().max(1).saturating_mul(self.saved.max(1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TIMES: HoldTimes = HoldTimes { on: 5, off: 5 };
+
+    /// Samples open and switches over 100 s of a wish.
+    fn run(budget: Budget, wish: impl Fn(u32) -> bool) -> (u32, u32) {
+        let mut purse = budget.full();
+        let mut hold = Hold::closed();
+        let (mut open, mut switches) = (0, 0);
+        for k in 0..100_000 {
+            let was = hold.is_on();
+            let wanted = budget.allow(&purse, &hold, &TIMES, wish(k));
+            let on = hold.pass(&TIMES, wanted);
+            budget.book(&mut purse, was, on);
+            open += u32::from(on);
+            switches += u32::from(on != was);
+        }
+        (open, switches)
+    }
+
+    #[test]
+    fn the_air_is_the_allowed_share_and_what_was_saved() {
+        let air = Some(Air {
+            per_mille: 400,
+            saved: 2000,
+        });
+        let (open, _) = run(
+            Budget {
+                air,
+                switches: None,
+            },
+            |_| true,
+        );
+        assert!((40_000..=42_010).contains(&open), "{open}");
+        let (open, _) = run(
+            Budget {
+                air,
+                switches: None,
+            },
+            |k| k % 10 < 3,
+        );
+        assert!(open >= 30_000, "a wish below the budget is granted: {open}");
+    }
+
+    #[test]
+    fn the_switches_are_the_allowed_rate_and_what_was_saved() {
+        let switches = Some(Switches {
+            samples_per_switch: 25,
+            saved: 10,
+        });
+        let (_, count) = run(
+            Budget {
+                air: None,
+                switches,
+            },
+            |k| k % 12 < 6,
+        );
+        assert!((3_900..=4_011).contains(&count), "{count}");
+    }
+}

@@ -1,0 +1,82 @@
+//! Periodic on/off commands: what the maximising law plays.
+
+/// `N` pulses in a period that repeats for ever.
+///
+/// ```
+/// use model_core::control::PulseTrain;
+/// let train = PulseTrain { period: 5, pulses: [(1, 2)] }; // on for samples 1 and 2 of 5
+/// let mut at = 0;
+/// let command: [bool; 7] = core::array::from_fn(|_| train.next(&mut at));
+/// assert_eq!(command, [false, true, true, false, false, false, true]);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PulseTrain<P> {
+    /// Length of the period, samples, at least 1.
+    pub period: u32,
+    /// (first sample, length) of each pulse in samples; a pulse may run over the
+    /// end of the period.
+    pub pulses: P,
+}
+
+impl<P: AsRef<[(u32, u32)]>> PulseTrain<P> {
+    /// Whether the valve is open at sample `at` of the period.
+    #[must_use]
+    pub fn is_on(&self, at: u32) -> bool {
+        let period = self.period.max(1);
+        let at = u64::from(at % period);
+        self.pulses.as_ref().iter().any(|&(first, length)| {
+            let first = u64::from(first % period);
+            let period = u64::from(period);
+            (at + period - first) % period < u64::from(length)
+        })
+    }
+
+    /// The command at sample `at`, which moves on.
+    pub fn next(&self, at: &mut u32) -> bool {
+        let on = self.is_on(*at);
+        *at = if *at + 1 < self.period { *at + 1 } else { 0 };
+        on
+    }
+
+    /// Share of the period with the valve open, as (samples open, period).
+    #[must_use]
+    pub fn open(&self) -> (u32, u32) {
+        let period = self.period.max(1);
+        (
+            (0..period).map(|at| u32::from(self.is_on(at))).sum(),
+            period,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pulses_wrap_and_overlap() {
+        let train = PulseTrain {
+            period: 10,
+            pulses: [(8, 4), (0, 3), (5, 1)],
+        };
+        let command: [bool; 10] = core::array::from_fn(|at| train.is_on(at as u32));
+        assert_eq!(
+            command,
+            [
+                true, true, true, false, false, true, false, false, true, true
+            ]
+        );
+        assert_eq!(train.open(), (6, 10));
+    }
+
+    #[test]
+    fn a_period_of_zero_is_one() {
+        let train = PulseTrain {
+            period: 0,
+            pulses: [(0, 1)],
+        };
+        let mut at = 7;
+        assert!(train.next(&mut at));
+        assert_eq!(train.open(), (1, 1));
+    }
+}

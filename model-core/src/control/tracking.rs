@@ -1,0 +1,500 @@
+//! The tracking law: holds the friction at a reference with an on/off valve.
+//!
+//! What is issued at sample k arrives at κ(k) = min{m ≥ k : m − h(ỹ_m) ≥ k}.
+//! The law runs the model on from its estimate of the present through everything
+//! already issued until that sample, the delay evaluated at each arrival, and
+//! then half a hold time further under the *other* position of the valve. It
+//! switches when the flow would by then be on the other side of the reference:
+//! the swing that a hold time enforces is centred on the reference instead of
+//! starting from it. At a hold time of one sample this is the one-step-optimal
+//! choice u = 1 ⇔ y* − F > G/2.
+//!
+//! Three corrections make it hold on a flow that is not the model: an observer
+//! moves the estimate by a share of each residual; the error of predictions made
+//! a delay ago, low-pass filtered, is added to those made now (Smith's
+//! correction); and a slow integral removes what remains.
+
+use crate::control::budget::{Budget, Purse};
+use crate::control::hold::{Hold, HoldTimes};
+use crate::control::reference::{Reachable, Unreachable, ramp};
+use crate::effect::Effect;
+use crate::history::{DelayLine, Memory, Past};
+use crate::model::{Input, Parts, StateOf, observe, step};
+use crate::real::Real;
+use core::fmt;
+
+/// A reading of the sensor; `None` (or a number that is not finite) where there
+/// is none.
+pub type Measurement<T> = Option<T>;
+
+/// The constants of the law. All times in samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tracking<T> {
+    /// y*, the friction to hold, of the flow itself (before sensor effects).
+    pub reference: T,
+    /// What can be held.
+    pub reachable: Reachable<T>,
+    /// Fastest change of the reference, y per sample; 0 follows steps as steps.
+    pub slope: T,
+    /// Shortest on and off times.
+    pub hold: HoldTimes,
+    /// Limits on switching and air.
+    pub budget: Budget,
+    /// How far ahead predictions are judged, at least 1 and at most the shortest delay.
+    pub lead: u16,
+    /// From an opening command to half the jet strength (valve, edge delays).
+    pub opening: u16,
+    /// From a closing command to half the jet strength.
+    pub closing: u16,
+    /// Share of each residual that corrects the estimate, 0–1: 0 trusts the
+    /// model alone, 1 the sensor alone.
+    pub observer: T,
+    /// Share of each prediction error that enters its average, 0–1 per sample.
+    pub bias_rate: T,
+    /// Integral action, 1 per sample.
+    pub integral_rate: T,
+    /// Neither bias nor integral corrects more than this, y.
+    pub correction_limit: T,
+    /// A residual counts as no more than this, y: one bad reading does no harm.
+    pub residual_limit: T,
+}
+
+/// A constant of the law that makes no sense.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Unusable {
+    /// A share or rate is not within 0–1, or a limit is negative or not finite.
+    Constant(&'static str),
+    /// The look-ahead memory has fewer samples than the delay, valve and half a
+    /// hold time together.
+    LookAhead,
+    /// Tracking needs the full model; an averaged model (eq. 15) does not see
+    /// single switches.
+    AveragedModel,
+}
+
+impl fmt::Display for Unusable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Constant(name) => write!(f, "`{name}` of the tracking law is out of range"),
+            Self::LookAhead => f.write_str(
+                "the look-ahead memory is shorter than delay, valve and half a hold time; enlarge it",
+            ),
+            Self::AveragedModel => f.write_str(
+                "the tracking law needs a full model; identify without averaging",
+            ),
+        }
+    }
+}
+
+impl core::error::Error for Unusable {}
+
+/// What the law remembers: the model's state `S` and look-ahead memory for `A` samples.
+#[derive(Clone, Copy, Debug)]
+pub struct TrackingState<T, S, const A: usize> {
+    /// The model at the estimate of the present.
+    pub model: S,
+    outputs: [T; A],
+    jets: [T; A],
+    /// Predictions `lead` ahead, the newest made last.
+    predictions: DelayLine<T, A>,
+    hold: Hold,
+    purse: Purse,
+    reference: T,
+    bias: T,
+    integral: T,
+    /// Samples since the start, saturating.
+    age: u32,
+    /// Consecutive samples without a reading, saturating.
+    lost: u32,
+}
+
+/// What the law decided at a sample, and why.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Decision<T> {
+    /// The valve's position from now to the next sample.
+    pub on: bool,
+    /// The reference in force (ramped).
+    pub reference: T,
+    /// The friction foreseen where the decision was taken, corrections included.
+    pub foreseen: T,
+    /// From now to the arrival of this decision, samples.
+    pub delay: u16,
+    /// The estimate of the present friction.
+    pub estimate: T,
+    /// Reading minus what the model says the sensor shows; 0 without a reading.
+    pub residual: T,
+    /// Filtered error of past predictions.
+    pub bias: T,
+    /// Consecutive samples without a reading: the law runs on the model alone.
+    pub lost: u32,
+}
+
+impl<T: Real> Tracking<T> {
+    /// Checks the constants for `model` and a look-ahead memory of `A` samples.
+    ///
+    /// # Errors
+    /// [`Unusable`] names what is wrong.
+    pub fn validate<M: Parts<T>, const A: usize>(
+        &self,
+        model: &M,
+        longest_delay: u16,
+    ) -> Result<(), Unusable> {
+        if model.averaging().averaged_model {
+            return Err(Unusable::AveragedModel);
+        }
+        for (name, share) in [
+            ("observer", self.observer),
+            ("bias_rate", self.bias_rate),
+            ("integral_rate", self.integral_rate),
+        ] {
+            if !(share >= T::ZERO && share <= T::ONE) {
+                return Err(Unusable::Constant(name));
+            }
+        }
+        for (name, limit) in [
+            ("correction_limit", self.correction_limit),
+            ("residual_limit", self.residual_limit),
+            ("slope", self.slope),
+        ] {
+            if !(limit >= T::ZERO && limit.value() < f64::MAX) {
+                return Err(Unusable::Constant(name));
+            }
+        }
+        if self.lead == 0 {
+            return Err(Unusable::Constant("lead"));
+        }
+        let half_hold = self.hold.of(true).max(self.hold.of(false)).div_ceil(2) as usize;
+        let needed = usize::from(longest_delay)
+            + usize::from(self.opening.max(self.closing))
+            + half_hold
+            + 2;
+        if needed > A || usize::from(self.lead) >= A {
+            return Err(Unusable::LookAhead);
+        }
+        Ok(())
+    }
+
+    /// The law at rest; `model_state` comes from [`Parts::on_off_state`] or
+    /// [`Parts::graded_state`].
+    pub fn start<S, const A: usize>(&self, model_state: S) -> TrackingState<T, S, A> {
+        const { assert!(A > 1, "the law looks ahead at least one sample") };
+        TrackingState {
+            model: model_state,
+            outputs: [T::ZERO; A],
+            jets: [T::ZERO; A],
+            predictions: DelayLine::new(),
+            hold: Hold::closed(),
+            purse: self.budget.full(),
+            reference: T::ZERO,
+            bias: T::ZERO,
+            integral: T::ZERO,
+            age: 0,
+            lost: 0,
+        }
+    }
+
+    /// Changes the reference.
+    ///
+    /// # Errors
+    /// [`Unreachable`], and the reference stays as it was.
+    pub fn set_reference(&mut self, reference: T) -> Result<(), Unreachable> {
+        self.reachable.check(reference)?;
+        self.reference = reference;
+        Ok(())
+    }
+
+    /// One sample: decides the valve's position with all that is known, then
+    /// takes in the reading. The reading of a sample therefore acts one sample
+    /// later, and the decision does not wait for the converter.
+    ///
+    /// Costs at most `A` + 1 model steps, of N1 + N3·(N2 + 1) multiply–adds each.
+    pub fn step<M, Y, J, const A: usize>(
+        &self,
+        model: &M,
+        state: &mut TrackingState<T, StateOf<T, M, Y, J>, A>,
+        measured: Measurement<T>,
+        channels: &[T],
+    ) -> Decision<T>
+    where
+        M: Parts<T>,
+        Y: Memory<T>,
+        J: Memory<T>,
+        <M::Effects as Effect<T>>::State: Clone,
+    {
+        state.reference = ramp(state.reference, self.reference, self.slope);
+        let was_on = state.hold.is_on();
+        let target = state.reference + state.integral - state.bias;
+        let may_switch = state.hold.may_switch(&self.hold);
+        // The position to judge: the other one, where the valve is free to take it.
+        let look = self.look_ahead(model, state, was_on != may_switch, channels);
+        let wanted = if !may_switch {
+            was_on
+        } else if was_on {
+            look.foreseen <= target
+        } else {
+            look.foreseen < target
+        };
+        let wanted = self
+            .budget
+            .allow(&state.purse, &state.hold, &self.hold, wanted);
+        let on = state.hold.pass(&self.hold, wanted);
+        self.budget.book(&mut state.purse, was_on, on);
+
+        let input = Input {
+            command: if on { T::ONE } else { T::ZERO },
+            channels,
+        };
+        let output = observe(model, &mut state.model, &input);
+        let residual = measured
+            .filter(|y| y.abs().value() < f64::MAX)
+            .map(|y| limited(y - output.measured, self.residual_limit));
+        self.correct(state, output.flow, residual, look.at_lead);
+        let next = output.next + self.observer * residual.unwrap_or(T::ZERO);
+        state.model.advance(next, model.averaging().window);
+        Decision {
+            on,
+            reference: state.reference,
+            foreseen: look.foreseen + state.bias - state.integral,
+            delay: look.delay,
+            estimate: output.flow,
+            residual: residual.unwrap_or(T::ZERO),
+            bias: state.bias,
+            lost: state.lost,
+        }
+    }
+
+    /// Runs the model on with the valve at `on` from now.
+    fn look_ahead<M, Y, J, const A: usize>(
+        &self,
+        model: &M,
+        state: &mut TrackingState<T, StateOf<T, M, Y, J>, A>,
+        on: bool,
+        channels: &[T],
+    ) -> Look<T>
+    where
+        M: Parts<T>,
+        Y: Memory<T>,
+        J: Memory<T>,
+    {
+        let hold = self.hold.of(on);
+        let valve = u32::from(if on { self.opening } else { self.closing });
+        // Half a hold time beyond the arrival; for an odd one, the mean of the
+        // two samples around it.
+        let (near, far) = (valve + hold / 2, valve + hold.div_ceil(2));
+        let input = Input {
+            command: if on { T::ONE } else { T::ZERO },
+            channels,
+        };
+        let mut ahead = state.model.ahead(&mut state.outputs, &mut state.jets);
+        let mut look = Look {
+            foreseen: ahead.outputs.back(0),
+            at_lead: ahead.outputs.back(0),
+            delay: 0,
+        };
+        let mut arrived_for = 0;
+        for i in 0..A {
+            let before = ahead.outputs.back(0);
+            let next = step(model, &mut ahead, &input).next;
+            if i + 1 == usize::from(self.lead) {
+                look.at_lead = next;
+            }
+            if ahead.jets.was_consulted() {
+                arrived_for += 1;
+            } else {
+                look.delay = (i + 1) as u16;
+            }
+            if arrived_for <= near {
+                look.foreseen = next;
+            }
+            if near == 0 && arrived_for == 1 {
+                look.foreseen = before;
+            }
+            if arrived_for >= far && i + 1 >= usize::from(self.lead) {
+                if far > near {
+                    look.foreseen = (look.foreseen + next) / (T::ONE + T::ONE);
+                }
+                break;
+            }
+        }
+        look
+    }
+
+    /// Bias and integral from the reading of this sample.
+    fn correct<S, const A: usize>(
+        &self,
+        state: &mut TrackingState<T, S, A>,
+        estimate: T,
+        residual: Option<T>,
+        at_lead: T,
+    ) {
+        state.predictions.push(at_lead);
+        state.age = state.age.saturating_add(1);
+        let Some(residual) = residual else {
+            state.lost = state.lost.saturating_add(1);
+            return;
+        };
+        state.lost = 0;
+        // Predictions begin to come due `lead` samples after the start.
+        if state.age <= u32::from(self.lead) {
+            return;
+        }
+        let flow = estimate + residual;
+        let missed = flow - state.predictions.back(usize::from(self.lead));
+        let bias = state.bias + self.bias_rate * (missed - state.bias);
+        state.bias = limited(bias, self.correction_limit);
+        // While the valve stands still the reference is out of reach for now and
+        // the integral waits.
+        if state.hold.since() < 4 * u32::from(self.lead) {
+            let integral = state.integral + self.integral_rate * (state.reference - flow);
+            state.integral = limited(integral, self.correction_limit);
+        }
+    }
+}
+
+/// What looking ahead found.
+struct Look<T> {
+    /// The friction half a hold time after the arrival.
+    foreseen: T,
+    /// The friction `lead` samples from now.
+    at_lead: T,
+    /// Samples from now to the arrival.
+    delay: u16,
+}
+
+#[inline]
+fn limited<T: Real>(value: T, limit: T) -> T {
+    value.at_most(limit).at_least(-limit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::StateDependentDelay;
+    use crate::model::{Averaging, Params};
+    use crate::recursion::LagConvention;
+    use nalgebra::{SMatrix, SVector};
+
+    type TableTwo<T> = Params<T, 5, 10, 1, StateDependentDelay<T>, ()>;
+
+    fn table_two<T: Real>(convention: LagConvention) -> TableTwo<T> {
+        let number = T::from_f64;
+        Params {
+            convention,
+            averaging: Averaging {
+                window: 250,
+                averaged_model: false,
+            },
+            constant: T::ZERO,
+            state_lags: [1, 44, 123, 479, 496],
+            a: SVector::from([0.9759, 0.0141, 0.0025, -0.0042, 0.0055].map(number)),
+            product_lags: [1, 73, 242, 264, 299, 335, 414, 477, 494, 500],
+            b: SVector::from([number(0.0080)]),
+            c: SMatrix::from([[
+                -0.0228, 0.0138, 0.0621, -0.0286, -0.0186, -0.0121, -0.0035, -0.0056, 0.0189,
+                -0.0049,
+            ]
+            .map(number)]),
+            delay: StateDependentDelay {
+                floor: number(47.35),
+                rise: number(12.69),
+                rate: number(20.18),
+                factors: [T::ONE],
+            },
+            effects: (),
+        }
+    }
+
+    fn law<T: Real>(reference: f64, dwell: u32) -> Tracking<T> {
+        Tracking {
+            reference: T::from_f64(reference),
+            reachable: Reachable {
+                low: T::ZERO,
+                high: T::from_f64(1.0667),
+            },
+            slope: T::ZERO,
+            hold: HoldTimes {
+                on: dwell,
+                off: dwell,
+            },
+            budget: Budget::default(),
+            lead: 47,
+            opening: 0,
+            closing: 0,
+            observer: T::from_f64(0.1),
+            bias_rate: T::from_f64(0.005),
+            integral_rate: T::ZERO,
+            correction_limit: T::from_f64(0.3),
+            residual_limit: T::ONE,
+        }
+    }
+
+    struct Run {
+        rms: f64,
+        mean: f64,
+        peak_to_peak: f64,
+        switches_per_s: f64,
+        duty: f64,
+    }
+
+    /// The law on its own model, judged from 5 s to 20 s.
+    fn run<T: Real>(convention: LagConvention, reference: f64, dwell: u32) -> Run {
+        let model = table_two::<T>(convention);
+        let law = law::<T>(reference, dwell);
+        law.validate::<_, 96>(&model, 60).unwrap();
+        let mut plant = model.on_off_state::<512, 4>();
+        let mut state = law.start::<_, 96>(model.on_off_state::<512, 4>());
+        let (mut sum, mut squares, mut low, mut high) = (0.0, 0.0, f64::MAX, f64::MIN);
+        let (mut switches, mut open, mut before, mut count) = (0.0, 0.0, false, 0.0);
+        for k in 0..20_000 {
+            let y = plant.outputs.back(0);
+            let on = law.step(&model, &mut state, Some(y), &[]).on;
+            let command = if on { T::ONE } else { T::ZERO };
+            step(
+                &model,
+                &mut plant,
+                &Input {
+                    command,
+                    channels: &[],
+                },
+            );
+            if k >= 5000 {
+                let y = y.value();
+                sum += y;
+                squares += (y - reference) * (y - reference);
+                low = low.min(y);
+                high = high.max(y);
+                switches += f64::from(u8::from(on != before));
+                open += f64::from(u8::from(on));
+                count += 1.0;
+            }
+            before = on;
+        }
+        Run {
+            rms: (squares / count).sqrt(),
+            mean: sum / count,
+            peak_to_peak: high - low,
+            switches_per_s: switches / 15.0,
+            duty: open / count,
+        }
+    }
+
+    #[test]
+    fn table_of_the_theory() {
+        for c in [LagConvention::Literal, LagConvention::OneStep] {
+            for y in [0.5, 0.8, 0.95] {
+                for d in [10, 1] {
+                    let r = run::<f64>(c, y, d);
+                    std::println!(
+                        "{c:?} {y} dwell {d}: rms {:.4} mean {:.4} p2p {:.3} sw {:.0} duty {:.3}",
+                        r.rms,
+                        r.mean,
+                        r.peak_to_peak,
+                        r.switches_per_s,
+                        r.duty
+                    );
+                }
+            }
+        }
+    }
+}

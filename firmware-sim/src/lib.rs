@@ -4,6 +4,7 @@
 
 mod waveform;
 
+pub mod closed_loop;
 pub mod command;
 pub mod dataset;
 pub mod dde;

@@ -1,0 +1,114 @@
+//! What a closed-loop run amounts to.
+
+use super::Trace;
+use crate::plant::SAMPLE_PERIOD_S;
+
+/// Figures of a run against its reference, in y and SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Figures {
+    /// Mean friction gain.
+    pub mean: f64,
+    /// Root mean square of friction minus reference.
+    pub rms: f64,
+    /// Mean of friction minus reference.
+    pub offset: f64,
+    /// Highest minus lowest friction.
+    pub peak_to_peak: f64,
+    /// Valve switches per second, opening and closing counted.
+    pub switches_per_s: f64,
+    /// Share of time with the valve open: the air used, relative to steady blowing.
+    pub air: f64,
+    /// From the start until the 100 ms mean of the friction stays within 5 % of
+    /// the last reference; `None` if it never does.
+    pub settling_s: Option<f64>,
+}
+
+/// Samples over which the friction is averaged before it is called settled.
+const SETTLED_MEAN: usize = 100;
+
+impl Figures {
+    /// The figures of `trace` from sample `from` on; settling from the start.
+    /// A part without samples gives zeros.
+    #[must_use]
+    pub fn of(trace: &Trace, from: usize) -> Self {
+        let judged = trace.samples.get(from..).unwrap_or_default();
+        let count = judged.len().max(1) as f64;
+        let mean = judged.iter().map(|s| s.friction).sum::<f64>() / count;
+        let offset = judged.iter().map(|s| s.friction - s.reference).sum::<f64>() / count;
+        let square: f64 = judged
+            .iter()
+            .map(|s| (s.friction - s.reference).powi(2))
+            .sum();
+        let (low, high) = judged.iter().fold((f64::MAX, f64::MIN), |(low, high), s| {
+            (low.min(s.friction), high.max(s.friction))
+        });
+        let switches = judged.windows(2).filter(|w| w[0].on != w[1].on).count();
+        let open = judged.iter().filter(|s| s.on).count();
+        Self {
+            mean,
+            rms: (square / count).sqrt(),
+            offset,
+            peak_to_peak: (high - low).max(0.0),
+            switches_per_s: switches as f64 / (count * SAMPLE_PERIOD_S),
+            air: open as f64 / count,
+            settling_s: settling(trace),
+        }
+    }
+}
+
+fn settling(trace: &Trace) -> Option<f64> {
+    let reference = trace.samples.last()?.reference;
+    let unsettled = trace.samples.windows(SETTLED_MEAN).rposition(|window| {
+        let mean = window.iter().map(|s| s.friction).sum::<f64>() / SETTLED_MEAN as f64;
+        (mean - reference).abs() > 0.05 * reference.abs()
+    });
+    let last_window = trace.samples.len().checked_sub(SETTLED_MEAN)?;
+    match unsettled {
+        None => Some(0.0),
+        Some(at) if at == last_window => None,
+        Some(at) => Some((at + SETTLED_MEAN) as f64 * SAMPLE_PERIOD_S),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Sample;
+    use super::*;
+
+    #[test]
+    fn a_square_wave_about_its_reference() {
+        let sample = |k: usize| Sample {
+            reference: 0.5,
+            friction: match (k < 1000, k % 20 < 10) {
+                (true, _) => 0.0,
+                (false, high) => 0.5 + if high { 0.1 } else { -0.1 },
+            },
+            reading: None,
+            on: k % 20 < 5,
+        };
+        let trace = Trace {
+            samples: (0..5000).map(sample).collect(),
+        };
+        let figures = Figures::of(&trace, 1000);
+        assert!((figures.mean - 0.5).abs() < 1e-12 && figures.offset.abs() < 1e-12);
+        assert!((figures.rms - 0.1).abs() < 1e-12);
+        assert!((figures.peak_to_peak - 0.2).abs() < 1e-12);
+        assert!((figures.air - 0.25).abs() < 1e-12);
+        assert!((figures.switches_per_s - 100.0).abs() < 0.5);
+        assert!((figures.settling_s.unwrap() - 1.1).abs() < 0.02);
+    }
+
+    #[test]
+    fn a_run_that_never_arrives_never_settles() {
+        let sample = Sample {
+            reference: 1.0,
+            friction: 0.5,
+            reading: None,
+            on: true,
+        };
+        let trace = Trace {
+            samples: vec![sample; 500],
+        };
+        assert_eq!(Figures::of(&trace, 0).settling_s, None);
+    }
+}

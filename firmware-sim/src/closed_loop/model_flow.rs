@@ -1,0 +1,41 @@
+//! A model as the flow: what a law does when everything is as identified.
+
+use super::Flow;
+use model_core::history::Memory;
+use model_core::model::StateOf;
+use model_core::{Input, Parts, Real, step};
+
+/// A model of `model-core` in the place of the flow.
+pub struct ModelFlow<'a, T: Real, M: Parts<T>, Y, J> {
+    model: &'a M,
+    state: StateOf<T, M, Y, J>,
+    channels: Vec<T>,
+}
+
+impl<'a, T: Real, M: Parts<T>, Y: Memory<T>, J: Memory<T>> ModelFlow<'a, T, M, Y, J> {
+    /// The model at rest, its channels held at `channels`.
+    pub fn new(model: &'a M, at_rest: StateOf<T, M, Y, J>, channels: Vec<T>) -> Self {
+        Self {
+            model,
+            state: at_rest,
+            channels,
+        }
+    }
+}
+
+impl<T: Real, M: Parts<T>, Y: Memory<T>, J: Memory<T>> Flow for ModelFlow<'_, T, M, Y, J> {
+    /// The reading belongs to the sample in which the command acts: sensor
+    /// effects of the model are one sample old.
+    fn step(&mut self, command: bool) -> Option<f64> {
+        let input = Input {
+            command: if command { T::ONE } else { T::ZERO },
+            channels: &self.channels,
+        };
+        let output = step(self.model, &mut self.state, &input);
+        let shown = output.measured.value() - output.flow.value();
+        Some(output.next.value() + shown)
+    }
+    fn friction(&self) -> f64 {
+        self.state.outputs.back(0).value()
+    }
+}

@@ -1,0 +1,47 @@
+//! The plain relay: what one builds first.
+
+use super::Controller;
+use model_core::control::{Hold, HoldTimes};
+
+/// On below the reference, off above it, with a dead zone and hold times; no
+/// thought for what is already on its way.
+#[derive(Clone, Copy, Debug)]
+pub struct Relay {
+    times: HoldTimes,
+    /// Half the dead zone, y.
+    half_band: f64,
+    reference: f64,
+    hold: Hold,
+    wanted: bool,
+}
+
+impl Relay {
+    /// A relay that switches on at `half_band` (y, ≥ 0) below the reference and
+    /// off at as much above.
+    #[must_use]
+    pub fn new(times: HoldTimes, half_band: f64) -> Self {
+        Self {
+            times,
+            half_band,
+            reference: 0.0,
+            hold: Hold::closed(),
+            wanted: false,
+        }
+    }
+}
+
+impl Controller for Relay {
+    fn set_reference(&mut self, reference: f64) {
+        self.reference = reference;
+    }
+    fn command(&mut self, reading: Option<f64>) -> bool {
+        if let Some(y) = reading {
+            if y < self.reference - self.half_band {
+                self.wanted = true;
+            } else if y > self.reference + self.half_band {
+                self.wanted = false;
+            }
+        }
+        self.hold.pass(&self.times, self.wanted)
+    }
+}

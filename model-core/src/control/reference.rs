@@ -88,10 +88,11 @@ impl<T: Real> Reachable<T> {
 #[inline]
 #[must_use]
 pub fn ramp<T: Real>(now: T, goal: T, slope: T) -> T {
-    if !(slope > T::ZERO) {
-        return goal;
+    if slope > T::ZERO {
+        goal.at_most(now + slope).at_least(now - slope)
+    } else {
+        goal
     }
-    goal.at_most(now + slope).at_least(now - slope)
 }
 
 #[cfg(test)]

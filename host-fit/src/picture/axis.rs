@@ -113,7 +113,7 @@ impl Axis {
         let step = [1.0, 2.0, 5.0, 10.0]
             .into_iter()
             .map(|m| m * decade)
-            .find(|step| *step >= rough * 0.999)
+            .find(|step| *step >= rough * 0.75)
             .unwrap_or(10.0 * decade);
         let first = (self.lo / step - 1e-6).ceil();
         let last = (self.hi / step + 1e-6).floor();

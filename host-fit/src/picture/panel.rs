@@ -85,7 +85,7 @@ impl Panel {
 
     /// Grid, lower and left axis and the ticks of y with its label.
     pub(super) fn frame(&self, canvas: &mut Canvas<'_>, y_label: &str) {
-        self.grid(canvas, y_label, (self.height / 36.0).max(2.0) as usize);
+        self.grid(canvas, y_label, (self.height / 44.0).max(2.0) as usize);
     }
 
     fn grid(&self, canvas: &mut Canvas<'_>, y_label: &str, count: usize) {

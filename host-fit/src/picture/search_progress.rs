@@ -3,10 +3,13 @@
 use super::axis::{Axis, extent};
 use super::canvas::{Ink, MARGIN, WIDTH, draw};
 use super::legend::{Swatch, heading, nothing};
-use super::overlay::named;
+use super::overlay::{named, union};
 use super::palette::{INK, series};
 use super::panel::{FOOT, Panel, left_edge};
 use super::strip::columns;
+
+/// The last count over the first one shown.
+const SHOWN: f64 = 200.0;
 
 /// One search.
 #[derive(Clone, Copy, Debug, Default)]
@@ -31,15 +34,16 @@ pub struct SearchProgress<'a> {
     pub reference: Option<(&'a str, f64)>,
 }
 
-/// Draws the progress of searches as steps. Returns SVG.
+/// Draws the progress of searches as steps, from half a per cent of the evaluations on.
+/// Returns SVG.
 #[must_use]
 pub fn search_progress(plot: &SearchProgress<'_>) -> String {
     let description = format!("{}: best objective against evaluations", plot.title);
     draw(&description, |canvas| {
         let points = || plot.runs.iter().flat_map(|r| r.best).copied();
-        let Some((lowest, highest)) = extent(points().map(|p| p.1)) else {
+        if extent(points().map(|p| p.1)).is_none() {
             return nothing(canvas, plot.title, "No evaluation succeeded.");
-        };
+        }
         let mut entries: Vec<_> = plot
             .runs
             .iter()
@@ -57,30 +61,27 @@ pub fn search_progress(plot: &SearchProgress<'_>) -> String {
         }
         let top = heading(canvas, plot.title, &entries);
 
-        let low = reference.map_or(lowest, |r| r.1.min(lowest));
-        // The first points of a search may be anything; the interesting part is near its end.
-        let start = plot
+        let counts = extent(points().map(|p| p.0).filter(|n| *n >= 1.0));
+        // Any point is better than the first ones; what counts is how a search ends.
+        let shown = counts.map(|(few, many)| (few.max(many / SHOWN), many));
+        let from = shown.map_or(f64::NEG_INFINITY, |s| s.0);
+        let most = columns(WIDTH, plot.runs.len());
+        let steps: Vec<Vec<(f64, f64)>> = plot
             .runs
             .iter()
-            .filter_map(|r| r.best.get(r.best.len().min(4).checked_sub(1)?))
-            .map(|p| p.1)
-            .fold(low, |m, v| if v.is_finite() { m.max(v) } else { m });
-        let high = if highest > low + 4.0 * (start - low) && start > low {
-            start + 0.5 * (start - low)
-        } else {
-            highest.max(reference.map_or(highest, |r| r.1))
-        };
-        let y = Axis::padded(Some((low, high)), 0.06);
-        let counts = extent(points().map(|p| p.0).filter(|n| *n >= 1.0));
+            .map(|run| staircase(run.best, from, most))
+            .collect();
+        let values = extent(steps.iter().flatten().map(|p| p.1));
+        let y = Axis::padded(union(values, reference.map(|r| (r.1, r.1))), 0.06);
         let left = left_edge([&y]);
         let panel = Panel {
             left,
             top,
             width: WIDTH - left - MARGIN - 16.0,
             height: 300.0,
-            x: match counts {
-                Some((few, many)) if many / few > 50.0 => Axis::logarithmic(counts),
-                _ => Axis::linear(counts.map(|(few, many)| (few.min(0.0), many))),
+            x: match shown {
+                Some((few, many)) if many / few > 20.0 => Axis::logarithmic(shown),
+                _ => Axis::linear(shown),
             },
             y,
         };
@@ -89,19 +90,7 @@ pub fn search_progress(plot: &SearchProgress<'_>) -> String {
         if let Some((_, value)) = reference {
             panel.level(canvas, value, Ink::new(INK, 1.5));
         }
-        let most = columns(panel.width, plot.runs.len());
-        for (index, run) in plot.runs.iter().enumerate() {
-            // Progress only falls, so any subset of its steps that has the last is true.
-            let stride = run.best.len().div_ceil(most).max(1);
-            let kept = run.best.iter().rev().step_by(stride).rev();
-            let mut before = None;
-            let mut steps = Vec::new();
-            for &(count, value) in kept.filter(|p| p.0.is_finite() && p.1.is_finite()) {
-                if let Some(before) = before.replace(value) {
-                    steps.push((count, before));
-                }
-                steps.push((count, value));
-            }
+        for (index, steps) in steps.into_iter().enumerate() {
             let last = steps.last().and_then(|p| panel.point(p.0, p.1));
             panel.curve(canvas, steps, Ink::new(series(index), 2.0));
             if let Some(last) = last {
@@ -111,6 +100,25 @@ pub fn search_progress(plot: &SearchProgress<'_>) -> String {
         panel.foot(canvas, "Evaluations of the objective");
         panel.bottom() + FOOT
     })
+}
+
+/// Corners of the steps through `best` from the count `from` on, of at most `most` steps.
+fn staircase(best: &[(f64, f64)], from: f64, most: usize) -> Vec<(f64, f64)> {
+    let stride = best.len().div_ceil(most.max(1)).max(1);
+    // Thinned from the end, so that the result of the search stays.
+    let kept = best.iter().rev().step_by(stride).rev();
+    let mut corners = Vec::new();
+    let mut held = None;
+    for &(count, value) in kept.filter(|p| p.0.is_finite() && p.1.is_finite()) {
+        if count >= from {
+            corners.extend(held.map(|before| (count, before)));
+            corners.push((count, value));
+        } else {
+            corners = vec![(from, value)];
+        }
+        held = Some(value);
+    }
+    corners
 }
 
 #[cfg(test)]
@@ -131,6 +139,23 @@ mod tests {
         check(&svg);
         let words = words(&svg);
         assert!(words.contains("MADS: 1.2571") && words.contains("paper: 1.2576"));
+    }
+
+    #[test]
+    fn steps_before_the_first_count_shown_are_held_there() {
+        let best = [(1.0, 9.0), (5.0, 4.0), (50.0, 2.0), (90.0, 1.0)];
+        assert_eq!(
+            staircase(&best, 20.0, 100),
+            [
+                (20.0, 4.0),
+                (50.0, 4.0),
+                (50.0, 2.0),
+                (90.0, 2.0),
+                (90.0, 1.0)
+            ]
+        );
+        assert_eq!(staircase(&best, 95.0, 100), [(95.0, 1.0)]);
+        assert_eq!(staircase(&best, 0.0, 2).last(), Some(&(90.0, 1.0)));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The model file `model.toml`.
 
-use super::{Added, Delay, Model, Start, Training};
+use super::{Added, Delay, Law, Model, Start, Training};
 use crate::output::{self, OutputError};
 use model_core::effects;
 use model_core::model::Averaging;
@@ -73,6 +73,8 @@ struct File {
     effect: Vec<EffectTable>,
     #[serde(default)]
     training: Training,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    law: Option<Law>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -217,6 +219,7 @@ impl File {
             delay: model.delay.clone(),
             effect: model.effects.iter().map(EffectTable::of).collect(),
             training: model.training.clone(),
+            law: model.law.clone(),
         }
     }
 
@@ -333,6 +336,9 @@ impl File {
                 }
             }
         }
+        if let Some(fault) = self.law.as_ref().and_then(Law::fault) {
+            return Err(fault);
+        }
         let added = self.effect.into_iter().map(EffectTable::into_added);
         Ok(Model {
             sample_period_s: self.sample_period_s,
@@ -351,6 +357,7 @@ impl File {
             delay: self.delay,
             effects: added.collect::<Result<_, _>>()?,
             training: self.training,
+            law: self.law,
         })
     }
 }
@@ -408,6 +415,7 @@ impl EffectTable {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Hold, Maximise, Track};
     use super::*;
 
     fn example() -> Model {
@@ -430,6 +438,7 @@ mod tests {
             },
             effects: Vec::new(),
             training: Training::default(),
+            law: None,
         };
         for name in ["hot-film-lag", "valve-lag"] {
             let spec = effects::spec(name).expect("in the catalogue");
@@ -448,6 +457,45 @@ mod tests {
         let moved = model.with_values(&model.values());
         assert_eq!(moved, model);
         assert_eq!(model.values().len(), model.coordinates().len());
+    }
+
+    #[test]
+    fn a_law_survives_and_its_faults_are_named() {
+        let law = Track {
+            reference: 0.8,
+            reachable: [0.0, 1.05],
+            slope: 0.0,
+            hold: Hold { on: 10, off: 12 },
+            switches: Some([20, 10]),
+            air: None,
+            lead: 47,
+            opening: 3,
+            closing: 0,
+            look_ahead: 80,
+            observer: 0.03,
+            bias_rate: 0.002,
+            integral_rate: 0.001,
+            correction_limit: 0.3,
+            residual_limit: 0.25,
+        };
+        let mut model = example();
+        model.law = Some(Law::Track(law.clone()));
+        let read = Model::from_toml(&model.to_toml(), "m").expect("own file");
+        assert_eq!(read, model);
+        model.law = Some(Law::Track(Track {
+            reference: 1.2,
+            ..law
+        }));
+        let error = Model::from_toml(&model.to_toml(), "m").expect_err("unreachable");
+        assert!(error.to_string().contains("law.reference"), "{error}");
+        model.law = Some(Law::Maximise(Maximise {
+            period: 250,
+            pulses: vec![(0, 100)],
+            hold: Hold { on: 10, off: 10 },
+            air_price: 0.0,
+        }));
+        let read = Model::from_toml(&model.to_toml(), "m").expect("own file");
+        assert_eq!(read, model);
     }
 
     #[test]

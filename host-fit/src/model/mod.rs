@@ -1,10 +1,12 @@
 //! An identified model with sizes known at run time.
 
 mod file;
+mod law;
 mod parameters;
 mod prepared;
 
 pub use file::{FORMAT_VERSION, ModelError};
+pub use law::{Hold, Law, Maximise, Track};
 pub use parameters::{Coordinate, Kind};
 pub use prepared::{AnyDelay, Chain, Prepared};
 
@@ -43,6 +45,8 @@ pub struct Model {
     pub effects: Vec<Added>,
     /// What the model was trained on.
     pub training: Training,
+    /// The control law designed for the model, if one was.
+    pub law: Option<Law>,
 }
 
 /// How a free run begins.

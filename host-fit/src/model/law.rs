@@ -1,0 +1,174 @@
+//! The control law that `design` writes into a model file.
+
+use model_core::Real;
+use model_core::control::budget::Budget;
+use model_core::control::{Air, HoldTimes, PulseTrain, Reachable, Switches, Tracking};
+use serde::{Deserialize, Serialize};
+
+/// A law for the valve, designed for the model it is stored with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "goal", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Law {
+    /// Holds the friction at a reference.
+    Track(Track),
+    /// Plays the pulses that give the most friction for the air.
+    Maximise(Maximise),
+}
+
+/// Shortest times of the valve, samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hold {
+    /// Shortest on time, samples.
+    pub on: u32,
+    /// Shortest off time, samples.
+    pub off: u32,
+}
+
+/// The constants of [`Tracking`], times in samples.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Track {
+    /// The friction to hold, y of the flow.
+    pub reference: f64,
+    /// What on/off blowing can hold: the open interval.
+    pub reachable: [f64; 2],
+    /// Fastest change of the reference, y per sample; 0 for steps.
+    pub slope: f64,
+    /// Shortest on and off times.
+    pub hold: Hold,
+    /// Samples per switch that the valve's budget allows, and switches saved up.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub switches: Option<[u32; 2]>,
+    /// Allowed share of air in 1/1000, and samples of blowing saved up.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub air: Option<[u32; 2]>,
+    /// Samples ahead at which predictions are judged.
+    pub lead: u16,
+    /// Samples from an opening command to half the jet.
+    pub opening: u16,
+    /// Samples from a closing command to half the jet.
+    pub closing: u16,
+    /// Look-ahead memory the law needs, samples.
+    pub look_ahead: u16,
+    /// Share of a residual that corrects the estimate.
+    pub observer: f64,
+    /// Share of a prediction error that enters its average, per sample.
+    pub bias_rate: f64,
+    /// Integral action, 1 per sample.
+    pub integral_rate: f64,
+    /// Limit of bias and integral, y.
+    pub correction_limit: f64,
+    /// Limit of a residual, y.
+    pub residual_limit: f64,
+}
+
+/// A pulse train; times in samples.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Maximise {
+    /// Length of the period.
+    pub period: u32,
+    /// First sample and length of each pulse.
+    pub pulses: Vec<(u32, u32)>,
+    /// Shortest on and off times.
+    pub hold: Hold,
+    /// Price of steady blowing, y, for which it is the best.
+    pub air_price: f64,
+}
+
+impl From<Hold> for HoldTimes {
+    fn from(hold: Hold) -> Self {
+        Self {
+            on: hold.on,
+            off: hold.off,
+        }
+    }
+}
+
+impl Track {
+    /// The law in numbers of type `T`.
+    #[must_use]
+    pub fn tracking<T: Real>(&self) -> Tracking<T> {
+        let number = T::from_f64;
+        Tracking {
+            reference: number(self.reference),
+            reachable: Reachable {
+                low: number(self.reachable[0]),
+                high: number(self.reachable[1]),
+            },
+            slope: number(self.slope),
+            hold: self.hold.into(),
+            budget: Budget {
+                switches: self.switches.map(|[samples_per_switch, saved]| Switches {
+                    samples_per_switch,
+                    saved,
+                }),
+                air: self.air.map(|[per_mille, saved]| Air { per_mille, saved }),
+            },
+            lead: self.lead,
+            opening: self.opening,
+            closing: self.closing,
+            observer: number(self.observer),
+            bias_rate: number(self.bias_rate),
+            integral_rate: number(self.integral_rate),
+            correction_limit: number(self.correction_limit),
+            residual_limit: number(self.residual_limit),
+        }
+    }
+}
+
+impl Maximise {
+    /// The pulses.
+    #[must_use]
+    pub fn train(&self) -> PulseTrain<Vec<(u32, u32)>> {
+        PulseTrain {
+            period: self.period,
+            pulses: self.pulses.clone(),
+        }
+    }
+}
+
+impl Law {
+    /// The key that makes no sense and why, if one does.
+    pub(super) fn fault(&self) -> Option<(String, String)> {
+        let fault = |key: &str, problem: &str| Some((format!("law.{key}"), problem.to_owned()));
+        match self {
+            Self::Track(law) => {
+                let [low, high] = law.reachable;
+                if !(low < high && law.reference > low && law.reference < high) {
+                    return fault("reference", "lies outside `law.reachable`");
+                }
+                let shares = [
+                    ("observer", law.observer),
+                    ("bias_rate", law.bias_rate),
+                    ("integral_rate", law.integral_rate),
+                ];
+                if let Some((key, _)) = shares.iter().find(|(_, x)| !(0.0..=1.0).contains(x)) {
+                    return fault(key, "must lie between 0 and 1");
+                }
+                let limits = [
+                    ("correction_limit", law.correction_limit),
+                    ("residual_limit", law.residual_limit),
+                    ("slope", law.slope),
+                ];
+                if let Some((key, _)) = limits.iter().find(|(_, x)| !(x.is_finite() && *x >= 0.0)) {
+                    return fault(key, "must be a finite number, 0 or above");
+                }
+                if law.lead == 0 || law.lead >= law.look_ahead {
+                    return fault("lead", "must be at least 1 and below `law.look_ahead`");
+                }
+                None
+            }
+            Self::Maximise(law) => {
+                if law.period == 0 || law.pulses.is_empty() {
+                    return fault("period", "a pulse train needs a period and a pulse");
+                }
+                if !law.air_price.is_finite() {
+                    return fault("air_price", "must be a finite number");
+                }
+                None
+            }
+        }
+    }
+}

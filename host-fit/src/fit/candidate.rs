@@ -1,0 +1,198 @@
+//! A base model refitted, all of it, with one more effect.
+
+use super::{Fit, FitOptions, fit};
+use crate::data::Record;
+use crate::model::{Delay, Model};
+use model_core::effect::{Parameter, Spec};
+use rayon::prelude::*;
+use thiserror::Error;
+
+/// How many starting points are followed to the end.
+const FOLLOWED: usize = 2;
+/// Most starting points that are tried.
+const MOST_STARTS: usize = 12;
+
+/// Why an effect could not be tried.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum CandidateError {
+    /// A record lacks the channel.
+    #[error(
+        "effect `{effect}` needs the measured channel `{channel}`, which record `{record}` does not have. \
+         Add the column `{channel}` to that record's CSV file, or choose another effect."
+    )]
+    MissingChannel {
+        /// The effect.
+        effect: String,
+        /// The channel.
+        channel: String,
+        /// The record.
+        record: String,
+    },
+    /// No starting point gave a stable free run.
+    #[error(
+        "effect `{effect}`: the free run diverges from every starting point. \
+         The model is close to unstable; identify it with fewer lags or with `--objective free-run`."
+    )]
+    Unstable {
+        /// The effect.
+        effect: String,
+    },
+}
+
+/// Refits `base` with `spec` added, from several starting points.
+///
+/// # Errors
+/// [`CandidateError`].
+pub fn fit_with_effect(
+    base: &Model,
+    spec: &'static Spec,
+    records: &[&Record],
+    options: &FitOptions,
+) -> Result<Fit, CandidateError> {
+    let reference = channel_reference(spec, records)?;
+    let brief = FitOptions {
+        iterations: 4,
+        ..*options
+    };
+    let scale = Scale::of(records);
+    let tried: Vec<Option<Fit>> = starts(base, spec, &scale, records)
+        .par_iter()
+        .map(|parameters| {
+            let mut model = base.clone();
+            model.add(spec, parameters, reference);
+            fit(&model, records, &brief).ok()
+        })
+        .collect();
+    let mut tried: Vec<Fit> = tried.into_iter().flatten().collect();
+    tried.sort_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
+    tried.truncate(FOLLOWED);
+    let finished: Vec<Option<Fit>> =
+        tried.par_iter().map(|start| fit(&start.model, records, options).ok()).collect();
+    finished
+        .into_iter()
+        .flatten()
+        .min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares))
+        .ok_or_else(|| CandidateError::Unstable {
+            effect: spec.name.to_owned(),
+        })
+}
+
+/// The mean of the effect's channel over the records.
+fn channel_reference(spec: &Spec, records: &[&Record]) -> Result<Option<f64>, CandidateError> {
+    let Some(channel) = spec.channel else {
+        return Ok(None);
+    };
+    let (mut sum, mut count) = (0.0, 0.0);
+    for record in records {
+        let Some(values) = record.channels.get(channel) else {
+            return Err(CandidateError::MissingChannel {
+                effect: spec.name.to_owned(),
+                channel: channel.to_owned(),
+                record: record.name.clone(),
+            });
+        };
+        sum += values.iter().sum::<f64>();
+        count += values.len() as f64;
+    }
+    Ok(Some(sum / f64::max(count, 1.0)))
+}
+
+/// The size of the signals: the catalogue's ranges are for signals of order 1.
+struct Scale {
+    y: f64,
+    u: f64,
+}
+
+impl Scale {
+    fn of(records: &[&Record]) -> Self {
+        let largest = |series: &dyn Fn(&Record) -> f64| {
+            let size = records.iter().map(|r| series(r)).fold(0.0, f64::max);
+            if (0.3..3.0).contains(&size) || size == 0.0 { 1.0 } else { size }
+        };
+        let size = |series: &[f64]| series.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        Self {
+            y: largest(&|record| size(&record.y)),
+            u: largest(&|record| size(&record.u)),
+        }
+    }
+
+    fn of_unit(&self, unit: &str) -> f64 {
+        match unit {
+            "y" | "y per sample" => self.y,
+            "1/y" => 1.0 / self.y,
+            "1/y²" => 1.0 / (self.y * self.y),
+            "1/u" => 1.0 / self.u,
+            "1/u²" => 1.0 / (self.u * self.u),
+            _ => 1.0,
+        }
+    }
+}
+
+/// Parameter vectors from which to set out.
+fn starts(base: &Model, spec: &Spec, scale: &Scale, records: &[&Record]) -> Vec<Vec<f64>> {
+    let delay = present_delay(base);
+    let period = base.sample_period_s;
+    match spec.name {
+        "state-dependent-delay" => vec![
+            vec![delay - 3.0, 10.0, 4.0],
+            vec![delay - 1.0, 10.0, 16.0],
+            vec![delay - 6.0, 10.0, 2.0],
+            vec![delay + 3.0, -8.0, 4.0],
+        ],
+        "edge-dependent-delay" => [(6.0, -6.0), (-6.0, 6.0), (18.0, -18.0), (1.0, -1.0)]
+            .iter()
+            .map(|(rise, fall)| {
+                let after = |shift: f64| ((delay + shift) * period).clamp(period, 0.5);
+                vec![after(*rise), after(*fall)]
+            })
+            .collect(),
+        "sensor-saturation" => {
+            let mut y: Vec<f64> = records.iter().flat_map(|r| r.y.iter().copied()).collect();
+            y.sort_by(f64::total_cmp);
+            let quantile = |q: f64| y.get((q * y.len() as f64) as usize).copied().unwrap_or(0.0);
+            let pairs = [(0.05, 0.95), (0.0, 0.9), (0.1, 0.999), (0.2, 0.8)];
+            pairs.iter().map(|(low, high)| vec![quantile(*low), quantile(*high)]).collect()
+        }
+        _ => product(spec.parameters, scale),
+    }
+}
+
+/// Every combination of the catalogue's starting values.
+fn product(parameters: &[Parameter], scale: &Scale) -> Vec<Vec<f64>> {
+    let mut all = vec![Vec::new()];
+    for parameter in parameters {
+        let unit = scale.of_unit(parameter.unit);
+        let extended = all.iter().flat_map(|start| {
+            parameter.starts.iter().map(move |value| {
+                let mut longer = start.clone();
+                longer.push(value * unit);
+                longer
+            })
+        });
+        all = extended.collect();
+    }
+    // Thinned evenly, so that no parameter keeps only its first value.
+    let stride = all.len().div_ceil(MOST_STARTS).max(1);
+    all.into_iter().step_by(stride).collect()
+}
+
+/// The first input's delay, about: in the middle of a law's range.
+fn present_delay(base: &Model) -> f64 {
+    match &base.delay {
+        Delay::Fixed { delays } => delays.first().copied().unwrap_or(0).into(),
+        Delay::StateDependent {
+            delay_floor,
+            delay_rise,
+            delay_rate,
+            factors,
+        } => {
+            let factor = factors.first().copied().unwrap_or(1.0);
+            factor * (delay_floor + delay_rise * (-0.5 * delay_rate).exp())
+        }
+        Delay::EdgeDependent {
+            rise_delay,
+            fall_delay,
+        } => 0.5 * (rise_delay + fall_delay) / base.sample_period_s,
+    }
+}

@@ -1,0 +1,184 @@
+//! The leanest bilinear model: one lag each, one input.
+//!
+//! A model with many free lags imitates slow effects (theory D.3: what is left
+//! of a plenum's droop behind 18 free coefficients is a twentieth). The leanest
+//! model has nothing to imitate with, so what it lacks stays visible.
+
+use super::{Fit, FitOptions, fit};
+use crate::data::Record;
+use crate::model::{Delay, Model, Start};
+use crate::simulate::SimulateError;
+use model_core::recursion::LagConvention;
+use rayon::prelude::*;
+
+/// Time constants from which the search sets out, s.
+const TIME_CONSTANTS: [f64; 3] = [0.02, 0.06, 0.2];
+
+/// y_{k+1} = a·y_k + (b + c·y_k)·u_{k−h}, fitted to the records in free run,
+/// with the kind of delay law that `given` has.
+///
+/// # Errors
+/// When no starting point gives a stable free run.
+pub fn lean_base(given: &Model, records: &[&Record]) -> Result<Fit, SimulateError> {
+    let level = steady_level(records);
+    let start = |delay: u16, time_constant: f64| {
+        let kept = (-given.sample_period_s / time_constant).exp();
+        Model {
+            convention: LagConvention::OneStep,
+            start: Start::Rest,
+            constant: 0.0,
+            state_lags: vec![1],
+            a: vec![kept],
+            product_lags: vec![1],
+            b: vec![(1.0 - kept) * level],
+            c: vec![0.0],
+            delay: Delay::Fixed {
+                delays: vec![delay],
+            },
+            effects: Vec::new(),
+            ..given.clone()
+        }
+    };
+    // The delays to set out from: spread evenly, and the given model's own.
+    let longest = (0.12 / given.sample_period_s).round().clamp(8.0, 400.0) as u16;
+    let mut delays: Vec<u16> = (0..8).map(|i| longest * i / 8 + longest / 16).collect();
+    delays.push(given.longest_delay().min(usize::from(u16::MAX)) as u16);
+    let brief = FitOptions {
+        iterations: 4,
+        ..FitOptions::default()
+    };
+    let starts: Vec<Model> = delays
+        .iter()
+        .flat_map(|h| TIME_CONSTANTS.iter().map(|time| start(*h, *time)))
+        .collect();
+    let tried: Vec<_> = starts.par_iter().map(|model| fit(model, records, &brief)).collect();
+    let mut best: Option<Fit> = None;
+    let mut refused = None;
+    for attempt in tried {
+        match attempt {
+            Ok(fit) if best.as_ref().is_none_or(|b| fit.sum_of_squares < b.sum_of_squares) => {
+                best = Some(fit);
+            }
+            Ok(_) => {}
+            Err(error) => refused = Some(error),
+        }
+    }
+    let best = match (best, refused) {
+        (Some(best), _) => best,
+        (None, Some(error)) => return Err(error),
+        (None, None) => fit(given, records, &brief)?,
+    };
+    let best = settle_fixed_delay(best, records)?;
+    match given.delay {
+        Delay::Fixed { .. } => Ok(best),
+        Delay::StateDependent { .. } | Delay::EdgeDependent { .. } => {
+            with_law_of(&best.model, given, records)
+        }
+    }
+}
+
+/// What y settles at under u = 1: the 95 % quantile of y while the input is on.
+fn steady_level(records: &[&Record]) -> f64 {
+    let mut ratios: Vec<f64> = records
+        .iter()
+        .flat_map(|record| record.y.iter().zip(&record.u))
+        .filter(|(_, u)| u.abs() > 0.1)
+        .map(|(y, u)| y / u)
+        .collect();
+    ratios.sort_by(f64::total_cmp);
+    ratios.get(ratios.len() * 95 / 100).copied().unwrap_or(1.0)
+}
+
+/// Moves a fixed first delay in ever smaller steps as long as the free run gains.
+///
+/// # Errors
+/// As [`fit`].
+pub fn settle_fixed_delay(mut best: Fit, records: &[&Record]) -> Result<Fit, SimulateError> {
+    let brief = FitOptions {
+        iterations: 3,
+        ..FitOptions::default()
+    };
+    for step in [8_i32, 4, 2, 1] {
+        loop {
+            let Delay::Fixed { delays } = &best.model.delay else {
+                return Ok(best);
+            };
+            let moved = |by: i32| {
+                let mut model = best.model.clone();
+                let shift = |h: &u16| (i32::from(*h) + by).clamp(0, i32::from(u16::MAX)) as u16;
+                model.delay = Delay::Fixed {
+                    delays: delays.iter().map(shift).collect(),
+                };
+                fit(&model, records, &brief)
+            };
+            let (up, down) = rayon::join(|| moved(step), || moved(-step));
+            let nearer = [up, down]
+                .into_iter()
+                .flatten()
+                .filter(|fit| fit.sum_of_squares < best.sum_of_squares * (1.0 - 1e-6))
+                .min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
+            match nearer {
+                Some(fit) => best = fit,
+                None => break,
+            }
+        }
+    }
+    fit(&best.model, records, &FitOptions::default())
+}
+
+/// The model with a delay law of the kind `given` has, from several starts.
+fn with_law_of(model: &Model, given: &Model, records: &[&Record]) -> Result<Fit, SimulateError> {
+    let delay = model.longest_delay() as f64;
+    let period = model.sample_period_s;
+    let laws: Vec<Delay> = match &given.delay {
+        Delay::Fixed { .. } => vec![model.delay.clone()],
+        Delay::StateDependent {
+            delay_floor,
+            delay_rise,
+            delay_rate,
+            factors,
+        } => {
+            let law = |delay_floor: f64, delay_rise: f64, delay_rate: f64| Delay::StateDependent {
+                delay_floor,
+                delay_rise,
+                delay_rate,
+                factors: vec![1.0],
+            };
+            let factor = factors.first().copied().unwrap_or(1.0);
+            vec![
+                law(factor * delay_floor, factor * delay_rise, *delay_rate),
+                law(delay - 3.0, 10.0, 4.0),
+                law(delay - 1.0, 10.0, 16.0),
+                law(delay - 6.0, 10.0, 2.0),
+            ]
+        }
+        Delay::EdgeDependent { .. } => [(4.0, -4.0), (-4.0, 4.0), (0.0, 0.0)]
+            .into_iter()
+            .map(|(rise, fall)| Delay::EdgeDependent {
+                rise_delay: ((delay + rise) * period).max(period),
+                fall_delay: ((delay + fall) * period).max(period),
+            })
+            .collect(),
+    };
+    let tried: Vec<_> = laws
+        .into_par_iter()
+        .map(|delay| {
+            let model = Model {
+                delay,
+                ..model.clone()
+            };
+            fit(&model, records, &FitOptions::default())
+        })
+        .collect();
+    let mut best: Option<Fit> = None;
+    for attempt in tried {
+        let attempt = attempt?;
+        if best.as_ref().is_none_or(|b| attempt.sum_of_squares < b.sum_of_squares) {
+            best = Some(attempt);
+        }
+    }
+    match best {
+        Some(best) => Ok(best),
+        None => fit(model, records, &FitOptions::default()),
+    }
+}

@@ -1,6 +1,7 @@
 //! Host side: recordings to models.
 
 pub mod data;
+pub mod diagnose;
 pub mod dual;
 pub mod fit;
 pub mod indicators;

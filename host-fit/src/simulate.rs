@@ -1,7 +1,7 @@
 //! Free runs and one-step predictions of a model over recorded signals.
 
 use crate::data::Record;
-use crate::model::{Delay, Model, Prepared, Start};
+use crate::model::{Delay, Model, Prepared, Rounding, Start};
 use model_core::history::{Memory, Past};
 use model_core::model::{Averaging, StateOf, observe};
 use model_core::{Input, Output, Parts, Real, State};
@@ -136,7 +136,7 @@ impl<T: Real> Simulator<T> {
     /// A simulator of `model` with other parameter `values` (see
     /// [`Model::coordinates`]).
     #[must_use]
-    pub fn with_values(model: &Model, values: &[T]) -> Self {
+    pub fn with_values(model: &Model, values: &[T], rounding: Rounding) -> Self {
         let Averaging {
             window,
             averaged_model,
@@ -153,7 +153,7 @@ impl<T: Real> Simulator<T> {
             jets += window as usize;
         }
         Self {
-            prepared: model.prepare_with(values),
+            prepared: model.prepare_with(values, rounding),
             start: model.start,
             outputs: model.longest_lag().max(window as usize),
             jets,
@@ -276,7 +276,7 @@ impl Model {
     /// A missing channel, or divergence.
     pub fn free_run(&self, record: &Record) -> Result<Vec<f64>, SimulateError> {
         let signals = Signals::of(self, record)?;
-        let simulator = Simulator::with_values(self, &self.values());
+        let simulator = Simulator::with_values(self, &self.values(), Rounding::Samples);
         let mut y = Vec::with_capacity(signals.u.len());
         let left = simulator.run(&signals, |_, output: &Output<f64>| {
             y.push(output.measured);

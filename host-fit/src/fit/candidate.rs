@@ -67,8 +67,10 @@ pub fn fit_with_effect(
     let mut tried: Vec<Fit> = tried.into_iter().flatten().collect();
     tried.sort_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
     tried.truncate(FOLLOWED);
-    let finished: Vec<Option<Fit>> =
-        tried.par_iter().map(|start| fit(&start.model, records, options).ok()).collect();
+    let finished: Vec<Option<Fit>> = tried
+        .par_iter()
+        .map(|start| fit(&start.model, records, options).ok())
+        .collect();
     finished
         .into_iter()
         .flatten()
@@ -108,7 +110,11 @@ impl Scale {
     fn of(records: &[&Record]) -> Self {
         let largest = |series: &dyn Fn(&Record) -> f64| {
             let size = records.iter().map(|r| series(r)).fold(0.0, f64::max);
-            if (0.3..3.0).contains(&size) || size == 0.0 { 1.0 } else { size }
+            if (0.3..3.0).contains(&size) || size == 0.0 {
+                1.0
+            } else {
+                size
+            }
         };
         let size = |series: &[f64]| series.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         Self {
@@ -152,7 +158,10 @@ fn starts(base: &Model, spec: &Spec, scale: &Scale, records: &[&Record]) -> Vec<
             y.sort_by(f64::total_cmp);
             let quantile = |q: f64| y.get((q * y.len() as f64) as usize).copied().unwrap_or(0.0);
             let pairs = [(0.05, 0.95), (0.0, 0.9), (0.1, 0.999), (0.2, 0.8)];
-            pairs.iter().map(|(low, high)| vec![quantile(*low), quantile(*high)]).collect()
+            pairs
+                .iter()
+                .map(|(low, high)| vec![quantile(*low), quantile(*high)])
+                .collect()
         }
         _ => product(spec.parameters, scale),
     }

@@ -51,12 +51,19 @@ pub fn lean_base(given: &Model, records: &[&Record]) -> Result<Fit, SimulateErro
         .iter()
         .flat_map(|h| TIME_CONSTANTS.iter().map(|time| start(*h, *time)))
         .collect();
-    let tried: Vec<_> = starts.par_iter().map(|model| fit(model, records, &brief)).collect();
+    let tried: Vec<_> = starts
+        .par_iter()
+        .map(|model| fit(model, records, &brief))
+        .collect();
     let mut best: Option<Fit> = None;
     let mut refused = None;
     for attempt in tried {
         match attempt {
-            Ok(fit) if best.as_ref().is_none_or(|b| fit.sum_of_squares < b.sum_of_squares) => {
+            Ok(fit)
+                if best
+                    .as_ref()
+                    .is_none_or(|b| fit.sum_of_squares < b.sum_of_squares) =>
+            {
                 best = Some(fit);
             }
             Ok(_) => {}
@@ -173,7 +180,10 @@ fn with_law_of(model: &Model, given: &Model, records: &[&Record]) -> Result<Fit,
     let mut best: Option<Fit> = None;
     for attempt in tried {
         let attempt = attempt?;
-        if best.as_ref().is_none_or(|b| attempt.sum_of_squares < b.sum_of_squares) {
+        if best
+            .as_ref()
+            .is_none_or(|b| attempt.sum_of_squares < b.sum_of_squares)
+        {
             best = Some(attempt);
         }
     }

@@ -4,7 +4,7 @@
 use crate::data::Record;
 use crate::dual::Dual;
 use crate::linalg;
-use crate::model::{Coordinate, Model};
+use crate::model::{Coordinate, Delay, Kind, Model, Rounding};
 use crate::simulate::{Signals, SimulateError, Simulator};
 use model_core::Output;
 use rayon::prelude::*;
@@ -24,6 +24,8 @@ pub struct FitOptions {
     pub constant: bool,
     /// Whether coefficients a, b, c and d move.
     pub linear: bool,
+    /// Whether the delay law moves.
+    pub delay: bool,
 }
 
 impl Default for FitOptions {
@@ -33,6 +35,7 @@ impl Default for FitOptions {
             tolerance: 1e-5,
             constant: false,
             linear: true,
+            delay: true,
         }
     }
 }
@@ -92,11 +95,8 @@ impl Axis {
                 logarithmic: parameter.is_logarithmic(),
                 low: parameter.low,
                 high: parameter.high,
-                secant: (!coordinate.is_smooth()).then_some(match parameter.unit {
-                    "samples" => 0.6,
-                    "1/y" => 0.5,
-                    _ => 0.01,
-                }),
+                secant: (!coordinate.is_smooth())
+                    .then_some(0.01 * (parameter.high - parameter.low)),
             },
         }
     }
@@ -108,12 +108,24 @@ impl Axis {
 
     fn moved(&self, value: f64, step: f64) -> f64 {
         let moved = if self.logarithmic {
-            // A step of more than a factor e² is a leap in the dark.
-            value * step.clamp(-2.0, 2.0).exp()
+            value * step.exp()
         } else {
             value + step
         };
         moved.clamp(self.low, self.high)
+    }
+
+    /// The lowest and highest step: to the bounds, and no leap in the dark.
+    fn reach(&self, value: f64) -> (f64, f64) {
+        if self.logarithmic {
+            let to = |bound: f64| (bound / value).ln();
+            (
+                to(self.low).clamp(-2.0, 0.0),
+                to(self.high).clamp(0.0, 2.0),
+            )
+        } else {
+            ((self.low - value).min(0.0), (self.high - value).max(0.0))
+        }
     }
 }
 
@@ -130,6 +142,7 @@ struct Problem<'a> {
     measured: Vec<&'a [f64]>,
     axes: Vec<Axis>,
     warm_up: usize,
+    rounding: Rounding,
 }
 
 impl Problem<'_> {
@@ -137,7 +150,7 @@ impl Problem<'_> {
     fn run(&self, values: &[f64], record: usize) -> Option<Vec<f64>> {
         let signals = &self.signals[record];
         let mut y = Vec::with_capacity(signals.u.len());
-        let simulator = Simulator::with_values(self.model, values);
+        let simulator = Simulator::with_values(self.model, values, self.rounding);
         let left = simulator.run(signals, |_, output: &Output<f64>| {
             y.push(output.measured);
             ControlFlow::Continue(())
@@ -147,7 +160,7 @@ impl Problem<'_> {
 
     /// Σ r²; infinite if a run diverges, and not summed beyond `enough`.
     fn cost(&self, values: &[f64], enough: f64) -> f64 {
-        let simulator = Simulator::with_values(self.model, values);
+        let simulator = Simulator::with_values(self.model, values, self.rounding);
         let each = |record: usize| {
             let measured = self.measured[record];
             let mut sum = 0.0;
@@ -196,7 +209,7 @@ impl Problem<'_> {
                 duals[axis.index].partials[slot] = axis.slope(value);
                 jacobian[chunk[slot]] = Vec::with_capacity(simulated.len());
             }
-            let simulator = Simulator::with_values(self.model, &duals);
+            let simulator = Simulator::with_values(self.model, &duals, self.rounding);
             simulator.run(&self.signals[record], |k, output: &Output<Dual<CHUNK>>| {
                 for (slot, axis) in chunk.iter().enumerate() {
                     let slope = output.measured.partials[slot];
@@ -277,16 +290,75 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
+/// The minimiser of ½ sᵀ·A·s − gᵀ·s within bounds: coordinates that would leave
+/// are held at their bound and the others solved again.
+fn bounded_step(a: &[f64], g: &[f64], reach: &[(f64, f64)]) -> Option<Vec<f64>> {
+    let n = g.len();
+    let mut held: Vec<Option<f64>> = vec![None; n];
+    loop {
+        let free: Vec<usize> = (0..n).filter(|i| held[*i].is_none()).collect();
+        let mut step: Vec<f64> = held.iter().map(|h| h.unwrap_or(0.0)).collect();
+        if !free.is_empty() {
+            let sub: Vec<f64> = free
+                .iter()
+                .flat_map(|i| free.iter().map(move |j| a[i * n + j]))
+                .collect();
+            let rest = |i: &usize| g[*i] - (0..n).map(|j| a[i * n + j] * step[j]).sum::<f64>();
+            let right: Vec<f64> = free.iter().map(rest).collect();
+            for (i, value) in free.iter().zip(linalg::solve_symmetric(&sub, &right)?) {
+                step[*i] = value;
+            }
+        }
+        let mut left = false;
+        for i in free {
+            let (low, high) = reach[i];
+            if step[i] < low || step[i] > high {
+                held[i] = Some(step[i].clamp(low, high));
+                left = true;
+            }
+        }
+        if !left {
+            return Some(step);
+        }
+    }
+}
+
 /// Fits the parameters of `model` to `records` in free run, from where they are.
+///
+/// A state-dependent delay is fitted without its rounding, which makes the free
+/// run smooth; the coefficients are then fitted again with it.
 ///
 /// # Errors
 /// A missing channel, or a model whose free run diverges from the start.
 pub fn fit(model: &Model, records: &[&Record], options: &FitOptions) -> Result<Fit, SimulateError> {
+    if !matches!(model.delay, Delay::StateDependent { .. }) {
+        return descend(model, records, options, Rounding::Samples);
+    }
+    let smooth = descend(model, records, options, Rounding::None)?;
+    let last = FitOptions {
+        iterations: options.iterations.min(4),
+        delay: false,
+        ..*options
+    };
+    let rounded = descend(&smooth.model, records, &last, Rounding::Samples)?;
+    Ok(Fit {
+        model: rounded.model,
+        sum_of_squares: rounded.sum_of_squares,
+        ..smooth
+    })
+}
+
+fn descend(
+    model: &Model,
+    records: &[&Record],
+    options: &FitOptions,
+    rounding: Rounding,
+) -> Result<Fit, SimulateError> {
     let signals: Result<Vec<_>, _> = records.iter().map(|r| Signals::of(model, r)).collect();
     let coordinates = model.coordinates();
     let moves = |index: usize, coordinate: &Coordinate| match coordinate.parameter() {
         None => options.linear && (index > 0 || options.constant),
-        Some(_) => true,
+        Some(_) => options.delay || !matches!(coordinate.kind, Kind::Delay(_)),
     };
     let axes: Vec<Axis> = coordinates
         .iter()
@@ -300,6 +372,7 @@ pub fn fit(model: &Model, records: &[&Record], options: &FitOptions) -> Result<F
         measured: records.iter().map(|record| record.y.as_slice()).collect(),
         axes,
         warm_up: model.warm_up(),
+        rounding,
     };
     let n = problem.axes.len();
     let samples: usize = records
@@ -329,7 +402,12 @@ pub fn fit(model: &Model, records: &[&Record], options: &FitOptions) -> Result<F
             for i in 0..n {
                 damped[i * n + i] += damping * information[i * n + i] + 1e-12;
             }
-            if let Some(step) = linalg::solve_symmetric(&damped, &gradient) {
+            let reach: Vec<(f64, f64)> = problem
+                .axes
+                .iter()
+                .map(|axis| axis.reach(values[axis.index]))
+                .collect();
+            if let Some(step) = bounded_step(&damped, &gradient, &reach) {
                 let mut moved = values.clone();
                 for (axis, step) in problem.axes.iter().zip(&step) {
                     moved[axis.index] = axis.moved(values[axis.index], *step);

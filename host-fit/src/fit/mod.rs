@@ -6,4 +6,5 @@ mod levenberg;
 
 pub use candidate::{CandidateError, fit_with_effect};
 pub use lean::{lean_base, settle_fixed_delay};
+pub(crate) use levenberg::dot;
 pub use levenberg::{Fit, FitOptions, fit};

@@ -8,7 +8,7 @@ mod prepared;
 pub use file::{FORMAT_VERSION, ModelError};
 pub use law::{Hold, Law, Maximise, Track};
 pub use parameters::{Coordinate, Kind};
-pub use prepared::{AnyDelay, Chain, Prepared};
+pub use prepared::{AnyDelay, Chain, Prepared, Rounding};
 
 use model_core::effect::{Place, Spec};
 use model_core::model::Averaging;

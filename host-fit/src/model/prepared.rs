@@ -53,13 +53,25 @@ impl<T: Real> Parts<T> for Prepared<T> {
     }
 }
 
+/// What becomes of a state-dependent delay between two samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rounding {
+    /// It is rounded to whole samples, eq. (4): the model itself.
+    Samples,
+    /// The input is interpolated: the model made smooth, for a search in the
+    /// law's parameters.
+    None,
+}
+
 /// Any delay law of `model-core`, chosen at run time.
 #[derive(Clone, Debug)]
 pub enum AnyDelay<T> {
     /// Constant delays.
     Fixed(FixedDelay<Vec<u16>>),
-    /// Eq. (2).
+    /// Eqs. (2) and (4).
     StateDependent(StateDependentDelay<T, Vec<T>>),
+    /// Eq. (2) without the rounding of eq. (4).
+    Unrounded(StateDependentDelay<T, Vec<T>>),
     /// Rising and falling edges apart.
     EdgeDependent(EdgeDependentDelay<T>),
 }
@@ -70,21 +82,21 @@ impl<T: Real> DelayLaw<T> for AnyDelay<T> {
     fn start(&self) -> Run {
         match self {
             Self::EdgeDependent(law) => law.start(),
-            Self::Fixed(_) | Self::StateDependent(_) => Run::default(),
+            Self::Fixed(_) | Self::StateDependent(_) | Self::Unrounded(_) => Run::default(),
         }
     }
     #[inline]
     fn command(&self, run: &mut Run, command: T) -> T {
         match self {
             Self::EdgeDependent(law) => law.command(run, command),
-            Self::Fixed(_) | Self::StateDependent(_) => command,
+            Self::Fixed(_) | Self::StateDependent(_) | Self::Unrounded(_) => command,
         }
     }
     #[inline]
     fn evaluate(&self, output: T) -> T {
         match self {
             Self::Fixed(law) => law.evaluate(output),
-            Self::StateDependent(law) => law.evaluate(output),
+            Self::StateDependent(law) | Self::Unrounded(law) => law.evaluate(output),
             Self::EdgeDependent(law) => law.evaluate(output),
         }
     }
@@ -93,6 +105,10 @@ impl<T: Real> DelayLaw<T> for AnyDelay<T> {
         match self {
             Self::Fixed(law) => law.tap(l, evaluated),
             Self::StateDependent(law) => law.tap(l, evaluated),
+            Self::Unrounded(law) => {
+                let factor = law.factors.get(l).copied().unwrap_or(T::ONE);
+                Tap::between(factor * evaluated)
+            }
             Self::EdgeDependent(law) => law.tap(l, evaluated),
         }
     }
@@ -140,13 +156,13 @@ impl Model {
     #[must_use]
     pub fn prepare<T: Real>(&self) -> Prepared<T> {
         let values: Vec<T> = self.values().into_iter().map(T::from_f64).collect();
-        self.prepare_with(&values)
+        self.prepare_with(&values, Rounding::Samples)
     }
 
     /// The model with other parameter values, in the order of
     /// [`coordinates`](Self::coordinates); missing ones count as 0.
     #[must_use]
-    pub fn prepare_with<T: Real>(&self, values: &[T]) -> Prepared<T> {
+    pub fn prepare_with<T: Real>(&self, values: &[T], rounding: Rounding) -> Prepared<T> {
         let mut rest = values.iter().copied();
         let mut next = || rest.next().unwrap_or(T::ZERO);
         let mut many = |n: usize| -> Vec<T> { (0..n).map(|_| next()).collect() };
@@ -161,12 +177,16 @@ impl Model {
             }),
             Delay::StateDependent { factors, .. } => {
                 let law = many(3);
-                AnyDelay::StateDependent(StateDependentDelay {
+                let law = StateDependentDelay {
                     floor: law[0],
                     rise: law[1],
                     rate: law[2],
                     factors: factors.iter().map(|f| T::from_f64(*f)).collect(),
-                })
+                };
+                match rounding {
+                    Rounding::Samples => AnyDelay::StateDependent(law),
+                    Rounding::None => AnyDelay::Unrounded(law),
+                }
             }
             Delay::EdgeDependent { .. } => {
                 let setting = Setting {

@@ -48,7 +48,7 @@ impl<T: Real> Physics<T> for StateDependentDelay<T> {
                 low: 0.0,
                 high: 500.0,
                 starts: &[30.0],
-                influence: Influence::Stepwise,
+                influence: Influence::Smooth,
             },
             Parameter {
                 name: "delay_rise",
@@ -56,7 +56,7 @@ impl<T: Real> Physics<T> for StateDependentDelay<T> {
                 low: -100.0,
                 high: 500.0,
                 starts: &[10.0],
-                influence: Influence::Stepwise,
+                influence: Influence::Smooth,
             },
             Parameter {
                 name: "delay_rate",
@@ -64,7 +64,7 @@ impl<T: Real> Physics<T> for StateDependentDelay<T> {
                 low: 0.1,
                 high: 200.0,
                 starts: &[4.0, 20.0],
-                influence: Influence::Stepwise,
+                influence: Influence::Smooth,
             },
         ],
         channel: None,

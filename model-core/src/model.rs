@@ -5,7 +5,7 @@ use crate::delay::DelayLaw;
 use crate::effect::{Effect, Flow, Instant};
 use crate::history::{BitHistory, DelayLine, Memory};
 use crate::real::Real;
-use crate::recursion::{Bilinear, LagConvention};
+use crate::recursion::{Bilinear, Grading, LagConvention};
 use nalgebra::{SMatrix, SVector};
 
 /// How outputs and inputs are averaged.
@@ -62,6 +62,8 @@ pub struct Params<T: Real, const N1: usize, const N2: usize, const N3: usize, D,
     pub convention: LagConvention,
     /// Averages.
     pub averaging: Averaging,
+    /// The response to jets of part strength.
+    pub grading: Grading,
     /// d.
     pub constant: T,
     /// τ_i, samples.
@@ -92,6 +94,7 @@ where
     fn recursion(&self) -> Bilinear<'_, T> {
         Bilinear {
             convention: self.convention,
+            grading: self.grading,
             constant: self.constant,
             state_lags: &self.state_lags,
             a: self.a.as_slice(),
@@ -339,6 +342,7 @@ mod tests {
                 window: 250,
                 averaged_model: false,
             },
+            grading: Grading::Proportional,
             constant: T::ZERO,
             state_lags: [1, 44, 123, 479, 496],
             a: SVector::from([0.9759, 0.0141, 0.0025, -0.0042, 0.0055].map(number)),
@@ -417,6 +421,7 @@ mod tests {
                 window: 2,
                 averaged_model: false,
             },
+            grading: Grading::Proportional,
             constant: 0.0,
             state_lags: [1],
             a: SVector::from([0.5]),
@@ -449,6 +454,7 @@ mod tests {
         let model = Params {
             convention: bare.convention,
             averaging: bare.averaging,
+            grading: bare.grading,
             constant: bare.constant,
             state_lags: bare.state_lags,
             a: bare.a,

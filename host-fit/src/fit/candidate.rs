@@ -3,7 +3,8 @@
 use super::{Fit, FitOptions, fit};
 use crate::data::Record;
 use crate::model::{Delay, Model};
-use model_core::effect::{Parameter, Spec};
+use model_core::effect::{Parameter, Place, Spec};
+use model_core::recursion::Grading;
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -56,13 +57,30 @@ pub fn fit_with_effect(
         ..*options
     };
     let scale = Scale::of(records);
-    let tried: Vec<Option<Fit>> = starts(base, spec, &scale, records)
-        .par_iter()
-        .map(|parameters| {
-            let mut model = base.clone();
-            model.add(spec, parameters, reference);
-            fit(&model, records, &brief).ok()
+    // How the flow takes jets of part strength shows only once there are some.
+    let gradings: &[Grading] = match spec.place {
+        Place::Jet => &[
+            Grading::Proportional,
+            Grading::Interpolated,
+            Grading::Switched,
+        ],
+        Place::Delay | Place::Flow | Place::Sensor => &[base.grading],
+    };
+    let starts = starts(base, spec, &scale, records);
+    let models: Vec<Model> = starts
+        .iter()
+        .flat_map(|parameters| {
+            gradings.iter().map(move |grading| {
+                let mut model = base.clone();
+                model.grading = *grading;
+                model.add(spec, parameters, reference);
+                model
+            })
         })
+        .collect();
+    let tried: Vec<Option<Fit>> = models
+        .par_iter()
+        .map(|model| fit(model, records, &brief).ok())
         .collect();
     let mut tried: Vec<Fit> = tried.into_iter().flatten().collect();
     tried.sort_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));

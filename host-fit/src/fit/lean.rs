@@ -8,7 +8,7 @@ use super::{Fit, FitOptions, fit};
 use crate::data::Record;
 use crate::model::{Delay, Model, Start};
 use crate::simulate::SimulateError;
-use model_core::recursion::LagConvention;
+use model_core::recursion::{Grading, LagConvention};
 use rayon::prelude::*;
 
 /// Time constants from which the search sets out, s.
@@ -26,6 +26,7 @@ pub fn lean_base(given: &Model, records: &[&Record]) -> Result<Fit, SimulateErro
         Model {
             convention: LagConvention::OneStep,
             start: Start::Rest,
+            grading: Grading::Proportional,
             constant: 0.0,
             state_lags: vec![1],
             a: vec![kept],

@@ -119,10 +119,7 @@ impl Axis {
     fn reach(&self, value: f64) -> (f64, f64) {
         if self.logarithmic {
             let to = |bound: f64| (bound / value).ln();
-            (
-                to(self.low).clamp(-2.0, 0.0),
-                to(self.high).clamp(0.0, 2.0),
-            )
+            (to(self.low).clamp(-2.0, 0.0), to(self.high).clamp(0.0, 2.0))
         } else {
             ((self.low - value).min(0.0), (self.high - value).max(0.0))
         }

@@ -4,7 +4,7 @@ use super::{Added, Delay, Law, Model, Start, Training};
 use crate::output::{self, OutputError};
 use model_core::effects;
 use model_core::model::Averaging;
-use model_core::recursion::LagConvention;
+use model_core::recursion::{Grading, LagConvention};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -84,11 +84,22 @@ enum Convention {
     OneStep,
 }
 
+#[derive(Clone, Copy, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum JetResponse {
+    #[default]
+    Proportional,
+    Interpolated,
+    Switched,
+}
+
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Structure {
     averaged: bool,
     window: u32,
+    #[serde(default)]
+    jet_response: JetResponse,
     state_lags: Vec<u16>,
     product_lags: Vec<u16>,
 }
@@ -205,6 +216,11 @@ impl File {
             structure: Structure {
                 averaged: model.averaging.averaged_model,
                 window: model.averaging.window,
+                jet_response: match model.grading {
+                    Grading::Proportional => JetResponse::Proportional,
+                    Grading::Interpolated => JetResponse::Interpolated,
+                    Grading::Switched => JetResponse::Switched,
+                },
                 state_lags: model.state_lags.clone(),
                 product_lags: model.product_lags.clone(),
             },
@@ -348,6 +364,11 @@ impl File {
                 averaged_model: self.structure.averaged,
             },
             start: self.start,
+            grading: match self.structure.jet_response {
+                JetResponse::Proportional => Grading::Proportional,
+                JetResponse::Interpolated => Grading::Interpolated,
+                JetResponse::Switched => Grading::Switched,
+            },
             constant: self.coefficients.constant,
             state_lags: self.structure.state_lags,
             a: self.coefficients.a,
@@ -427,6 +448,7 @@ mod tests {
                 averaged_model: false,
             },
             start: Start::Rest,
+            grading: Grading::Proportional,
             constant: 0.0,
             state_lags: vec![1, 44],
             a: vec![0.9, 0.01],

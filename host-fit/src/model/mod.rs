@@ -12,7 +12,7 @@ pub use prepared::{AnyDelay, Chain, Prepared, Rounding};
 
 use model_core::effect::{Place, Spec};
 use model_core::model::Averaging;
-use model_core::recursion::LagConvention;
+use model_core::recursion::{Grading, LagConvention};
 use serde::{Deserialize, Serialize};
 
 /// A bilinear model, eqs. (3), (4), (14) or (15), with its effects and with
@@ -27,6 +27,8 @@ pub struct Model {
     pub averaging: Averaging,
     /// How a free run begins.
     pub start: Start,
+    /// The response to jets of part strength.
+    pub grading: Grading,
     /// d, what drives the flow without jets; 0 in the paper.
     pub constant: f64,
     /// τ_i, samples.

@@ -6,7 +6,7 @@ use model_core::effect::{Effect, Flow, Instant, Physics, Setting};
 use model_core::effects::edge_dependent_delay::Run;
 use model_core::effects::{AnyEffect, EdgeDependentDelay, StateDependentDelay};
 use model_core::model::{Averaging, Parts};
-use model_core::recursion::{Bilinear, LagConvention};
+use model_core::recursion::{Bilinear, Grading, LagConvention};
 use model_core::{Real, effects};
 
 /// A model prepared to run in numbers of type `T`.
@@ -16,6 +16,7 @@ pub struct Prepared<T: Real> {
     averaging: Averaging,
     state_lags: Vec<u16>,
     product_lags: Vec<u16>,
+    grading: Grading,
     constant: T,
     a: Vec<T>,
     b: Vec<T>,
@@ -31,6 +32,7 @@ impl<T: Real> Parts<T> for Prepared<T> {
     fn recursion(&self) -> Bilinear<'_, T> {
         Bilinear {
             convention: self.convention,
+            grading: self.grading,
             constant: self.constant,
             state_lags: &self.state_lags,
             a: &self.a,
@@ -217,6 +219,7 @@ impl Model {
             averaging: self.averaging,
             state_lags: self.state_lags.clone(),
             product_lags: self.product_lags.clone(),
+            grading: self.grading,
             constant,
             a,
             b,

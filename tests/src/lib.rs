@@ -1,1 +1,4 @@
-//! Scenarios.
+//! Scenarios that cross the crates, and the campaign that asks the diagnosis
+//! for effects hidden in simulated rigs.
+
+pub mod campaign;

@@ -116,6 +116,8 @@ pub struct Diagnosis {
     pub ladder: Vec<Rung>,
     /// All candidates of the first round, best first.
     pub ranking: Vec<Ranked>,
+    /// Parameters of the missing effects in the final model.
+    pub parameters: BTreeMap<String, BTreeMap<String, ParameterEstimate>>,
     /// Candidates that could not be tried.
     pub not_tried: Vec<NotTried>,
     /// The final model.
@@ -512,11 +514,14 @@ pub fn diagnose(
         return Err(DiagnoseError::Interrupted);
     }
 
+    let parameters: BTreeMap<_, _> = added
+        .iter()
+        .map(|spec| (spec.name.to_owned(), estimates(&current.fit, spec)))
+        .collect();
     // The ranking shows what the effects are in the final model.
-    for spec in &added {
-        let last = estimates(&current.fit, spec);
-        if let Some(entry) = ranking.iter_mut().find(|entry| entry.effect == spec.name) {
-            entry.parameters = last;
+    for entry in &mut ranking {
+        if let Some(last) = parameters.get(&entry.effect) {
+            entry.parameters.clone_from(last);
         }
     }
     let verdict = bench.verdict(&base, &current, added.len());
@@ -525,6 +530,7 @@ pub fn diagnose(
         missing: added.iter().map(|spec| spec.name.to_owned()).collect(),
         ladder,
         ranking,
+        parameters,
         not_tried,
         model: current.fit.model,
         base: base_model,

@@ -1,6 +1,7 @@
 //! Host side: recordings to models.
 
 pub mod data;
+pub mod delay;
 pub mod diagnose;
 pub mod dual;
 pub mod fit;

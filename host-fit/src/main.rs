@@ -24,6 +24,7 @@ struct Cli {
 #[derive(Debug, clap::Subcommand)]
 enum Command {
     Average(commands::average::Args),
+    Delay(commands::delay::Args),
 }
 
 fn main() -> ExitCode {
@@ -31,6 +32,7 @@ fn main() -> ExitCode {
     let console = Console { json: cli.json };
     let result = match &cli.command {
         Command::Average(args) => commands::average::run(args, console),
+        Command::Delay(args) => commands::delay::run(args, console),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

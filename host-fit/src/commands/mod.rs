@@ -6,6 +6,7 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 
 pub(crate) mod average;
+pub(crate) mod delay;
 
 /// How a command talks to the user.
 #[derive(Debug, Clone, Copy)]

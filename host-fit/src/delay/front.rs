@@ -1,0 +1,213 @@
+//! Where the front of a response lies: roughly, for all edges together, then for each.
+//!
+//! The mean of y over the `reach` samples from a time on, less the mean over those before it, is the matched filter for a
+//! change of level. Summed over all edges of one direction as a function of the time since the edge (each edge's vote
+//! bounded, so that no edge decides alone) it peaks at the middle of the front. Responses to the neighbouring edges have
+//! the other sign and do not add up.
+
+use super::edge::Edge;
+use super::onset::mean;
+
+/// Of the peaks at least this high against the highest, the soonest is the front.
+const HIGH: f64 = 0.8;
+
+/// When a response is expected after an edge of one direction, samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Arrival {
+    /// Middle of the front.
+    pub(crate) front: usize,
+    /// Its start.
+    pub(crate) onset: usize,
+}
+
+/// What is known before an edge is looked at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Expectation {
+    rising: Arrival,
+    falling: Arrival,
+    /// +1 if y rises with the command, −1 if it falls.
+    gain_sign: f64,
+    /// Samples of y used on either side of an arrival.
+    pub(crate) reach: usize,
+}
+
+impl Expectation {
+    /// For edges of this direction.
+    pub(crate) fn of(&self, edge: Edge) -> Arrival {
+        if edge.rising {
+            self.rising
+        } else {
+            self.falling
+        }
+    }
+
+    /// The sign of the change of y after an edge.
+    pub(crate) fn direction(&self, edge: Edge) -> f64 {
+        if edge.rising {
+            self.gain_sign
+        } else {
+            -self.gain_sign
+        }
+    }
+
+    /// Corrects the start of the responses to edges of one direction.
+    pub(crate) fn set_onset(&mut self, rising: bool, onset: usize) {
+        if rising {
+            self.rising.onset = onset;
+        } else {
+            self.falling.onset = onset;
+        }
+    }
+}
+
+/// Where responses arrive on the whole. `None` if there is no edge.
+pub(crate) fn expect(
+    series: &[(&[f64], Vec<Edge>)],
+    levels: &[Vec<f64>],
+    max_delay: usize,
+    reach: usize,
+) -> Option<Expectation> {
+    // No edge may count for more than twice the usual one.
+    let mut sizes: Vec<f64> = Vec::new();
+    for ((_, edges), levels) in series.iter().zip(levels) {
+        for edge in edges {
+            let seen = levels.iter().skip(edge.sample).take(max_delay + 1);
+            sizes.push(seen.fold(0.0, |m: f64, k| m.max(k.abs())));
+        }
+    }
+    if sizes.is_empty() {
+        return None;
+    }
+    let middle = sizes.len() / 2;
+    let bound = 2.0 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 + f64::MIN_POSITIVE;
+    let gain_sign = gain_sign(series);
+    let arrival = |rising: bool| -> Option<Arrival> {
+        let direction = if rising { gain_sign } else { -gain_sign };
+        let mine = || {
+            series.iter().zip(levels).flat_map(|((_, edges), levels)| {
+                let mine = edges.iter().filter(|e| e.rising == rising);
+                mine.map(move |e| (e.sample, levels))
+            })
+        };
+        mine().next()?;
+        // The front lies up to `reach` after its start.
+        let votes: Vec<f64> = (0..=max_delay + reach)
+            .map(|delay| {
+                let mut sum = 0.0;
+                let mut count = 0usize;
+                for level in mine().filter_map(|(sample, levels)| levels.get(sample + delay)) {
+                    sum += (direction * level).clamp(-bound, bound);
+                    count += 1;
+                }
+                sum / count.max(1) as f64
+            })
+            .collect();
+        let front = first_high_peak(&votes, reach / 2)?;
+        Some(Arrival {
+            front,
+            onset: front.saturating_sub(reach / 2),
+        })
+    };
+    let (rising, falling) = (arrival(true), arrival(false));
+    Some(Expectation {
+        rising: rising.or(falling)?,
+        falling: falling.or(rising)?,
+        gain_sign,
+        reach,
+    })
+}
+
+/// The front of the response to one edge, as a sample of the record: the highest level change near the expected one.
+pub(crate) fn own_front(levels: &[f64], edge: Edge, expected: &Expectation) -> usize {
+    let centre = edge.sample + expected.of(edge).front;
+    let spread = expected.reach * 2 / 3;
+    let from = centre.saturating_sub(spread).max(edge.sample);
+    let direction = expected.direction(edge);
+    levels
+        .iter()
+        .enumerate()
+        .take(centre + spread + 1)
+        .skip(from)
+        .max_by(|a, b| (direction * a.1).total_cmp(&(direction * b.1)))
+        .map_or(centre, |(k, _)| k)
+}
+
+/// The first peak (within `half_width` to either side) that is nearly as high as the highest.
+///
+/// In periodic records a peak returns with the period, and fast responses cast echoes: the soonest is meant.
+fn first_high_peak(votes: &[f64], half_width: usize) -> Option<usize> {
+    let highest = votes.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    (0..votes.len()).find(|&d| {
+        let mut around = votes
+            .iter()
+            .take(d + half_width + 1)
+            .skip(d.saturating_sub(half_width));
+        votes
+            .get(d)
+            .is_some_and(|&v| v >= HIGH * highest && around.all(|&a| a <= v))
+    })
+}
+
+/// +1 if y lies above its level at rest on the whole, −1 if below. y at rest is y before the first edge, or 0.
+///
+/// The fronts alone do not tell: a square wave of 50 % and its inverse half a period later look alike.
+fn gain_sign(series: &[(&[f64], Vec<Edge>)]) -> f64 {
+    let mut sum = 0.0;
+    for (y, edges) in series {
+        let Some(first) = edges.first() else { continue };
+        let rest = y
+            .get(..first.sample)
+            .filter(|rest| rest.len() >= 20)
+            .map_or(0.0, mean);
+        sum += y.iter().skip(first.sample).map(|y| y - rest).sum::<f64>();
+    }
+    if sum < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// Mean of y over the `reach` samples from each sample on, less that over the `reach` samples before it (0 before the
+/// record, which ends the filter where it ends).
+pub(crate) fn level_filter(y: &[f64], reach: usize) -> Vec<f64> {
+    let mut sums = Vec::with_capacity(y.len() + 1);
+    let mut total = 0.0;
+    sums.push(total);
+    for value in y {
+        total += value;
+        sums.push(total);
+    }
+    let sum = |k: usize| sums.get(k).copied().unwrap_or(total);
+    (0..y.len().saturating_sub(reach))
+        .map(|k| {
+            let after = sum(k + reach) - sum(k);
+            let before = sum(k) - sum(k.saturating_sub(reach));
+            (after - before) / reach.max(1) as f64
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn level_filter_peaks_at_a_step_and_sees_its_size() {
+        let y: Vec<f64> = (0..200).map(|k| if k < 90 { 0.25 } else { 1.0 }).collect();
+        let levels = level_filter(&y, 20);
+        assert_eq!(levels.len(), 180);
+        assert!((levels[90] - 0.75).abs() < 1e-12);
+        assert!(levels.iter().skip(30).all(|l| *l <= 0.75 + 1e-12));
+    }
+
+    #[test]
+    fn soonest_of_equal_peaks_and_sign_of_the_gain() {
+        let votes: Vec<f64> = (0..300)
+            .map(|d| (f64::from(d) * std::f64::consts::TAU / 125.0).sin())
+            .collect();
+        assert_eq!(first_high_peak(&votes, 15), Some(31));
+        let edges = vec![Edge {
+            sample: 30,
+            rising: true,
+        }];
+        let y: Vec<f64> = (0..100).map(|k| if k < 50 { 5.0 } else { 4.0 }).collect();
+        assert_eq!(gain_sign(&[(&y, edges)]), -1.0);
+    }
+}

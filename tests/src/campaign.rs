@@ -147,6 +147,7 @@ fn given(case: &Case) -> Model {
             delay_rise: 10.0,
             delay_rate: 6.0,
             factors: vec![1.0],
+            interpolated: false,
         },
         effects: Vec::new(),
         law: None,
@@ -167,6 +168,7 @@ fn given(case: &Case) -> Model {
             delay_rise: 40.0,
             delay_rate: 2.0,
             factors: vec![1.0],
+            interpolated: false,
         };
     }
     model

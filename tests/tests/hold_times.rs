@@ -19,6 +19,7 @@ fn small_model() -> Small {
             window: 8,
             averaged_model: false,
         },
+        grading: model_core::recursion::Grading::Proportional,
         constant: 0.0,
         state_lags: [1],
         a: SVector::from([0.9]),

@@ -213,6 +213,7 @@ fn present_delay(base: &Model) -> f64 {
             delay_rise,
             delay_rate,
             factors,
+            ..
         } => {
             let factor = factors.first().copied().unwrap_or(1.0);
             factor * (delay_floor + delay_rise * (-0.5 * delay_rate).exp())

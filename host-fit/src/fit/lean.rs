@@ -145,12 +145,14 @@ fn with_law_of(model: &Model, given: &Model, records: &[&Record]) -> Result<Fit,
             delay_rise,
             delay_rate,
             factors,
+            ..
         } => {
             let law = |delay_floor: f64, delay_rise: f64, delay_rate: f64| Delay::StateDependent {
                 delay_floor,
                 delay_rise,
                 delay_rate,
                 factors: vec![1.0],
+                interpolated: true,
             };
             let factor = factors.first().copied().unwrap_or(1.0);
             vec![

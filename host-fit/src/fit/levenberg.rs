@@ -322,13 +322,20 @@ fn bounded_step(a: &[f64], g: &[f64], reach: &[(f64, f64)]) -> Option<Vec<f64>> 
 
 /// Fits the parameters of `model` to `records` in free run, from where they are.
 ///
-/// A state-dependent delay is fitted without its rounding, which makes the free
+/// A rounded state-dependent delay is fitted without its rounding, which makes the free
 /// run smooth; the coefficients are then fitted again with it.
 ///
 /// # Errors
 /// A missing channel, or a model whose free run diverges from the start.
 pub fn fit(model: &Model, records: &[&Record], options: &FitOptions) -> Result<Fit, SimulateError> {
-    if !matches!(model.delay, Delay::StateDependent { .. }) {
+    let rounded = matches!(
+        model.delay,
+        Delay::StateDependent {
+            interpolated: false,
+            ..
+        }
+    );
+    if !rounded {
         return descend(model, records, options, Rounding::Samples);
     }
     let smooth = descend(model, records, options, Rounding::None)?;

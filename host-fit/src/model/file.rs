@@ -337,6 +337,7 @@ impl File {
                 delay_rise,
                 delay_rate,
                 factors,
+                ..
             } => {
                 per_input("delay.factors", factors.len())?;
                 finite("delay", &[*delay_floor, *delay_rise, *delay_rate])?;

@@ -82,6 +82,10 @@ pub enum Delay {
         delay_rate: f64,
         /// f_l.
         factors: Vec<f64>,
+        /// Whether the input is interpolated between samples instead of the
+        /// delay rounded as in eq. (4).
+        #[serde(default)]
+        interpolated: bool,
     },
     /// Rising and falling edges travel differently long.
     EdgeDependent {
@@ -235,6 +239,7 @@ impl Model {
                     delay_rise,
                     delay_rate,
                     factors,
+                    interpolated: true,
                 };
             }
             ("edge-dependent-delay", &[rise_delay, fall_delay]) => {

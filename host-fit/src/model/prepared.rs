@@ -58,10 +58,10 @@ impl<T: Real> Parts<T> for Prepared<T> {
 /// What becomes of a state-dependent delay between two samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rounding {
-    /// It is rounded to whole samples, eq. (4): the model itself.
+    /// As the model says: rounded to whole samples, eq. (4), or interpolated.
     Samples,
-    /// The input is interpolated: the model made smooth, for a search in the
-    /// law's parameters.
+    /// The input is interpolated in any case: the model made smooth, for a
+    /// search in the law's parameters.
     None,
 }
 
@@ -73,7 +73,7 @@ pub enum AnyDelay<T> {
     /// Eqs. (2) and (4).
     StateDependent(StateDependentDelay<T, Vec<T>>),
     /// Eq. (2) without the rounding of eq. (4).
-    Unrounded(StateDependentDelay<T, Vec<T>>),
+    Unrounded(StateDependentDelay<T, Vec<T>, false>),
     /// Rising and falling edges apart.
     EdgeDependent(EdgeDependentDelay<T>),
 }
@@ -98,7 +98,8 @@ impl<T: Real> DelayLaw<T> for AnyDelay<T> {
     fn evaluate(&self, output: T) -> T {
         match self {
             Self::Fixed(law) => law.evaluate(output),
-            Self::StateDependent(law) | Self::Unrounded(law) => law.evaluate(output),
+            Self::StateDependent(law) => law.evaluate(output),
+            Self::Unrounded(law) => law.evaluate(output),
             Self::EdgeDependent(law) => law.evaluate(output),
         }
     }
@@ -107,10 +108,7 @@ impl<T: Real> DelayLaw<T> for AnyDelay<T> {
         match self {
             Self::Fixed(law) => law.tap(l, evaluated),
             Self::StateDependent(law) => law.tap(l, evaluated),
-            Self::Unrounded(law) => {
-                let factor = law.factors.get(l).copied().unwrap_or(T::ONE);
-                Tap::between(factor * evaluated)
-            }
+            Self::Unrounded(law) => law.tap(l, evaluated),
             Self::EdgeDependent(law) => law.tap(l, evaluated),
         }
     }
@@ -177,17 +175,28 @@ impl Model {
             Delay::Fixed { delays } => AnyDelay::Fixed(FixedDelay {
                 delays: delays.clone(),
             }),
-            Delay::StateDependent { factors, .. } => {
+            Delay::StateDependent {
+                factors,
+                interpolated,
+                ..
+            } => {
                 let law = many(3);
-                let law = StateDependentDelay {
-                    floor: law[0],
-                    rise: law[1],
-                    rate: law[2],
-                    factors: factors.iter().map(|f| T::from_f64(*f)).collect(),
-                };
-                match rounding {
-                    Rounding::Samples => AnyDelay::StateDependent(law),
-                    Rounding::None => AnyDelay::Unrounded(law),
+                let (floor, rise, rate) = (law[0], law[1], law[2]);
+                let factors = factors.iter().map(|f| T::from_f64(*f)).collect();
+                if *interpolated || rounding == Rounding::None {
+                    AnyDelay::Unrounded(StateDependentDelay {
+                        floor,
+                        rise,
+                        rate,
+                        factors,
+                    })
+                } else {
+                    AnyDelay::StateDependent(StateDependentDelay {
+                        floor,
+                        rise,
+                        rate,
+                        factors,
+                    })
                 }
             }
             Delay::EdgeDependent { .. } => {

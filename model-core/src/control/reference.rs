@@ -104,6 +104,7 @@ mod tests {
     fn the_papers_model_reaches_1_067() {
         let recursion = Bilinear {
             convention: LagConvention::OneStep,
+            grading: crate::recursion::Grading::Proportional,
             constant: 0.0_f64,
             state_lags: &[1, 44, 123, 479, 496],
             a: &[0.9759, 0.0141, 0.0025, -0.0042, 0.0055],

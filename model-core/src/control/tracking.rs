@@ -388,6 +388,7 @@ mod tests {
                 window: 250,
                 averaged_model: false,
             },
+            grading: crate::recursion::Grading::Proportional,
             constant: T::ZERO,
             state_lags: [1, 44, 123, 479, 496],
             a: SVector::from([0.9759, 0.0141, 0.0025, -0.0042, 0.0055].map(number)),

@@ -4,12 +4,16 @@ use crate::delay::{DelayLaw, Tap};
 use crate::effect::{Influence, Parameter, Physics, Place, Setting, Spec, take};
 use crate::real::Real;
 
-/// h_l = round(f_l · (p0 + p1·exp(−p2·ỹ))), samples, eqs. (2) and (4).
+/// h_l = round(f_l · (p0 + p1·exp(−p2·ỹ))), samples, eqs. (2) and (4); without
+/// the rounding, and with the input interpolated, where `ROUNDED` is false.
+///
+/// The rounding moves every edge by up to half a sample, which a flow that
+/// rings at 20 Hz shows as an error of several per cent of the ringing.
 ///
 /// A negative ỹ counts as 0: the exponential would run away (theory: at
 /// ỹ = −0.1 it would be 2.4 times the delay of the natural flow).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StateDependentDelay<T, F = [T; 1]> {
+pub struct StateDependentDelay<T, F = [T; 1], const ROUNDED: bool = true> {
     /// p0, samples: the delay of the attached flow.
     pub floor: T,
     /// p1, samples: how much longer the delay of the separated flow is.
@@ -20,8 +24,11 @@ pub struct StateDependentDelay<T, F = [T; 1]> {
     pub factors: F,
 }
 
-impl<T: Real, F: AsRef<[T]> + Clone> DelayLaw<T> for StateDependentDelay<T, F> {
+impl<T: Real, F: AsRef<[T]> + Clone, const ROUNDED: bool> DelayLaw<T>
+    for StateDependentDelay<T, F, ROUNDED>
+{
     type State = ();
+    const INTERPOLATES: bool = !ROUNDED;
     fn start(&self) {}
     #[inline]
     fn evaluate(&self, output: T) -> T {
@@ -30,7 +37,12 @@ impl<T: Real, F: AsRef<[T]> + Clone> DelayLaw<T> for StateDependentDelay<T, F> {
     #[inline]
     fn tap(&self, l: usize, evaluated: T) -> Tap<T> {
         let factor = self.factors.as_ref().get(l).copied().unwrap_or(T::ONE);
-        Tap::on((factor * evaluated).round().max(0) as usize)
+        let delay = factor * evaluated;
+        if ROUNDED {
+            Tap::on(delay.round().max(0) as usize)
+        } else {
+            Tap::between(delay)
+        }
     }
 }
 
@@ -87,17 +99,29 @@ mod tests {
     use super::*;
 
     #[test]
+    fn without_rounding_it_taps_between_samples() {
+        let law = StateDependentDelay::<f64, [f64; 1], false> {
+            floor: 30.25,
+            rise: 0.0,
+            rate: 1.0,
+            factors: [1.0],
+        };
+        let tap = law.tap(0, law.evaluate(0.3));
+        assert_eq!((tap.whole, tap.fraction), (30, 0.25));
+    }
+
+    #[test]
     fn the_papers_law_at_its_ends() {
-        let law = StateDependentDelay {
-            floor: 47.35_f32,
+        let law = StateDependentDelay::<f32> {
+            floor: 47.35,
             rise: 12.69,
             rate: 20.18,
             factors: [1.0],
         };
         assert_eq!(law.tap(0, law.evaluate(0.0)).whole, 60);
         assert_eq!(law.tap(0, law.evaluate(1.0)).whole, 47);
-        let fast = StateDependentDelay {
-            factors: [1.5513_f32, 106.756],
+        let fast = StateDependentDelay::<f32, [f32; 2]> {
+            factors: [1.5513, 106.756],
             floor: 47.35,
             rise: 12.69,
             rate: 20.18,

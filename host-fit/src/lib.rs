@@ -11,5 +11,6 @@ pub mod output;
 pub mod picture;
 pub mod search;
 pub mod simulate;
+pub mod target;
 
 mod linalg;

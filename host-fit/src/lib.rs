@@ -4,6 +4,7 @@ pub mod data;
 pub mod delay;
 pub mod diagnose;
 pub mod dual;
+pub mod extend;
 pub mod fit;
 pub mod indicators;
 pub mod model;

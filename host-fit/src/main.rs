@@ -25,6 +25,11 @@ struct Cli {
 enum Command {
     Average(commands::average::Args),
     Delay(commands::delay::Args),
+    Compare(commands::compare::Args),
+    Diagnose(commands::diagnose::Args),
+    Extend(commands::extend::Args),
+    Simulate(commands::simulate::Args),
+    Effects(commands::effects::Args),
 }
 
 fn main() -> ExitCode {
@@ -33,6 +38,11 @@ fn main() -> ExitCode {
     let result = match &cli.command {
         Command::Average(args) => commands::average::run(args, console),
         Command::Delay(args) => commands::delay::run(args, console),
+        Command::Compare(args) => commands::compare::run(args, console),
+        Command::Diagnose(args) => commands::diagnose::run(args, console),
+        Command::Extend(args) => commands::extend::run(args, console),
+        Command::Simulate(args) => commands::simulate::run(args, console),
+        Command::Effects(args) => commands::effects::run(args, console),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

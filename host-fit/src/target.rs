@@ -34,7 +34,11 @@ pub fn moving_average(series: &[f64], window: u32, held: bool) -> Vec<f64> {
             Some(last_outside) => {
                 let end = (last_outside / window + 1) * window - 1;
                 let tail = prefix[end] - prefix[last_outside];
-                if k == end { prefix[k] } else { tail + prefix[k] }
+                if k == end {
+                    prefix[k]
+                } else {
+                    tail + prefix[k]
+                }
             }
         };
         sum / window as f64

@@ -6,7 +6,14 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 
 pub(crate) mod average;
+pub(crate) mod compare;
 pub(crate) mod delay;
+pub(crate) mod diagnose;
+pub(crate) mod effects;
+pub(crate) mod extend;
+mod interrupt;
+mod scores;
+pub(crate) mod simulate;
 
 /// How a command talks to the user.
 #[derive(Debug, Clone, Copy)]
@@ -43,6 +50,13 @@ impl Console {
             bar.set_style(style);
         }
         bar.enable_steady_tick(Duration::from_millis(200));
+        bar
+    }
+
+    /// A sign of life on standard error while `what` goes on; invisible when that is no terminal.
+    pub(crate) fn spinner(self, what: &str) -> ProgressBar {
+        let bar = self.progress(0, "{spinner} {msg} ({elapsed})");
+        bar.set_message(what.to_owned());
         bar
     }
 }

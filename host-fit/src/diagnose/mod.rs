@@ -415,7 +415,7 @@ fn holm(p: &[f64]) -> Vec<f64> {
 }
 
 /// Estimates of an effect's parameters with 95 % intervals.
-fn estimates(fit: &Fit, spec: &Spec) -> BTreeMap<String, ParameterEstimate> {
+pub(crate) fn estimates(fit: &Fit, spec: &Spec) -> BTreeMap<String, ParameterEstimate> {
     let values = fit.model.values();
     let coordinates = fit.model.coordinates();
     let own = coordinates

@@ -1,5 +1,6 @@
 //! An identified model with sizes known at run time.
 
+mod envelope;
 mod file;
 mod law;
 mod parameters;

@@ -1,0 +1,20 @@
+//! Ctrl-C: the first asks a command for the best it has, the second ends it.
+
+use std::sync::Once;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+static ASKED: AtomicBool = AtomicBool::new(false);
+static WATCHING: Once = Once::new();
+
+/// Whether the user has pressed Ctrl-C; from the first call on it is watched.
+pub(crate) fn watch() -> &'static AtomicBool {
+    WATCHING.call_once(|| {
+        // Without a handler Ctrl-C ends the program, which is what it does anyway.
+        let _ = ctrlc::set_handler(|| {
+            if ASKED.swap(true, Ordering::Relaxed) {
+                std::process::exit(130);
+            }
+        });
+    });
+    &ASKED
+}

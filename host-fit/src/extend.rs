@@ -1,0 +1,247 @@
+//! Adding physical effects to a model: everything is refitted with them.
+//!
+//! A model with many free lags has absorbed part of what it lacks, so the
+//! effects are added to the given structure and to the leanest one, and the
+//! better of the two is kept; where both fit alike, the one with fewer
+//! parameters.
+
+use std::collections::BTreeMap;
+
+use crate::data::{Record, Use};
+use crate::diagnose::ParameterEstimate;
+use crate::fit::{CandidateError, Fit, FitOptions, fit, fit_with_effect, lean_base};
+use crate::model::{Model, Start};
+use crate::simulate::SimulateError;
+use model_core::effect::Spec;
+use model_core::effects::{SPECS, spec};
+use thiserror::Error;
+
+/// The lean model is kept when its error is within this factor of the other's.
+const AS_GOOD: f64 = 1.02;
+
+/// Why a model was not extended.
+#[derive(Clone, Debug, Error)]
+#[non_exhaustive]
+pub enum ExtendError {
+    /// The catalogue has no such effect.
+    #[error("{}", nearest_name(.0))]
+    Unknown(String),
+    /// The effect is in the model, or was named twice.
+    #[error(
+        "effect `{0}` is in the model already; each effect can be there once. Leave out this `--effect`."
+    )]
+    Doubled(String),
+    /// No record to refit on.
+    #[error(
+        "the data set has no `identify` record to refit the model on. \
+         Set `use = \"identify\"` for at least one record in dataset.toml."
+    )]
+    NothingToLearnFrom,
+    /// No structure could be fitted with the effects.
+    #[error(transparent)]
+    Candidate(#[from] CandidateError),
+    /// The model cannot be run on the data.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+}
+
+/// Which structure the effects were added to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Structure {
+    /// That of the given model.
+    Given,
+    /// One lag each and one input.
+    Lean,
+}
+
+/// A model with effects added.
+#[derive(Clone, Debug)]
+pub struct Extended {
+    /// The model.
+    pub model: Model,
+    /// Where its structure comes from.
+    pub structure: Structure,
+    /// Parameters of the added effects: by effect, by name.
+    pub parameters: BTreeMap<String, BTreeMap<String, ParameterEstimate>>,
+    /// Root mean square error of the free run on the identify records, y.
+    pub identify_rmse: f64,
+}
+
+/// The message for a name that the catalogue does not have.
+#[must_use]
+pub fn nearest_name(name: &str) -> String {
+    let nearest = SPECS
+        .iter()
+        .map(|spec| (distance(name, spec.name), spec.name))
+        .min();
+    let hint = match nearest {
+        Some((edits, nearest)) if edits <= 1 + nearest.len() / 3 => {
+            format!(" Did you mean `{nearest}`?")
+        }
+        _ => String::new(),
+    };
+    let all: Vec<&str> = SPECS.iter().map(|spec| spec.name).collect();
+    format!(
+        "there is no effect `{}` in the catalogue.{hint} The effects are: {}; `host-fit effects` explains them.",
+        name.escape_debug(),
+        all.join(", ")
+    )
+}
+
+/// Edits (insert, delete, replace) from one word to another.
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().take(100).enumerate() {
+        let mut corner = i;
+        let mut left = i + 1;
+        for (cell, y) in row.iter_mut().skip(1).zip(&b) {
+            let replaced = corner + usize::from(x != *y);
+            corner = *cell;
+            left = replaced.min(left + 1).min(corner + 1);
+            *cell = left;
+        }
+        if let Some(first) = row.first_mut() {
+            *first = i + 1;
+        }
+    }
+    row.last().copied().unwrap_or(0)
+}
+
+/// The catalogue's entries for `names`, which are new to `model`.
+///
+/// # Errors
+/// [`ExtendError::Unknown`] and [`ExtendError::Doubled`].
+pub fn effects_for(model: &Model, names: &[String]) -> Result<Vec<&'static Spec>, ExtendError> {
+    let mut present = model.effect_names();
+    let mut specs = Vec::new();
+    for name in names {
+        let found = spec(name).ok_or_else(|| ExtendError::Unknown(name.clone()))?;
+        if present.contains(name) {
+            return Err(ExtendError::Doubled(name.clone()));
+        }
+        present.push(name.clone());
+        specs.push(found);
+    }
+    Ok(specs)
+}
+
+/// Adds the effects called `names` to `model` and refits everything to the
+/// identify records among `records` (as the model sees them, see
+/// [`Model::targets`]).
+///
+/// # Errors
+/// [`ExtendError`]; a missing channel is named, not guessed.
+pub fn extend(
+    model: &Model,
+    records: &[Record],
+    names: &[String],
+) -> Result<Extended, ExtendError> {
+    let specs = effects_for(model, names)?;
+    let learning: Vec<&Record> = records.iter().filter(|r| r.role == Use::Identify).collect();
+    if learning.is_empty() {
+        return Err(ExtendError::NothingToLearnFrom);
+    }
+    // A held-out record without the channel could not be judged afterwards.
+    for spec in &specs {
+        let Some(channel) = spec.channel else {
+            continue;
+        };
+        if let Some(record) = records.iter().find(|r| !r.channels.contains_key(channel)) {
+            return Err(ExtendError::Candidate(CandidateError::MissingChannel {
+                effect: spec.name.to_owned(),
+                channel: channel.to_owned(),
+                record: record.name.clone(),
+            }));
+        }
+    }
+    let options = FitOptions {
+        constant: model.constant != 0.0,
+        ..FitOptions::default()
+    };
+    let with_all = |base: Model| -> Result<Fit, ExtendError> {
+        let mut current = base;
+        let mut last = None;
+        for spec in &specs {
+            let fitted = fit_with_effect(&current, spec, &learning, &options)?;
+            current = fitted.model.clone();
+            last = Some(fitted);
+        }
+        match last {
+            // Effects added one after the other are settled together.
+            Some(fitted) if specs.len() == 1 => Ok(fitted),
+            _ => Ok(fit(&current, &learning, &options)?),
+        }
+    };
+    let given = with_all(model.clone());
+    let lean = if model.start == Start::Rest {
+        lean_structure(model, &learning, &options).and_then(with_all)
+    } else {
+        Err(ExtendError::NothingToLearnFrom)
+    };
+    let (fitted, structure) = match (given, lean) {
+        (Ok(given), Ok(lean)) => {
+            let as_good = given.sum_of_squares * AS_GOOD * AS_GOOD;
+            if lean.sum_of_squares <= as_good {
+                (lean, Structure::Lean)
+            } else {
+                (given, Structure::Given)
+            }
+        }
+        (Ok(given), Err(_)) => (given, Structure::Given),
+        (Err(_), Ok(lean)) => (lean, Structure::Lean),
+        (Err(error), Err(_)) => return Err(error),
+    };
+    let parameters = specs.iter().map(|spec| {
+        let own = crate::diagnose::estimates(&fitted, spec);
+        (spec.name.to_owned(), own)
+    });
+    Ok(Extended {
+        structure,
+        parameters: parameters.collect(),
+        identify_rmse: (fitted.sum_of_squares / fitted.samples.max(1) as f64).sqrt(),
+        model: Model {
+            // A law was designed for the model as it was.
+            law: None,
+            ..fitted.model
+        },
+    })
+}
+
+/// The leanest structure with the effects that `model` has.
+fn lean_structure(
+    model: &Model,
+    learning: &[&Record],
+    options: &FitOptions,
+) -> Result<Model, ExtendError> {
+    let mut bare = model.clone();
+    let kept = std::mem::take(&mut bare.effects);
+    let lean = lean_base(&bare, learning)?;
+    if kept.is_empty() {
+        return Ok(lean.model);
+    }
+    let with_kept = Model {
+        effects: kept,
+        ..lean.model
+    };
+    Ok(fit(&with_kept, learning, options)?.model)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_misspelt_effect_is_answered_with_the_nearest() {
+        assert_eq!(distance("kitten", "sitting"), 3);
+        assert_eq!(distance("", "abc"), 3);
+        assert_eq!(distance("abc", ""), 3);
+        let text = nearest_name("plenum-drop");
+        assert!(text.contains("Did you mean `plenum-droop`?"), "{text}");
+        let text = nearest_name("x\n");
+        assert!(
+            !text.contains("Did you mean") && !text.contains('\n'),
+            "{text}"
+        );
+    }
+}

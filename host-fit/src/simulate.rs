@@ -270,25 +270,31 @@ impl Model {
         }
     }
 
+    /// The free run over signals, measured or not: what the sensor would show.
+    ///
+    /// # Errors
+    /// The sample at which the run left all bounds.
+    pub fn run_free(&self, signals: &Signals<'_>) -> Result<Vec<f64>, usize> {
+        let simulator = Simulator::with_values(self, &self.values(), Rounding::Samples);
+        let mut y = Vec::with_capacity(signals.u.len());
+        let left = simulator.run(signals, |_, output: &Output<f64>| {
+            y.push(output.measured);
+            ControlFlow::Continue(())
+        });
+        left.map_or(Ok(y), Err)
+    }
+
     /// The free run over a record: what the sensor would have shown, y_sim.
     ///
     /// # Errors
     /// A missing channel, or divergence.
     pub fn free_run(&self, record: &Record) -> Result<Vec<f64>, SimulateError> {
         let signals = Signals::of(self, record)?;
-        let simulator = Simulator::with_values(self, &self.values(), Rounding::Samples);
-        let mut y = Vec::with_capacity(signals.u.len());
-        let left = simulator.run(&signals, |_, output: &Output<f64>| {
-            y.push(output.measured);
-            ControlFlow::Continue(())
-        });
-        match left {
-            None => Ok(y),
-            Some(sample) => Err(SimulateError::Diverged {
+        self.run_free(&signals)
+            .map_err(|sample| SimulateError::Diverged {
                 record: record.name.clone(),
                 sample,
                 time: record.t0 + sample as f64 * record.sample_period_s,
-            }),
-        }
+            })
     }
 }

@@ -100,9 +100,7 @@ fn page(model: &Model, set: &DataSet, scores: &Scores, pictures: &[(String, Stri
     report.section("How well the model matches");
     report.paragraph(&describe(model));
     if let Some(all) = scores.held_out() {
-        let noise = all
-            .noise_rmse
-            .map_or_else(|| "–".to_owned(), |noise| short(noise));
+        let noise = all.noise_rmse.map_or_else(|| "–".to_owned(), short);
         report.key_numbers(&[
             KeyNumber::new("FIT", format!("{:.1} %", all.fit_percent), "free run"),
             KeyNumber::new("RMSE", short(all.rmse), "in y"),

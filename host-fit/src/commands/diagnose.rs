@@ -61,7 +61,6 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let options = Options {
         most_effects: args.most_effects as usize,
         seed: args.seed,
-        ..Options::default()
     };
     let bar = console.spinner("trying every effect");
     let diagnosis = diagnose(&model, &records, &options, watch())?;

@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use anyhow::bail;
-use host_fit::data::{InputFile, Record, Use};
+use anyhow::{Context, bail};
+use host_fit::data::InputFile;
 use host_fit::model::{Model, Start};
 use host_fit::output::write_atomic;
+use host_fit::simulate::Signals;
 
 use super::Console;
 
@@ -48,35 +49,49 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
             model.sample_period_s
         );
     }
-    let y = match (input.y, model.start) {
-        (Some(y), _) => y,
-        (None, Start::Rest) => vec![0.0; input.u.len()],
-        (None, Start::Measured) => bail!(
+    if input.y.is_none() && model.start == Start::Measured {
+        bail!(
             "{}: no column `y`, but this model starts from measurements (`start = \"measured\"`); \
              add the measured y of the first {} samples (later values are not used)",
             args.input.display(),
             model.warm_up()
+        );
+    }
+    let channels = model.channels();
+    let channels = channels.iter().map(|channel| {
+        let values = input.channels.get(channel).map(Vec::as_slice);
+        values.with_context(|| {
+            format!(
+                "{}: no column `{channel}`, which the model's effects need; add it",
+                args.input.display()
+            )
+        })
+    });
+    let signals = Signals {
+        u: &input.u,
+        y: input
+            .y
+            .as_deref()
+            .filter(|_| model.start == Start::Measured),
+        channels: channels.collect::<Result<_, _>>()?,
+    };
+    let time = |k: usize| input.t0 + k as f64 * model.sample_period_s;
+    let y = match model.run_free(&signals) {
+        Ok(y) => y,
+        Err(sample) => bail!(
+            "the model's free run diverges at t = {} s of {}: it is unstable for this command; \
+             identify it again, with fewer lags or `--objective free-run`",
+            time(sample),
+            args.input.display()
         ),
     };
-    let record = Record {
-        t0: input.t0,
-        channels: input.channels,
-        ..Record::new(
-            "the command",
-            Use::Validate,
-            model.sample_period_s,
-            input.u,
-            y,
-        )
-    };
-    let y = model.free_run(&record)?;
     write_atomic(&args.output, |file| {
         let mut csv = csv::Writer::from_writer(file);
         csv.write_record(["t", "u", "y"])?;
         for (k, y) in y.iter().enumerate() {
             // Times as they were given: sums of a period would print 0.30000000000000004.
-            let t = (record.time(k) * 1e9).round() / 1e9;
-            csv.write_record([t.to_string(), record.u[k].to_string(), y.to_string()])?;
+            let t = (time(k) * 1e9).round() / 1e9;
+            csv.write_record([t.to_string(), input.u[k].to_string(), y.to_string()])?;
         }
         csv.flush()
     })?;
@@ -88,7 +103,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         mean: y.iter().sum::<f64>() / count,
         lowest: y.iter().copied().fold(f64::INFINITY, f64::min),
         highest: y.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-        outside_training: model.outside_training(&record.u, &y),
+        outside_training: model.outside_training(&input.u, &y),
     };
     console.say(&format!(
         "{} samples ({} s): mean y {:.4}, between {:.4} and {:.4}; written to {}",

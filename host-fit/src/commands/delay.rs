@@ -7,7 +7,7 @@ use anyhow::Context;
 use host_fit::data::DataSet;
 use host_fit::delay::{
     DelayLawFit, DelayOptions, DelayStatistics, DelayStudy, DelayVerdict, EdgeDelay, Spread,
-    study_delays,
+    draw_delays, study_delays,
 };
 use host_fit::output::Staging;
 
@@ -108,6 +108,9 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
             }
             csv.flush()
         })?;
+        let title = set.title.as_deref().unwrap_or_default();
+        let picture = draw_delays(&study, title, set.sample_period_s);
+        staging.write("delays.svg", |w| w.write_all(picture.as_bytes()))?;
         staging.commit().context("writing the delays")?;
     }
     console.say(&words(&set, &study))?;

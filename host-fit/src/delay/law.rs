@@ -58,6 +58,12 @@ pub struct DelayLawFit {
     pub outliers: Vec<usize>,
     /// Smallest and largest ỹ in the fit: outside, the law is an extrapolation.
     pub range: (f64, f64),
+    /// Covariance of p0, p1 and ln p2, row by row.
+    #[serde(skip)]
+    covariance: [[f64; 3]; 3],
+    /// Student's t for 95 %.
+    #[serde(skip)]
+    quantile: f64,
 }
 
 impl DelayLawFit {
@@ -66,6 +72,31 @@ impl DelayLawFit {
     pub fn at(&self, mean_output: f64) -> f64 {
         self.p0.value + self.p1.value * (-self.p2.value * mean_output).exp()
     }
+
+    /// The 95 % confidence band of the law at ỹ, samples: (low, high). Infinite where the data do not determine it.
+    #[must_use]
+    pub fn band(&self, mean_output: f64) -> (f64, f64) {
+        let gradient = gradient(self.p1.value, self.p2.value, mean_output);
+        let variance: f64 = self
+            .covariance
+            .iter()
+            .zip(&gradient)
+            .flat_map(|(row, a)| row.iter().zip(&gradient).map(move |(c, b)| a * b * c))
+            .sum();
+        let half = self.quantile * variance.max(0.0).sqrt();
+        let middle = self.at(mean_output);
+        if half.is_finite() {
+            (middle - half, middle + half)
+        } else {
+            (f64::NEG_INFINITY, f64::INFINITY)
+        }
+    }
+}
+
+/// ∂h̃/∂(p0, p1, ln p2).
+fn gradient(p1: f64, p2: f64, mean_output: f64) -> [f64; 3] {
+    let e = (-p2 * mean_output).exp();
+    [1.0, e, -p1 * p2 * mean_output * e]
 }
 
 /// A least-squares fit at one value of p2.
@@ -238,29 +269,35 @@ pub fn fit_delay_law(points: &[DelayPoint]) -> Option<DelayLawFit> {
     let variance = fit.rss / free;
     let mean = kept.iter().map(|p| p.delay).sum::<f64>() / n as f64;
     let total: f64 = kept.iter().map(|p| (p.delay - mean).powi(2)).sum();
-    // (JᵀJ)⁻¹, column by column; p2 is scaled so that the matrix is well conditioned.
+    // (JᵀJ)⁻¹, column by column; ln p2 in place of p2 keeps the matrix well conditioned.
     let mut information = vec![0.0; 9];
     for p in &kept {
-        let e = (-p2 * p.mean_output).exp();
-        let j = [1.0, e, -p1 * p.mean_output * e * p2];
+        let j = gradient(p1, p2, p.mean_output);
         for (row, ja) in information.chunks_exact_mut(3).zip(&j) {
             for (target, jb) in row.iter_mut().zip(&j) {
                 *target += ja * jb;
             }
         }
     }
+    // A direction that the data say nothing about has an infinite error, not none.
+    let mut covariance = [[f64::INFINITY; 3]; 3];
+    for (axis, row) in covariance.iter_mut().enumerate() {
+        let unit: Vec<f64> = (0..3).map(|i| f64::from(u8::from(i == axis))).collect();
+        if let Some(column) = linalg::solve_symmetric(&information, &unit) {
+            for (target, value) in row.iter_mut().zip(column) {
+                *target = variance * value;
+            }
+        }
+    }
     let quantile = StudentsT::new(0.0, 1.0, free).ok()?.inverse_cdf(0.975);
     let estimate = |value: f64, axis: usize, scale: f64| {
-        let mut unit = [0.0; 3];
-        if let Some(u) = unit.get_mut(axis) {
-            *u = 1.0;
-        }
-        // A direction that the data say nothing about has an infinite error, not none.
-        let inverse = linalg::solve_symmetric(&information, &unit)
-            .and_then(|column| column.get(axis).copied())
+        let variance = covariance
+            .get(axis)
+            .and_then(|row| row.get(axis))
+            .copied()
             .filter(|v| *v >= 0.0)
             .unwrap_or(f64::INFINITY);
-        let standard_error = (variance * inverse).sqrt() * scale;
+        let standard_error = variance.sqrt() * scale;
         Estimate {
             value,
             standard_error,
@@ -281,6 +318,8 @@ pub fn fit_delay_law(points: &[DelayPoint]) -> Option<DelayLawFit> {
         edges: n,
         outliers,
         range: range(&kept),
+        covariance,
+        quantile,
     })
 }
 
@@ -319,7 +358,7 @@ mod tests {
 
     #[test]
     fn intervals_cover_the_truth_as_often_as_they_say() {
-        let mut covered = [0; 3];
+        let mut covered = [0; 4];
         let runs = 400;
         for seed in 0..runs {
             let fit = fit_delay_law(&points(100, 1.0, seed)).unwrap();
@@ -330,6 +369,9 @@ mod tests {
             {
                 *count += u32::from(e.low <= truth && truth <= e.high);
             }
+            let (low, high) = fit.band(0.1);
+            let truth = 47.35 + 12.69 * (-2.018f64).exp();
+            covered[3] += u32::from(low <= truth && truth <= high);
         }
         for count in covered {
             let share = f64::from(count) / runs as f64;

@@ -4,12 +4,14 @@
 //! delay with the averaged output (1) at that time, fits h̃(ỹ) = p0 + p1·exp(−p2·ỹ) to the edges of the identify
 //! records, and tests whether the data bear such a law out.
 
+mod drawing;
 mod edge;
 mod front;
 mod law;
 mod onset;
 mod study;
 
+pub use drawing::draw_delays;
 pub use edge::{Edge, edges, mean_output};
 pub use law::{DelayLawFit, DelayPoint, Estimate, fit_delay_law};
 pub use onset::{Onset, Unmeasured};

@@ -19,7 +19,7 @@ use super::edge::Edge;
 use super::front::{Expectation, expect, level_filter, own_front};
 
 /// Time constants of the course before and of the response, samples; 0 stands for a straight line.
-const BEFORE_SHAPES: [f64; 4] = [0.0, 12.0, 40.0, 120.0];
+const BEFORE_SHAPES: [f64; 9] = [0.0, 8.0, 12.0, 17.0, 25.0, 36.0, 55.0, 90.0, 180.0];
 const RESPONSE_SHAPES: [f64; 17] = [
     0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 3.0, 6.0, 11.0, 22.0, 45.0, 90.0, 180.0,
     360.0,

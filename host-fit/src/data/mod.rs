@@ -6,6 +6,7 @@
 
 mod average;
 mod error;
+mod excitation;
 mod folder;
 mod hash;
 mod raw;
@@ -16,5 +17,6 @@ mod table;
 
 pub use average::{Align, AverageError, AverageSummary, Averaging, Defect, Dropped, average_files};
 pub use error::{DataError, Place, Problem};
+pub use excitation::{Demand, Excitation, ExcitationError, RecordExcitation, check_excitation};
 pub use record::{DataSet, Record, Use};
 pub use table::InputFile;

@@ -1,0 +1,514 @@
+//! What the commands of a data set can tell, before anything is fitted.
+//!
+//! Two input delays that differ by d samples can be told apart by the samples at which u_k and u_{k−d} differ, and by
+//! nothing else. [`Excitation`] counts those: for a square wave they vanish whenever d is a multiple of the period, for a
+//! single step they are d per edge and no more. Beside the pairs, the whole span of delays is judged at once: the
+//! eigenvalues of the covariance of lagged inputs tell how many of them are free of the others.
+
+use super::record::{DataSet, Record};
+
+/// Lags put side by side in the covariance.
+const MOST_LAGS: usize = 32;
+/// An eigenvalue below this share of the largest stands for a direction that noise decides.
+const NEGLIGIBLE: f64 = 0.01;
+/// Delays count as alike when they differ at less than this share of the samples at which they could.
+const ALIKE: f64 = 0.1;
+
+/// What a fit is going to ask of the data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Demand {
+    /// Longest lag or delay in the model, samples.
+    pub max_lag: usize,
+    /// Coefficients that are estimated together.
+    pub coefficients: usize,
+}
+
+/// Why the data cannot bear a fit at all.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExcitationError {
+    /// Nothing to fit on.
+    #[error(
+        "no record is marked use = \"identify\", so there is nothing to fit on; mark at least one"
+    )]
+    NoIdentifyRecord,
+    /// u never changes.
+    #[error(
+        "the command is constant ({0}) in every identify record, so its effect cannot be told from the flow's own motion; record at least one switching of the command"
+    )]
+    ConstantInput(f64),
+    /// y never changes.
+    #[error(
+        "the output is constant ({0}) in every identify record; check the sensor and the column y"
+    )]
+    ConstantOutput(f64),
+    /// Records shorter than the model's memory.
+    #[error(
+        "the longest identify record has {longest} samples, no more than the longest lag of {max_lag}; record for longer or lower the longest lag (--max-lag)"
+    )]
+    TooShort {
+        /// Samples in the longest identify record.
+        longest: usize,
+        /// The longest lag asked for.
+        max_lag: usize,
+    },
+    /// Fewer equations than unknowns.
+    #[error(
+        "the identify records give {equations} equations for {coefficients} coefficients; record for longer or use fewer lags"
+    )]
+    TooFewSamples {
+        /// Number of one-step equations.
+        equations: usize,
+        /// Number of unknowns.
+        coefficients: usize,
+    },
+}
+
+/// Switching in one record.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct RecordExcitation {
+    /// Name of the record.
+    pub name: String,
+    /// Number of samples.
+    pub samples: usize,
+    /// Off → on.
+    pub rising_edges: usize,
+    /// On → off.
+    pub falling_edges: usize,
+    /// Shortest and longest time on between two edges, samples.
+    pub on_times: Option<(usize, usize)>,
+    /// Shortest and longest time off between two edges, samples.
+    pub off_times: Option<(usize, usize)>,
+    /// Share of samples with the command on.
+    pub duty: f64,
+}
+
+/// What the identify records can tell.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Excitation {
+    /// Each identify record.
+    pub records: Vec<RecordExcitation>,
+    /// Whether the command is 0 or 1 throughout; if not, edges are changes from and to 0.
+    pub on_off: bool,
+    /// Different times on, of all identify records, to the sample.
+    pub distinct_on_times: usize,
+    /// Different times off.
+    pub distinct_off_times: usize,
+    /// For d = 0 … max_lag: Σ (u_k − u_{k−d})², summed over the identify records with u = 0 before each. For an on/off
+    /// command it is the number of samples at which delays d apart predict different things.
+    pub separation: Vec<f64>,
+    /// Ranges of d (first, last), beyond the shortest, at which two delays d apart look alike.
+    pub alike: Vec<(usize, usize)>,
+    /// Lags put side by side, evenly spaced up to the longest.
+    pub lags_tried: usize,
+    /// How many of them the commands separate (eigenvalues of their covariance above 1/100 of the largest).
+    pub lags_separated: usize,
+    /// Condition number of that covariance, capped at 1e16.
+    pub condition: f64,
+    /// The same in plain sentences, worst first; empty if there is nothing to remark.
+    pub remarks: Vec<String>,
+}
+
+impl Excitation {
+    /// Judges the identify records of a data set for a model that reaches `max_lag` samples back.
+    #[must_use]
+    pub fn of(set: &DataSet, max_lag: usize) -> Self {
+        let records: Vec<&Record> = set.identify().collect();
+        let mut on = Vec::new();
+        let mut off = Vec::new();
+        let described: Vec<RecordExcitation> = records
+            .iter()
+            .map(|r| describe(r, &mut on, &mut off))
+            .collect();
+        let distinct = |mut times: Vec<usize>| {
+            times.sort_unstable();
+            times.dedup();
+            times.len()
+        };
+        let separation: Vec<f64> = (0..=max_lag).map(|d| separation(&records, d)).collect();
+        let alike = alike_ranges(&separation);
+        let (lags_tried, lags_separated, condition) = separated_lags(&records, max_lag);
+        let mut found = Self {
+            on_off: records.iter().all(|r| r.is_on_off()),
+            records: described,
+            distinct_on_times: distinct(on),
+            distinct_off_times: distinct(off),
+            separation,
+            alike,
+            lags_tried,
+            lags_separated,
+            condition,
+            remarks: Vec::new(),
+        };
+        found.remarks = found.remark(set.sample_period_s);
+        found
+    }
+
+    fn remark(&self, sample_period_s: f64) -> Vec<String> {
+        let mut remarks = Vec::new();
+        let edges: usize = self
+            .records
+            .iter()
+            .map(|r| r.rising_edges + r.falling_edges)
+            .sum();
+        if edges < 4 {
+            remarks.push(format!(
+                "The command switches only {edges} time(s): a delay and time constants can be estimated, but nothing about how they depend on the flow."
+            ));
+        }
+        if let Some((first, last)) = self.alike.first() {
+            remarks.push(format!(
+                "Input delays that differ by {first}–{last} samples ({:.3}–{:.3} s) predict nearly the same, because the command repeats: such a pair cannot be told apart. Random on and off times would separate them.",
+                *first as f64 * sample_period_s,
+                *last as f64 * sample_period_s
+            ));
+        }
+        if edges >= 4 && self.distinct_on_times <= 1 && self.distinct_off_times <= 1 {
+            remarks.push(
+                "All on-times are equal and all off-times are equal: a slow effect (droop, drift, hysteresis) cannot be told from the response itself. Add a record with other times.".into(),
+            );
+        }
+        if 2 * self.lags_separated < self.lags_tried {
+            remarks.push(format!(
+                "Of {} input delays spread over the lags asked for, the commands separate about {}: least squares over many input delays will be decided by noise.",
+                self.lags_tried, self.lags_separated
+            ));
+        }
+        remarks
+    }
+}
+
+/// Refuses data on which a fit is hopeless, and reports what the rest can tell.
+///
+/// # Errors
+/// [`ExcitationError`] when no record is for identification, u or y is constant in all that are, or they are too short.
+pub fn check_excitation(set: &DataSet, demand: Demand) -> Result<Excitation, ExcitationError> {
+    let records: Vec<&Record> = set.identify().collect();
+    let longest = records
+        .iter()
+        .map(|r| r.len())
+        .max()
+        .ok_or(ExcitationError::NoIdentifyRecord)?;
+    // A record that starts blowing has its edge against the zero history.
+    let varies = |r: &Record| r.u.iter().any(|u| Some(u) != r.u.first());
+    if !records.iter().any(|r| varies(r)) {
+        let level = records.first().and_then(|r| r.u.first()).copied();
+        return Err(ExcitationError::ConstantInput(level.unwrap_or(0.0)));
+    }
+    if records
+        .iter()
+        .all(|r| r.y.iter().all(|y| Some(y) == r.y.first()))
+    {
+        let level = records.first().and_then(|r| r.y.first()).copied();
+        return Err(ExcitationError::ConstantOutput(level.unwrap_or(0.0)));
+    }
+    if longest <= demand.max_lag {
+        return Err(ExcitationError::TooShort {
+            longest,
+            max_lag: demand.max_lag,
+        });
+    }
+    let equations: usize = records.iter().map(|r| r.len() - 1).sum();
+    if equations < demand.coefficients {
+        return Err(ExcitationError::TooFewSamples {
+            equations,
+            coefficients: demand.coefficients,
+        });
+    }
+    Ok(Excitation::of(set, demand.max_lag))
+}
+
+fn describe(record: &Record, on: &mut Vec<usize>, off: &mut Vec<usize>) -> RecordExcitation {
+    let (mut rising, mut falling) = (0, 0);
+    let (mut my_on, mut my_off) = (Vec::new(), Vec::new());
+    let mut level = false;
+    let mut since: Option<usize> = None;
+    for (k, &u) in record.u.iter().enumerate() {
+        let now = u != 0.0;
+        if now == level {
+            continue;
+        }
+        // Times that the record's ends cut off are not known.
+        if let Some(since) = since {
+            if level { &mut my_on } else { &mut my_off }.push(k - since);
+        }
+        *(if now { &mut rising } else { &mut falling }) += 1;
+        level = now;
+        since = Some(k);
+    }
+    let extremes = |times: &[usize]| Some((*times.iter().min()?, *times.iter().max()?));
+    let described = RecordExcitation {
+        name: record.name.clone(),
+        samples: record.len(),
+        rising_edges: rising,
+        falling_edges: falling,
+        on_times: extremes(&my_on),
+        off_times: extremes(&my_off),
+        duty: record.u.iter().filter(|u| **u != 0.0).count() as f64 / record.len().max(1) as f64,
+    };
+    on.append(&mut my_on);
+    off.append(&mut my_off);
+    described
+}
+
+/// Σ (u_k − u_{k−d})² over the records, u = 0 before each.
+fn separation(records: &[&Record], d: usize) -> f64 {
+    records
+        .iter()
+        .map(|r| {
+            let head: f64 = r.u.iter().take(d).map(|u| u * u).sum();
+            let rest = r.u.iter().skip(d).zip(&r.u);
+            head + rest.map(|(a, b)| (a - b).powi(2)).sum::<f64>()
+        })
+        .sum()
+}
+
+/// Ranges of d in which the separation has fallen back to a small share of what it had reached before.
+fn alike_ranges(separation: &[f64]) -> Vec<(usize, usize)> {
+    let mut reached: f64 = 0.0;
+    let mut ranges: Vec<(usize, usize)> = Vec::new();
+    for (d, &s) in separation.iter().enumerate() {
+        reached = reached.max(s);
+        if s < ALIKE * reached {
+            match ranges.last_mut() {
+                Some(range) if range.1 + 1 == d => range.1 = d,
+                _ => ranges.push((d, d)),
+            }
+        }
+    }
+    ranges
+}
+
+/// Lags spread over 0 … max_lag: how many are tried, how many the covariance separates, its condition number.
+fn separated_lags(records: &[&Record], max_lag: usize) -> (usize, usize, f64) {
+    let count = MOST_LAGS.min(max_lag + 1);
+    let step = max_lag as f64 / (count - 1).max(1) as f64;
+    let lags: Vec<usize> = (0..count)
+        .map(|i| (i as f64 * step).round() as usize)
+        .collect();
+    let mut covariance = vec![0.0; count * count];
+    let n: usize = records.iter().map(|r| r.len()).sum();
+    let shifted_sum = |lag: usize| -> f64 {
+        let sums = records
+            .iter()
+            .map(|r| r.u.iter().take(r.len().saturating_sub(lag)).sum::<f64>());
+        sums.sum()
+    };
+    for (i, &a) in lags.iter().enumerate() {
+        for (j, &b) in lags.iter().enumerate().skip(i) {
+            // Σ u_{k−a} u_{k−b} over k, with a ≤ b.
+            let product: f64 = records
+                .iter()
+                .map(|r| {
+                    let late = r.u.iter().skip(b - a);
+                    let shared = r.len().saturating_sub(b);
+                    late.zip(&r.u).take(shared).map(|(x, y)| x * y).sum::<f64>()
+                })
+                .sum();
+            let value = product - shifted_sum(a) * shifted_sum(b) / n.max(1) as f64;
+            for at in [i * count + j, j * count + i] {
+                if let Some(target) = covariance.get_mut(at) {
+                    *target = value;
+                }
+            }
+        }
+    }
+    let eigenvalues = symmetric_eigenvalues(covariance, count);
+    let largest = eigenvalues.iter().copied().fold(0.0, f64::max);
+    let smallest = eigenvalues.iter().copied().fold(f64::INFINITY, f64::min);
+    let separated = eigenvalues
+        .iter()
+        .filter(|e| **e > NEGLIGIBLE * largest && largest > 0.0)
+        .count();
+    let condition = if smallest > 0.0 {
+        (largest / smallest).min(1e16)
+    } else {
+        1e16
+    };
+    (count, separated, condition)
+}
+
+/// Eigenvalues of a symmetric matrix (row-major, n × n), by cyclic Jacobi rotations; for n up to a few dozen.
+fn symmetric_eigenvalues(mut a: Vec<f64>, n: usize) -> Vec<f64> {
+    let size: f64 = a.iter().map(|x| x * x).sum();
+    for _ in 0..50 {
+        let mut off = 0.0;
+        for p in 0..n {
+            for q in p + 1..n {
+                off += a[p * n + q] * a[p * n + q];
+            }
+        }
+        if off <= 1e-28 * size {
+            break;
+        }
+        for p in 0..n {
+            for q in p + 1..n {
+                let apq = a[p * n + q];
+                if apq == 0.0 {
+                    continue;
+                }
+                let theta = (a[q * n + q] - a[p * n + p]) / (2.0 * apq);
+                let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+                let c = 1.0 / (t * t + 1.0).sqrt();
+                let s = t * c;
+                for k in 0..n {
+                    let (x, y) = (a[k * n + p], a[k * n + q]);
+                    a[k * n + p] = c * x - s * y;
+                    a[k * n + q] = s * x + c * y;
+                }
+                for k in 0..n {
+                    let (x, y) = (a[p * n + k], a[q * n + k]);
+                    a[p * n + k] = c * x - s * y;
+                    a[q * n + k] = s * x + c * y;
+                }
+            }
+        }
+    }
+    (0..n).map(|i| a[i * n + i]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Use;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    fn set(u: Vec<f64>) -> DataSet {
+        let y = (0..u.len()).map(|k| (k as f64 * 0.01).sin()).collect();
+        let record = Record::new("r", Use::Identify, 0.001, u, y);
+        DataSet::from_records(None, vec![record]).unwrap()
+    }
+
+    fn square(n: usize) -> Vec<f64> {
+        (0..n).map(|k| f64::from(u8::from(k % 250 < 125))).collect()
+    }
+
+    fn random(n: usize, seed: u64) -> Vec<f64> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut u = Vec::new();
+        while u.len() < n {
+            let (on, off) = (rng.random_range(20..300), rng.random_range(20..300));
+            u.extend(std::iter::repeat_n(1.0, on));
+            u.extend(std::iter::repeat_n(0.0, off));
+        }
+        u.truncate(n);
+        u
+    }
+
+    #[test]
+    fn a_square_wave_cannot_tell_delays_a_period_apart() {
+        let found = Excitation::of(&set(square(10_000)), 500);
+        // u_k and u_{k−d} differ at 2 d samples per period of 250 while d ≤ 125 (the start adds a few).
+        assert!((found.separation[50] / (40.0 * 2.0 * 50.0) - 1.0).abs() < 0.02);
+        assert!(
+            found.alike.iter().any(|(a, b)| (*a..=*b).contains(&250)),
+            "{:?}",
+            found.alike
+        );
+        assert!(
+            found
+                .remarks
+                .iter()
+                .any(|r| r.contains("cannot be told apart"))
+        );
+        assert!(
+            found
+                .remarks
+                .iter()
+                .any(|r| r.contains("on-times are equal"))
+        );
+        assert_eq!((found.distinct_on_times, found.distinct_off_times), (1, 1));
+        assert_eq!(found.records[0].on_times, Some((125, 125)));
+        assert_eq!(
+            (found.records[0].rising_edges, found.records[0].duty),
+            (40, 0.5)
+        );
+    }
+
+    #[test]
+    fn random_switching_separates_more_than_a_square_wave_and_a_step() {
+        let random = Excitation::of(&set(random(10_000, 1)), 500);
+        assert!(
+            random.alike.is_empty() && random.remarks.is_empty(),
+            "{:?}",
+            random.remarks
+        );
+        let square = Excitation::of(&set(square(10_000)), 500);
+        let step = Excitation::of(
+            &set((0..10_000).map(|k| f64::from(u8::from(k > 500))).collect()),
+            500,
+        );
+        assert!(
+            random.lags_separated > square.lags_separated,
+            "{} {}; {} {}; {} {}",
+            random.lags_separated,
+            square.lags_separated,
+            random.condition,
+            square.condition,
+            step.lags_separated,
+            step.condition
+        );
+        assert!(random.condition < square.condition);
+        assert!(step.remarks[0].contains("1 time"), "{:?}", step.remarks);
+    }
+
+    #[test]
+    fn eigenvalues_of_a_known_matrix() {
+        // Second differences: 2 − 2 cos(iπ/(n + 1)).
+        let n = 8;
+        let mut a = vec![0.0; n * n];
+        for i in 0..n {
+            a[i * n + i] = 2.0;
+            if i + 1 < n {
+                a[i * n + i + 1] = -1.0;
+                a[(i + 1) * n + i] = -1.0;
+            }
+        }
+        let mut found = symmetric_eigenvalues(a, n);
+        found.sort_by(f64::total_cmp);
+        for (i, value) in found.iter().enumerate() {
+            let exact = 2.0 - 2.0 * ((i + 1) as f64 * std::f64::consts::PI / (n + 1) as f64).cos();
+            assert!((value - exact).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn hopeless_data_are_refused_with_the_reason() {
+        let demand = Demand {
+            max_lag: 100,
+            coefficients: 16,
+        };
+        let error = |set: &DataSet, demand| check_excitation(set, demand).unwrap_err().to_string();
+        assert!(error(&set(vec![1.0; 500]), demand).contains("constant (1)"));
+        assert!(
+            error(
+                &set(square(101).into_iter().take(100).chain([0.0]).collect()),
+                Demand {
+                    max_lag: 101,
+                    ..demand
+                }
+            )
+            .contains("--max-lag")
+        );
+        assert!(
+            error(
+                &set(square(130)),
+                Demand {
+                    max_lag: 5,
+                    coefficients: 500
+                }
+            )
+            .contains("129 equations")
+        );
+        let mut flat = set(square(500)).records;
+        flat[0].y = vec![0.5; 500];
+        let flat = DataSet::from_records(None, flat).unwrap();
+        assert!(error(&flat, demand).contains("check the sensor"));
+        let mut held_out = flat.records;
+        held_out[0].role = Use::Validate;
+        let held_out = DataSet::from_records(None, held_out).unwrap();
+        assert!(error(&held_out, demand).contains("identify"));
+        assert!(check_excitation(&set(square(500)), demand).is_ok());
+    }
+}

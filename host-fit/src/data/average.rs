@@ -408,7 +408,11 @@ impl Folding {
             defect: Some(Defect::MissingSamples),
         };
         // Whole periods inside a long gap are counted without walking through them.
-        let far = (count.saturating_sub(2 * self.length as u64) as f64 / self.exact_length) as u64;
+        let period = match self.align {
+            Align::Edges => self.length as f64,
+            Align::Grid => self.exact_length,
+        };
+        let far = (count.saturating_sub(2 * self.length as u64) as f64 / period) as u64;
         let mut near = count;
         if far > 0 {
             self.drop_period(Defect::MissingSamples, line, far);
@@ -416,7 +420,7 @@ impl Folding {
                 Align::Edges => far * self.length as u64,
                 Align::Grid => {
                     let before = self.started_at;
-                    self.period += far;
+                    self.period = self.period.saturating_add(far);
                     self.started_at = (self.period as f64 * self.exact_length).round() as u64;
                     self.started_at - before
                 }
@@ -882,6 +886,20 @@ mod tests {
         let (record, summary) = run(&text(&rows), &Averaging::over(0.1)).unwrap();
         assert_eq!(summary.periods_used, 9, "{summary:?}");
         assert!((record.y[35] - response(35)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_gap_of_years_takes_no_time_when_the_period_is_no_whole_number_of_samples() {
+        let mut rows = recording(10, 0.0, 5);
+        rows[450..].iter_mut().for_each(|r| r.time += 1e9);
+        for align in [Align::Edges, Align::Grid] {
+            let averaging = Averaging {
+                align,
+                ..Averaging::over(0.0024)
+            };
+            let outcome = run(&text(&rows), &averaging);
+            assert!(outcome.is_ok_and(|(_, summary)| summary.periods_used > 0));
+        }
     }
 
     #[test]

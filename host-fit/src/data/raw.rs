@@ -13,6 +13,9 @@ const HEAD_ROWS: usize = 20_000;
 /// A row belongs to the uniform grid if its step is a whole number of periods within this share of one.
 const GRID_TOLERANCE: f64 = 0.25;
 
+/// Samples over which a gap can be told; a longer one is taken for so many.
+const FARTHEST: f64 = 1e15;
+
 /// Where a cell of a row goes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Slot {
@@ -152,7 +155,7 @@ impl<R: BufRead> RawReader<R> {
                 if steps <= GRID_TOLERANCE {
                     Step::Restart
                 } else if (steps - steps.round()).abs() <= GRID_TOLERANCE && steps >= 0.5 {
-                    Step::Forward(steps.round() as u64)
+                    Step::Forward(steps.round().min(FARTHEST) as u64)
                 } else {
                     Step::OffGrid
                 }

@@ -1,0 +1,250 @@
+//! Whatever bytes a user's files hold, loading ends in data that keep their promises or in one paragraph that names
+//! the file; never in a panic, never with half an output.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use host_fit::data::{Averaging, DataSet, Excitation, InputFile, average_files};
+use proptest::prelude::*;
+
+fn csv(rows: usize) -> String {
+    let mut text = String::from("t,u,y,y_sd,y_min,y_max,u_inf\n");
+    for k in 0..rows {
+        let y = (k as f64 * 0.3).sin();
+        text.push_str(&format!(
+            "{:.3},{},{y},0.01,{},{},9.8\n",
+            k as f64 * 0.001,
+            (k / 5) % 2,
+            y - 0.1,
+            y + 0.1
+        ));
+    }
+    text
+}
+
+const MANIFEST: &str = "title = \"T\"\nsample_period_s = 0.001\n\n[[record]]\nname = \"a\"\nfile = \"a.csv\"\nuse = \"identify\"\n";
+
+/// One change of a text file.
+#[derive(Debug, Clone)]
+enum Mutation {
+    Flip(prop::sample::Index, u8),
+    Insert(prop::sample::Index, Vec<u8>),
+    Remove(prop::sample::Index, usize),
+    Cut(prop::sample::Index),
+}
+
+fn mutation() -> impl Strategy<Value = Mutation> {
+    let telling = prop_oneof![
+        Just(b",".to_vec()),
+        Just(b"\n".to_vec()),
+        Just(b"\r".to_vec()),
+        Just(b"\"".to_vec()),
+        Just(b"nan".to_vec()),
+        Just(b"-1e999".to_vec()),
+        Just(b"\xff\xfe".to_vec()),
+        Just(b"\0".to_vec()),
+        Just(b"../".to_vec()),
+        Just(b"= [[".to_vec()),
+        prop::collection::vec(any::<u8>(), 1..8),
+    ];
+    prop_oneof![
+        (any::<prop::sample::Index>(), any::<u8>()).prop_map(|(i, b)| Mutation::Flip(i, b)),
+        (any::<prop::sample::Index>(), telling).prop_map(|(i, b)| Mutation::Insert(i, b)),
+        (any::<prop::sample::Index>(), 1..40usize).prop_map(|(i, n)| Mutation::Remove(i, n)),
+        any::<prop::sample::Index>().prop_map(Mutation::Cut),
+    ]
+}
+
+fn mutate(text: &str, mutations: &[Mutation]) -> Vec<u8> {
+    let mut bytes = text.as_bytes().to_vec();
+    for m in mutations {
+        if bytes.is_empty() {
+            break;
+        }
+        match m {
+            Mutation::Flip(i, b) => {
+                let at = i.index(bytes.len());
+                bytes[at] = *b;
+            }
+            Mutation::Insert(i, new) => {
+                let at = i.index(bytes.len());
+                bytes.splice(at..at, new.iter().copied());
+            }
+            Mutation::Remove(i, n) => {
+                let at = i.index(bytes.len());
+                bytes.drain(at..(at + n).min(bytes.len()));
+            }
+            Mutation::Cut(i) => bytes.truncate(i.index(bytes.len())),
+        }
+    }
+    bytes
+}
+
+/// Loads the folder (or file): either every promise holds, or the message is one paragraph that names a file of it.
+fn judge(path: &Path, names: &[&str]) {
+    match DataSet::load(path) {
+        Ok(set) => {
+            assert!(!set.records.is_empty());
+            for r in &set.records {
+                assert!(r.len() >= 2 && r.y.len() == r.len());
+                assert!(r.sample_period_s.is_finite() && r.sample_period_s > 0.0);
+                let columns = [Some(&r.u), Some(&r.y), r.y_sd.as_ref(), r.y_min.as_ref()];
+                for column in columns.into_iter().flatten().chain(r.channels.values()) {
+                    assert_eq!(column.len(), r.len());
+                    assert!(column.iter().all(|v| v.is_finite() && v.abs() <= 1e100));
+                }
+            }
+            let _ = Excitation::of(&set, 10);
+        }
+        Err(e) => {
+            let text = e.to_string();
+            assert!(names.iter().any(|n| text.contains(n)), "{text}");
+            assert!(!text.contains('\n') && text.len() < 2000, "{text}");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn arbitrary_bytes_as_csv(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("wild.csv");
+        fs::write(&path, bytes).unwrap();
+        judge(&path, &["wild.csv"]);
+        if let Err(e) = InputFile::load(&path, None) {
+            prop_assert!(e.to_string().contains("wild.csv"));
+        }
+    }
+
+    #[test]
+    fn csv_like_text(text in "t,u,y\n([0-9.,e+\\-naif\"\r \t]{0,12}[,\n]){0,30}") {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("wild.csv");
+        fs::write(&path, text).unwrap();
+        judge(&path, &["wild.csv"]);
+    }
+
+    #[test]
+    fn mutated_csv(mutations in prop::collection::vec(mutation(), 1..4)) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        fs::write(&path, mutate(&csv(40), &mutations)).unwrap();
+        judge(&path, &["a.csv"]);
+        fs::write(folder.path().join("dataset.toml"), MANIFEST).unwrap();
+        judge(folder.path(), &["a.csv"]);
+    }
+
+    #[test]
+    fn mutated_manifest(mutations in prop::collection::vec(mutation(), 1..4)) {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("a.csv"), csv(20)).unwrap();
+        fs::write(folder.path().join("dataset.toml"), mutate(MANIFEST, &mutations)).unwrap();
+        judge(folder.path(), &["dataset.toml", "a.csv", folder.path().to_str().unwrap()]);
+    }
+
+    #[test]
+    fn arbitrary_manifest(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("dataset.toml"), bytes).unwrap();
+        judge(folder.path(), &["dataset.toml"]);
+    }
+
+    #[test]
+    fn mutated_raw_recordings(mutations in prop::collection::vec(mutation(), 0..6), period in 0.0..0.05f64) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("raw.csv");
+        let text = csv(60).lines().map(|l| l.splitn(7, ',').take(3).collect::<Vec<_>>().join(",") + "\n").collect::<String>();
+        fs::write(&path, mutate(&text, &mutations)).unwrap();
+        match average_files(&[&path], &[], &Averaging::over(period), &mut |_, _| {}) {
+            Ok((set, summaries)) => {
+                prop_assert!(set.records[0].y.iter().all(|y| y.is_finite()));
+                prop_assert!(summaries[0].periods_used >= 1);
+            }
+            Err(e) => {
+                let text = e.to_string();
+                prop_assert!(text.contains("raw.csv") || text.contains("period of"), "{}", text);
+                prop_assert!(!text.contains('\n'));
+            }
+        }
+    }
+}
+
+fn host_fit(arguments: &[&str]) -> (Option<i32>, String, String) {
+    let out = Command::new(env!("CARGO_BIN_EXE_host-fit"))
+        .args(arguments)
+        .output()
+        .unwrap();
+    (
+        out.status.code(),
+        String::from_utf8(out.stdout).unwrap(),
+        String::from_utf8(out.stderr).unwrap(),
+    )
+}
+
+#[test]
+fn the_program_exits_1_on_bad_data_2_on_bad_usage_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv");
+    let file = path.to_str().unwrap();
+    let out = folder.path().join("out");
+    let out = out.to_str().unwrap();
+    fs::write(&path, "t,u,y\n0,0,0\n0.001,0,x\n").unwrap();
+    for arguments in [
+        vec!["delay", file, "--out", out],
+        vec!["--json", "delay", file],
+        vec!["average", file, "--period", "0.5", "--out", out],
+        vec!["delay", "no/such/folder"],
+    ] {
+        let (code, stdout, stderr) = host_fit(&arguments);
+        assert_eq!(code, Some(1), "{arguments:?}: {stderr}");
+        assert!(stdout.is_empty());
+        assert!(
+            stderr.starts_with("error: ") && stderr.trim_end().lines().count() == 1,
+            "{stderr}"
+        );
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+    for arguments in [
+        vec!["delay"],
+        vec!["average", file, "--period", "0", "--out", out],
+        vec!["nonsense"],
+    ] {
+        assert_eq!(host_fit(&arguments).0, Some(2), "{arguments:?}");
+    }
+}
+
+#[test]
+fn json_is_one_document_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let raw = folder.path().join("run.csv");
+    let mut text = String::from("t,u,y\n");
+    for k in 0..1000 {
+        let on = k % 100 >= 20 && k % 100 < 60;
+        text.push_str(&format!(
+            "{:.3},{},{}\n",
+            f64::from(k) * 0.001,
+            u8::from(on),
+            f64::from(k % 100)
+        ));
+    }
+    fs::write(&raw, text).unwrap();
+    let out = folder.path().join("set");
+    let (raw, out) = (raw.to_str().unwrap(), out.to_str().unwrap());
+    let (code, stdout, stderr) =
+        host_fit(&["average", raw, "--period", "0.1", "--out", out, "--json"]);
+    assert_eq!((code, stderr.as_str()), (Some(0), ""));
+    let document: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+    assert_eq!(document["recordings"][0]["periods_used"], 10);
+    assert_eq!(
+        document["hash"],
+        DataSet::load(Path::new(out)).unwrap().hash
+    );
+    let (code, stdout, _) = host_fit(&["delay", out, "--json"]);
+    assert_eq!(code, Some(0));
+    let document: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+    assert_eq!(document["edges"].as_array().unwrap().len(), 2);
+    assert_eq!(document["verdict"], "too-few-edges");
+}

@@ -8,6 +8,7 @@ mod average;
 mod error;
 mod excitation;
 mod folder;
+mod folding;
 mod hash;
 mod raw;
 mod record;

@@ -4,6 +4,7 @@
 //! delay with the averaged output (1) at that time, fits h̃(ỹ) = p0 + p1·exp(−p2·ỹ) to the edges of the identify
 //! records, and tests whether the data bear such a law out.
 
+mod dependence;
 mod drawing;
 mod edge;
 mod front;
@@ -11,11 +12,11 @@ mod law;
 mod onset;
 mod study;
 
+pub use dependence::DelayVerdict;
 pub use drawing::draw_delays;
 pub use edge::{Edge, edges, mean_output};
 pub use law::{DelayLawFit, DelayPoint, Estimate, fit_delay_law};
 pub use onset::{Onset, Unmeasured};
 pub use study::{
-    DelayOptions, DelayStatistics, DelayStudy, DelayVerdict, EdgeDelay, SequenceStatistics, Spread,
-    study_delays,
+    DelayOptions, DelayStatistics, DelayStudy, EdgeDelay, SequenceStatistics, Spread, study_delays,
 };

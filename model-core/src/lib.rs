@@ -23,6 +23,7 @@ pub mod history;
 pub mod model;
 pub mod real;
 pub mod recursion;
+pub mod self_test;
 
 pub use effect::Effect;
 pub use model::{Input, Output, Parts, State, step};

@@ -6,7 +6,7 @@ use crate::effect::{Effect, Flow, Instant};
 use crate::history::{BitHistory, DelayLine, Memory};
 use crate::real::Real;
 use crate::recursion::{Bilinear, Grading, LagConvention};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{ArrayStorage, SMatrix, SVector};
 
 /// How outputs and inputs are averaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,6 +53,18 @@ pub trait Parts<T: Real> {
     {
         State::at_rest(self, DelayLine::new(), DelayLine::new())
     }
+}
+
+/// A coefficient vector, for generated constants.
+#[must_use]
+pub const fn vector<T, const N: usize>(values: [T; N]) -> SVector<T, N> {
+    SVector::from_array_storage(ArrayStorage([values]))
+}
+
+/// A coefficient matrix from its columns, for generated constants.
+#[must_use]
+pub const fn matrix<T, const R: usize, const C: usize>(columns: [[T; R]; C]) -> SMatrix<T, R, C> {
+    SMatrix::from_array_storage(ArrayStorage(columns))
 }
 
 /// A model with N1 state delays, N2 product delays and N3 inputs.

@@ -1,5 +1,6 @@
 //! Host side: recordings to models.
 
+pub mod codegen;
 pub mod data;
 pub mod delay;
 pub mod diagnose;

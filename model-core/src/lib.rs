@@ -15,6 +15,7 @@
 extern crate std;
 
 pub mod average;
+pub mod checks;
 pub mod control;
 pub mod delay;
 pub mod effect;

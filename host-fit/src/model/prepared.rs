@@ -137,9 +137,10 @@ impl<T: Real> Effect<T> for Chain<T> {
     }
     #[inline]
     fn drive(&self, states: &mut Self::State, flow: &Flow<T>, at: &Instant<'_, T>) -> T {
-        let each = self.effects.iter().zip(states);
+        // Added from the last to the first, as nested pairs of effects do.
+        let each = self.effects.iter().zip(states).rev();
         each.fold(T::ZERO, |sum, (effect, state)| {
-            sum + effect.drive(state, flow, at)
+            effect.drive(state, flow, at) + sum
         })
     }
     #[inline]

@@ -30,6 +30,7 @@ enum Command {
     Extend(commands::extend::Args),
     Simulate(commands::simulate::Args),
     Effects(commands::effects::Args),
+    Codegen(commands::codegen::Args),
 }
 
 fn main() -> ExitCode {
@@ -43,6 +44,7 @@ fn main() -> ExitCode {
         Command::Extend(args) => commands::extend::run(args, console),
         Command::Simulate(args) => commands::simulate::run(args, console),
         Command::Effects(args) => commands::effects::run(args, console),
+        Command::Codegen(args) => commands::codegen::run(args, console),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

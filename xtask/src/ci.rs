@@ -2,7 +2,7 @@
 
 use crate::Task;
 use crate::setup::TARGETS;
-use crate::shell::{cargo, run};
+use crate::shell::{cargo, firmware_cargo, run};
 use anyhow::{Result, bail};
 use std::time::Instant;
 
@@ -15,7 +15,10 @@ pub(crate) const TASK: Task = Task {
 type Step = (&'static str, fn() -> Result<()>);
 
 const STEPS: &[Step] = &[
-    ("format", || run(&mut cargo(&["fmt", "--all", "--check"]))),
+    ("format", || {
+        run(&mut cargo(&["fmt", "--all", "--check"]))?;
+        run(&mut firmware_cargo(&["fmt", "--all", "--check"]))
+    }),
     ("lints", || {
         run(&mut cargo(&[
             "clippy",
@@ -39,6 +42,21 @@ const STEPS: &[Step] = &[
         TARGETS
             .iter()
             .try_for_each(|target| crate::setup::cross_build(target, &["--package", "model-core"]))
+    }),
+    ("constants", || {
+        crate::identified::identified(&["--check".to_owned()])
+    }),
+    ("firmware lints", || {
+        run(&mut firmware_cargo(&[
+            "clippy",
+            "--release",
+            "--all-targets",
+            "--",
+            "-Dwarnings",
+        ]))
+    }),
+    ("firmware tests", || {
+        run(&mut firmware_cargo(&["test", "--release"]))
     }),
 ];
 

@@ -1,6 +1,7 @@
 //! The project's chores; `cargo xtask help` lists them.
 
 mod ci;
+mod identified;
 mod setup;
 mod shell;
 
@@ -13,7 +14,7 @@ struct Task {
     run: fn(&[String]) -> anyhow::Result<()>,
 }
 
-const TASKS: &[Task] = &[ci::TASK, setup::TASK];
+const TASKS: &[Task] = &[ci::TASK, identified::TASK, setup::TASK];
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

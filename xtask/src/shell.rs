@@ -23,6 +23,22 @@ pub(crate) fn cargo(arguments: &[&str]) -> Command {
     command(&program, arguments)
 }
 
+/// `cargo` in the firmware's workspace, with a target folder of its own: the
+/// two workspaces build the same crates with other features.
+pub(crate) fn firmware_cargo(arguments: &[&str]) -> Command {
+    let mut command = cargo(arguments);
+    command
+        .current_dir(root().join("firmware"))
+        .env("CARGO_TARGET_DIR", firmware_target());
+    command
+}
+
+/// Where the firmware's workspace builds.
+pub(crate) fn firmware_target() -> PathBuf {
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or(root().join("target"), PathBuf::from);
+    root().join(target).join("firmware")
+}
+
 /// The command as a person would type it.
 pub(crate) fn shown(command: &Command) -> String {
     let program = PathBuf::from(command.get_program());

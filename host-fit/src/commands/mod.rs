@@ -14,6 +14,7 @@ pub(crate) mod extend;
 mod interrupt;
 mod scores;
 pub(crate) mod simulate;
+pub(crate) mod codegen;
 
 /// How a command talks to the user.
 #[derive(Debug, Clone, Copy)]

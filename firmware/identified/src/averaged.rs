@@ -1,0 +1,151 @@
+//! Constants of an identified model. Generated; edit the model file instead.
+//!
+//! - tool: host-fit 0.1.0
+//! - structure: averaged model, N1 = 2, N2 = 2, N3 = 2, window 250 samples, one-step lags (lag 1 is y_k)
+//! - units: y is the normalised friction gain, u is 0 or 1, delays and lags are samples of 0.001 s
+
+use model_core::checks;
+use model_core::delay::FixedDelay;
+use model_core::model::{Averaging, OnOffState, Params, Parts, matrix, vector};
+use model_core::recursion::LagConvention;
+use model_core::self_test::Golden;
+
+/// Sample period, s.
+pub const SAMPLE_PERIOD_S: f32 = 0.001;
+/// Outputs kept: more than the longest lag and the averaging window; a power of two.
+pub const OUTPUTS: usize = 512;
+/// Commands kept, in words of 32: more than the longest input delay.
+pub const WORDS: usize = 21;
+/// Measured channels that the effects need, in the order in which they are passed.
+pub const CHANNELS: [&str; 0] = [];
+/// Usual values of the channels, in their units.
+pub const REFERENCES: [f32; 0] = [];
+
+/// The delay law.
+pub type Delay = FixedDelay<[u16; 2]>;
+/// The effects, in the order of the physics.
+pub type Effects = ();
+/// The model: N1, N2, N3 as identified.
+pub type Identified = Params<f32, 2, 2, 2, Delay, Effects>;
+/// What the model remembers.
+pub type IdentifiedState = OnOffState<f32, OUTPUTS, WORDS, Identified>;
+
+/// τ_i, samples.
+pub const STATE_LAGS: [u16; 2] = [1, 269];
+/// a_i.
+pub const A: [f32; 2] = [1.0027, -0.0027];
+/// τ̄_j, samples.
+pub const PRODUCT_LAGS: [u16; 2] = [1, 307];
+/// b_l.
+pub const B: [f32; 2] = [0.0009, 0.003];
+/// c_j1.
+pub const C1: [f32; 2] = [-0.0008, 0.0045];
+/// c_j2.
+pub const C2: [f32; 2] = [-0.0085, 0.001];
+/// h_l, samples.
+pub const DELAYS: [u16; 2] = [49, 417];
+
+/// W, samples.
+pub const WINDOW: u32 = 250;
+/// What lags mean.
+pub const CONVENTION: LagConvention = LagConvention::OneStep;
+/// d, what drives the flow without jets.
+pub const CONSTANT: f32 = 0.0;
+
+const _: () = {
+    assert!(CONSTANT.is_finite(), "the constant is not finite");
+    assert!(checks::finite(&A), "a coefficient a is not finite");
+    assert!(checks::finite(&B), "a coefficient b is not finite");
+    assert!(checks::finite(&C1), "a coefficient c is not finite");
+    assert!(checks::finite(&C2), "a coefficient c is not finite");
+    assert!(
+        OUTPUTS >= checks::outputs_for(&STATE_LAGS, CONVENTION),
+        "a state lag reaches beyond the outputs kept"
+    );
+    assert!(
+        OUTPUTS >= checks::outputs_for(&PRODUCT_LAGS, CONVENTION),
+        "a product lag reaches beyond the outputs kept"
+    );
+    assert!(
+        OUTPUTS >= WINDOW as usize,
+        "the averaging window reaches beyond the outputs kept"
+    );
+    assert!(
+        32 * WORDS >= DELAYS[0] as usize + 1 + WINDOW as usize,
+        "an input delay reaches beyond the commands kept"
+    );
+    assert!(
+        32 * WORDS >= DELAYS[1] as usize + 1 + WINDOW as usize,
+        "an input delay reaches beyond the commands kept"
+    );
+};
+
+/// The model.
+pub const MODEL: Identified = Params {
+    convention: CONVENTION,
+    averaging: Averaging {
+        window: WINDOW,
+        averaged_model: true,
+    },
+    constant: CONSTANT,
+    state_lags: STATE_LAGS,
+    a: vector(A),
+    product_lags: PRODUCT_LAGS,
+    b: vector(B),
+    c: matrix([C1, C2]),
+    delay: FixedDelay { delays: DELAYS },
+    effects: (),
+};
+
+/// The model.
+#[must_use]
+pub const fn model() -> Identified {
+    MODEL
+}
+
+/// The state at rest.
+#[must_use]
+pub fn state(model: &Identified) -> IdentifiedState {
+    model.on_off_state()
+}
+
+/// CRC-32 of structure and coefficients, for the start-up self-test.
+pub const CHECKSUM: u32 = 0xd235_8872;
+/// What the model says to the golden run, bit for bit, as the host computed it.
+pub const GOLDEN: Golden<32> = Golden {
+    every: 32,
+    expected: [
+        0x0000_0000,
+        0x39c8_7cdf,
+        0x3b84_9d7e,
+        0x3c42_0640,
+        0x3cc5_1707,
+        0x3d27_cc0d,
+        0x3d80_a0d2,
+        0x3db7_e48c,
+        0x3dfa_0c25,
+        0x3e22_aa21,
+        0x3e48_1002,
+        0x3e6c_7026,
+        0x3e87_ec20,
+        0x3e99_a8ba,
+        0x3eab_3603,
+        0x3ebb_5b0c,
+        0x3eca_15e7,
+        0x3ed7_1c44,
+        0x3ee3_7701,
+        0x3eef_5c45,
+        0x3efa_de47,
+        0x3f03_f2ee,
+        0x3f0b_29cd,
+        0x3f12_cd5b,
+        0x3f19_d927,
+        0x3f20_9c3e,
+        0x3f28_f9d1,
+        0x3f32_9545,
+        0x3f3c_3cf6,
+        0x3f44_4192,
+        0x3f49_108e,
+        0x3f4a_9a6b,
+    ],
+};

@@ -1,0 +1,188 @@
+//! Constants of an identified model. Generated; edit the model file instead.
+//!
+//! - tool: host-fit 0.1.0
+//! - structure: full model, N1 = 5, N2 = 10, N3 = 1, window 250 samples, one-step lags (lag 1 is y_k)
+//! - effects: valve-lag, state-dependent-delay, amplitude-saturation, hot-film-nonlinearity
+//! - units: y is the normalised friction gain, u is 0 or 1, delays and lags are samples of 0.001 s
+
+use model_core::checks;
+use model_core::effect::{Physics, Setting};
+use model_core::effects::AmplitudeSaturation;
+use model_core::effects::HotFilmNonlinearity;
+use model_core::effects::StateDependentDelay;
+use model_core::effects::ValveLag;
+use model_core::model::{Averaging, GradedState, Params, Parts, matrix, vector};
+use model_core::recursion::LagConvention;
+use model_core::self_test::Golden;
+
+/// Sample period, s.
+pub const SAMPLE_PERIOD_S: f32 = 0.001;
+/// Outputs kept: more than the longest lag and the averaging window; a power of two.
+pub const OUTPUTS: usize = 512;
+/// Jet strengths kept: more than the longest input delay; a power of two.
+pub const JETS: usize = 64;
+/// Measured channels that the effects need, in the order in which they are passed.
+pub const CHANNELS: [&str; 0] = [];
+/// Usual values of the channels, in their units.
+pub const REFERENCES: [f32; 0] = [];
+
+/// valve-lag.
+pub type Effect1 = ValveLag<f32>;
+/// amplitude-saturation.
+pub type Effect2 = AmplitudeSaturation<f32>;
+/// hot-film-nonlinearity.
+pub type Effect3 = HotFilmNonlinearity<f32>;
+/// The delay law.
+pub type Delay = StateDependentDelay<f32, [f32; 1]>;
+/// The effects, in the order of the physics.
+pub type Effects = (Effect1, (Effect2, (Effect3, ())));
+/// The model: N1, N2, N3 as identified.
+pub type Identified = Params<f32, 5, 10, 1, Delay, Effects>;
+/// What the model remembers.
+pub type IdentifiedState = GradedState<f32, OUTPUTS, JETS, Identified>;
+
+/// τ_i, samples.
+pub const STATE_LAGS: [u16; 5] = [1, 44, 123, 479, 496];
+/// a_i.
+pub const A: [f32; 5] = [0.9759, 0.0141, 0.0025, -0.0042, 0.0055];
+/// τ̄_j, samples.
+pub const PRODUCT_LAGS: [u16; 10] = [1, 73, 242, 264, 299, 335, 414, 477, 494, 500];
+/// b_l.
+pub const B: [f32; 1] = [0.008];
+/// c_j1.
+pub const C1: [f32; 10] = [
+    -0.0228, 0.0138, 0.0621, -0.0286, -0.0186, -0.0121, -0.0035, -0.0056, 0.0189, -0.0049,
+];
+/// p0, samples.
+pub const DELAY_FLOOR: f32 = 47.35;
+/// p1, samples.
+pub const DELAY_RISE: f32 = 12.69;
+/// p2, 1/y.
+pub const DELAY_RATE: f32 = 20.18;
+/// f_l.
+pub const DELAY_FACTORS: [f32; 1] = [1.0];
+/// valve-lag: opening_time (s), closing_time (s).
+pub const EFFECT1: [f32; 2] = [0.004, 0.009];
+/// amplitude-saturation: cubic (1/y²).
+pub const EFFECT2: [f32; 1] = [0.2];
+/// hot-film-nonlinearity: king_ratio (-), king_offset (y).
+pub const EFFECT3: [f32; 2] = [1.0, 0.1];
+
+/// W, samples.
+pub const WINDOW: u32 = 250;
+/// What lags mean.
+pub const CONVENTION: LagConvention = LagConvention::OneStep;
+/// d, what drives the flow without jets.
+pub const CONSTANT: f32 = 0.0;
+
+const _: () = {
+    assert!(CONSTANT.is_finite(), "the constant is not finite");
+    assert!(checks::finite(&A), "a coefficient a is not finite");
+    assert!(checks::finite(&B), "a coefficient b is not finite");
+    assert!(checks::finite(&C1), "a coefficient c is not finite");
+    assert!(
+        OUTPUTS >= checks::outputs_for(&STATE_LAGS, CONVENTION),
+        "a state lag reaches beyond the outputs kept"
+    );
+    assert!(
+        OUTPUTS >= checks::outputs_for(&PRODUCT_LAGS, CONVENTION),
+        "a product lag reaches beyond the outputs kept"
+    );
+    assert!(
+        OUTPUTS >= WINDOW as usize,
+        "the averaging window reaches beyond the outputs kept"
+    );
+    assert!(
+        JETS >= (DELAY_FACTORS[0] * (DELAY_FLOOR + DELAY_RISE) + 0.5) as usize + 1,
+        "an input delay reaches beyond the commands kept"
+    );
+    assert!(
+        JETS >= (DELAY_FACTORS[0] * DELAY_FLOOR + 0.5) as usize + 1,
+        "an input delay reaches beyond the commands kept"
+    );
+};
+
+/// The model, its effects prepared for the sample period.
+#[must_use]
+pub fn model() -> Identified {
+    Params {
+        convention: CONVENTION,
+        averaging: Averaging {
+            window: WINDOW,
+            averaged_model: false,
+        },
+        constant: CONSTANT,
+        state_lags: STATE_LAGS,
+        a: vector(A),
+        product_lags: PRODUCT_LAGS,
+        b: vector(B),
+        c: matrix([C1]),
+        delay: StateDependentDelay {
+            floor: DELAY_FLOOR,
+            rise: DELAY_RISE,
+            rate: DELAY_RATE,
+            factors: DELAY_FACTORS,
+        },
+        effects: effects(),
+    }
+}
+
+const SETTING: Setting<f32> = Setting {
+    period: SAMPLE_PERIOD_S,
+    channel: 0,
+    reference: 1.0,
+};
+
+fn effects() -> Effects {
+    let effect1 = Effect1::new(&EFFECT1, &SETTING);
+    let effect2 = Effect2::new(&EFFECT2, &SETTING);
+    let effect3 = Effect3::new(&EFFECT3, &SETTING);
+    (effect1, (effect2, (effect3, ())))
+}
+
+/// The state at rest.
+#[must_use]
+pub fn state(model: &Identified) -> IdentifiedState {
+    model.graded_state()
+}
+
+/// CRC-32 of structure and coefficients, for the start-up self-test.
+pub const CHECKSUM: u32 = 0x4b5f_7ba2;
+/// What the model says to the golden run, bit for bit, as the host computed it.
+pub const GOLDEN: Golden<32> = Golden {
+    every: 32,
+    expected: [
+        0x0000_0000,
+        0x3cd1_becc,
+        0x3e90_5a19,
+        0x3eb1_6c7e,
+        0x3ed0_92b4,
+        0x3ee8_c6bc,
+        0x3efc_012d,
+        0x3f05_bd25,
+        0x3f0b_e0fd,
+        0x3f0c_34b6,
+        0x3efc_248c,
+        0x3ee7_7665,
+        0x3ed4_b2e9,
+        0x3ec4_c482,
+        0x3eb5_072e,
+        0x3ee7_e1e5,
+        0x3f07_dc00,
+        0x3f08_451b,
+        0x3f09_7373,
+        0x3f0a_2f84,
+        0x3f0d_d629,
+        0x3f0b_df77,
+        0x3eff_c68e,
+        0x3eee_cd1c,
+        0x3ee0_241a,
+        0x3f0a_ef35,
+        0x3f1a_2ff7,
+        0x3f1f_dab8,
+        0x3f2a_2e10,
+        0x3f23_7ec1,
+        0x3f14_dcbe,
+        0x3f17_c71a,
+    ],
+};

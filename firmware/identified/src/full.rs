@@ -1,0 +1,162 @@
+//! Constants of an identified model. Generated; edit the model file instead.
+//!
+//! - tool: host-fit 0.1.0
+//! - structure: full model, N1 = 5, N2 = 10, N3 = 1, window 250 samples, one-step lags (lag 1 is y_k)
+//! - effects: state-dependent-delay
+//! - units: y is the normalised friction gain, u is 0 or 1, delays and lags are samples of 0.001 s
+
+use model_core::checks;
+use model_core::effects::StateDependentDelay;
+use model_core::model::{Averaging, OnOffState, Params, Parts, matrix, vector};
+use model_core::recursion::LagConvention;
+use model_core::self_test::Golden;
+
+/// Sample period, s.
+pub const SAMPLE_PERIOD_S: f32 = 0.001;
+/// Outputs kept: more than the longest lag and the averaging window; a power of two.
+pub const OUTPUTS: usize = 512;
+/// Commands kept, in words of 32: more than the longest input delay.
+pub const WORDS: usize = 2;
+/// Measured channels that the effects need, in the order in which they are passed.
+pub const CHANNELS: [&str; 0] = [];
+/// Usual values of the channels, in their units.
+pub const REFERENCES: [f32; 0] = [];
+
+/// The delay law.
+pub type Delay = StateDependentDelay<f32, [f32; 1]>;
+/// The effects, in the order of the physics.
+pub type Effects = ();
+/// The model: N1, N2, N3 as identified.
+pub type Identified = Params<f32, 5, 10, 1, Delay, Effects>;
+/// What the model remembers.
+pub type IdentifiedState = OnOffState<f32, OUTPUTS, WORDS, Identified>;
+
+/// τ_i, samples.
+pub const STATE_LAGS: [u16; 5] = [1, 44, 123, 479, 496];
+/// a_i.
+pub const A: [f32; 5] = [0.9759, 0.0141, 0.0025, -0.0042, 0.0055];
+/// τ̄_j, samples.
+pub const PRODUCT_LAGS: [u16; 10] = [1, 73, 242, 264, 299, 335, 414, 477, 494, 500];
+/// b_l.
+pub const B: [f32; 1] = [0.008];
+/// c_j1.
+pub const C1: [f32; 10] = [
+    -0.0228, 0.0138, 0.0621, -0.0286, -0.0186, -0.0121, -0.0035, -0.0056, 0.0189, -0.0049,
+];
+/// p0, samples.
+pub const DELAY_FLOOR: f32 = 47.35;
+/// p1, samples.
+pub const DELAY_RISE: f32 = 12.69;
+/// p2, 1/y.
+pub const DELAY_RATE: f32 = 20.18;
+/// f_l.
+pub const DELAY_FACTORS: [f32; 1] = [1.0];
+
+/// W, samples.
+pub const WINDOW: u32 = 250;
+/// What lags mean.
+pub const CONVENTION: LagConvention = LagConvention::OneStep;
+/// d, what drives the flow without jets.
+pub const CONSTANT: f32 = 0.0;
+
+const _: () = {
+    assert!(CONSTANT.is_finite(), "the constant is not finite");
+    assert!(checks::finite(&A), "a coefficient a is not finite");
+    assert!(checks::finite(&B), "a coefficient b is not finite");
+    assert!(checks::finite(&C1), "a coefficient c is not finite");
+    assert!(
+        OUTPUTS >= checks::outputs_for(&STATE_LAGS, CONVENTION),
+        "a state lag reaches beyond the outputs kept"
+    );
+    assert!(
+        OUTPUTS >= checks::outputs_for(&PRODUCT_LAGS, CONVENTION),
+        "a product lag reaches beyond the outputs kept"
+    );
+    assert!(
+        OUTPUTS >= WINDOW as usize,
+        "the averaging window reaches beyond the outputs kept"
+    );
+    assert!(
+        32 * WORDS >= (DELAY_FACTORS[0] * (DELAY_FLOOR + DELAY_RISE) + 0.5) as usize + 1,
+        "an input delay reaches beyond the commands kept"
+    );
+    assert!(
+        32 * WORDS >= (DELAY_FACTORS[0] * DELAY_FLOOR + 0.5) as usize + 1,
+        "an input delay reaches beyond the commands kept"
+    );
+};
+
+/// The model.
+pub const MODEL: Identified = Params {
+    convention: CONVENTION,
+    averaging: Averaging {
+        window: WINDOW,
+        averaged_model: false,
+    },
+    constant: CONSTANT,
+    state_lags: STATE_LAGS,
+    a: vector(A),
+    product_lags: PRODUCT_LAGS,
+    b: vector(B),
+    c: matrix([C1]),
+    delay: StateDependentDelay {
+        floor: DELAY_FLOOR,
+        rise: DELAY_RISE,
+        rate: DELAY_RATE,
+        factors: DELAY_FACTORS,
+    },
+    effects: (),
+};
+
+/// The model.
+#[must_use]
+pub const fn model() -> Identified {
+    MODEL
+}
+
+/// The state at rest.
+#[must_use]
+pub fn state(model: &Identified) -> IdentifiedState {
+    model.on_off_state()
+}
+
+/// CRC-32 of structure and coefficients, for the start-up self-test.
+pub const CHECKSUM: u32 = 0x4b5f_7ba2;
+/// What the model says to the golden run, bit for bit, as the host computed it.
+pub const GOLDEN: Golden<32> = Golden {
+    every: 32,
+    expected: [
+        0x0000_0000,
+        0x3cbb_8800,
+        0x3e0e_27ef,
+        0x3e38_07e6,
+        0x3e67_4c44,
+        0x3e86_d7df,
+        0x3e97_d88c,
+        0x3ea6_3a26,
+        0x3eb2_481d,
+        0x3ea1_63c2,
+        0x3e8b_304d,
+        0x3e74_c13c,
+        0x3e59_d994,
+        0x3e42_c2df,
+        0x3e2c_fa63,
+        0x3e89_235a,
+        0x3ea6_dcea,
+        0x3e9b_9433,
+        0x3ea3_8c9d,
+        0x3ea7_844e,
+        0x3eb2_707d,
+        0x3ea4_167d,
+        0x3e91_0ac5,
+        0x3e82_a06c,
+        0x3e70_d6ec,
+        0x3eae_b776,
+        0x3ec9_5725,
+        0x3eda_6855,
+        0x3ef5_b0af,
+        0x3ed7_e95b,
+        0x3ebb_ef9d,
+        0x3eca_d5c6,
+    ],
+};

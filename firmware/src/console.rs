@@ -1,0 +1,182 @@
+//! What the operator types and reads over the serial line.
+
+use crate::controller::Mode;
+
+/// A command of the operator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Command {
+    /// Let the law drive the valves.
+    Arm,
+    /// Shut the valves; also takes note of a latched fault.
+    Disarm,
+    /// Say how things are.
+    Status,
+    /// Not understood.
+    Unknown,
+}
+
+/// Collects a line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Console {
+    line: [u8; 8],
+    length: usize,
+}
+
+impl Console {
+    /// An empty line.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            line: [0; 8],
+            length: 0,
+        }
+    }
+
+    /// Takes a byte; a line end gives a command, an empty line none.
+    pub fn receive(&mut self, byte: u8) -> Option<Command> {
+        if byte != b'\n' && byte != b'\r' {
+            if let Some(slot) = self.line.get_mut(self.length) {
+                *slot = byte;
+            }
+            self.length = self.length.saturating_add(1);
+            return None;
+        }
+        let command = match self.line.get(..self.length) {
+            Some(b"") => None,
+            Some(b"arm") => Some(Command::Arm),
+            Some(b"disarm") => Some(Command::Disarm),
+            Some(b"status") => Some(Command::Status),
+            _ => Some(Command::Unknown),
+        };
+        self.length = 0;
+        command
+    }
+}
+
+/// A line of text; what does not fit is cut off.
+#[derive(Clone, Copy, Debug)]
+pub struct Line {
+    bytes: [u8; 96],
+    length: usize,
+}
+
+impl Line {
+    /// How things are: `armed y=0.512 valve=1 samples=61234`.
+    #[must_use]
+    pub fn status(mode: Mode, friction: f32, open: bool, samples: u64) -> Self {
+        let mut line = Self {
+            bytes: [0; 96],
+            length: 0,
+        };
+        match mode {
+            Mode::Disarmed => line.text("disarmed"),
+            Mode::Armed => line.text("armed"),
+            Mode::Faulted(fault) => {
+                line.text("fault=");
+                line.text(fault.name());
+            }
+        }
+        line.text(" y=");
+        line.thousandths(friction);
+        line.text(if open { " valve=1" } else { " valve=0" });
+        line.text(" samples=");
+        line.integer(samples);
+        line.text("\r\n");
+        line
+    }
+
+    /// The bytes to send.
+    #[must_use]
+    pub fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.length).unwrap_or(&self.bytes)
+    }
+
+    fn byte(&mut self, byte: u8) {
+        if let Some(slot) = self.bytes.get_mut(self.length) {
+            *slot = byte;
+            self.length += 1;
+        }
+    }
+
+    fn text(&mut self, text: &str) {
+        for byte in text.bytes() {
+            self.byte(byte);
+        }
+    }
+
+    fn integer(&mut self, mut value: u64) {
+        // Least significant digit first; a constant divisor cannot be 0.
+        let mut digits = [b'0'; 20];
+        let mut used = 0;
+        for digit in &mut digits {
+            *digit = b'0' + (value % 10) as u8;
+            value /= 10;
+            used += 1;
+            if value == 0 {
+                break;
+            }
+        }
+        for digit in digits.iter().take(used).rev() {
+            self.byte(*digit);
+        }
+    }
+
+    fn thousandths(&mut self, value: f32) {
+        if !value.is_finite() {
+            self.text("nan");
+            return;
+        }
+        let scaled = value.clamp(-1e6, 1e6) * 1000.0;
+        let rounded = if scaled < 0.0 {
+            scaled - 0.5
+        } else {
+            scaled + 0.5
+        } as i64;
+        if rounded < 0 {
+            self.byte(b'-');
+        }
+        let magnitude = rounded.unsigned_abs();
+        self.integer(magnitude / 1000);
+        self.byte(b'.');
+        self.byte(b'0' + (magnitude / 100 % 10) as u8);
+        self.byte(b'0' + (magnitude / 10 % 10) as u8);
+        self.byte(b'0' + (magnitude % 10) as u8);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fault::Fault;
+
+    #[test]
+    fn lines_become_commands() {
+        let mut console = Console::new();
+        let mut typed = std::vec::Vec::new();
+        for byte in b"arm\r\nstatus\ndisarm\n\nlaunch the rocket\narms\n".iter() {
+            typed.extend(console.receive(*byte));
+        }
+        let expected = [
+            Command::Arm,
+            Command::Status,
+            Command::Disarm,
+            Command::Unknown,
+            Command::Unknown,
+        ];
+        assert_eq!(typed, expected);
+    }
+
+    #[test]
+    fn the_status_is_one_line() {
+        let line = Line::status(Mode::Armed, 0.5124, true, u64::MAX);
+        assert_eq!(
+            line.bytes(),
+            b"armed y=0.512 valve=1 samples=18446744073709551615\r\n"
+        );
+        let line = Line::status(Mode::Faulted(Fault::Stuck), -0.0306, false, 0);
+        assert_eq!(line.bytes(), b"fault=stuck y=-0.031 valve=0 samples=0\r\n");
+        let line = Line::status(Mode::Disarmed, f32::NAN, false, 7);
+        assert_eq!(line.bytes(), b"disarmed y=nan valve=0 samples=7\r\n");
+    }
+}

@@ -1,0 +1,49 @@
+//! Why the valves were shut.
+
+/// A reason to shut the valves. It stays until the operator disarms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum Fault {
+    /// A sample was not done when the next one was due.
+    Overrun,
+    /// The sensor gave no number.
+    NotFinite,
+    /// The sensor is at the lower or upper end of its range.
+    AtRail,
+    /// The sensor has not changed for too long.
+    Stuck,
+    /// The sensor and the model have parted.
+    Residual,
+    /// The watchdog restarted the board.
+    Watchdog,
+    /// The constants or the model's answers are not what was generated.
+    SelfTest,
+}
+
+impl Fault {
+    /// All faults.
+    pub const ALL: [Self; 7] = [
+        Self::Overrun,
+        Self::NotFinite,
+        Self::AtRail,
+        Self::Stuck,
+        Self::Residual,
+        Self::Watchdog,
+        Self::SelfTest,
+    ];
+
+    /// The word for it in the status line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Overrun => "overrun",
+            Self::NotFinite => "not-finite",
+            Self::AtRail => "at-rail",
+            Self::Stuck => "stuck",
+            Self::Residual => "residual",
+            Self::Watchdog => "watchdog",
+            Self::SelfTest => "self-test",
+        }
+    }
+}

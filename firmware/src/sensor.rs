@@ -1,0 +1,108 @@
+//! The sensor's reading, and whether it can be believed.
+
+use crate::fault::Fault;
+
+/// From the converter's counts to y.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Calibration {
+    /// Counts of the natural flow, y = 0.
+    pub zero: f32,
+    /// y per count.
+    pub per_count: f32,
+}
+
+impl Calibration {
+    /// y of a reading in counts.
+    #[inline]
+    #[must_use]
+    pub fn friction(&self, counts: f32) -> f32 {
+        (counts - self.zero) * self.per_count
+    }
+}
+
+/// What a healthy sensor does not do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// Readings at or below it are at the lower rail, counts.
+    pub lower_rail: f32,
+    /// Readings at or above it are at the upper rail, counts.
+    pub upper_rail: f32,
+    /// Equal readings in a row that mean a stuck sensor: noise moves a healthy
+    /// one by a count now and then.
+    pub stuck_after: u32,
+}
+
+/// Watches the readings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Watch {
+    last: f32,
+    equal: u32,
+}
+
+impl Watch {
+    /// Nothing seen yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            last: f32::NAN,
+            equal: 0,
+        }
+    }
+
+    /// Takes a reading in counts and says what is wrong with it, if anything.
+    #[inline]
+    pub fn check(&mut self, range: &Range, counts: f32) -> Option<Fault> {
+        if counts == self.last {
+            self.equal = self.equal.saturating_add(1);
+        } else {
+            self.equal = 0;
+        }
+        self.last = counts;
+        if !counts.is_finite() {
+            Some(Fault::NotFinite)
+        } else if counts <= range.lower_rail || counts >= range.upper_rail {
+            Some(Fault::AtRail)
+        } else if self.equal >= range.stuck_after {
+            Some(Fault::Stuck)
+        } else {
+            None
+        }
+    }
+}
+
+impl Default for Watch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RANGE: Range = Range {
+        lower_rail: 8.0,
+        upper_rail: 4087.0,
+        stuck_after: 3,
+    };
+
+    #[test]
+    fn each_illness_has_its_name() {
+        let check = |readings: &[f32]| {
+            let mut watch = Watch::new();
+            readings
+                .iter()
+                .map(|counts| watch.check(&RANGE, *counts))
+                .last()
+                .flatten()
+        };
+        assert_eq!(check(&[100.0, 101.0]), None);
+        assert_eq!(check(&[100.0, f32::NAN]), Some(Fault::NotFinite));
+        assert_eq!(check(&[f32::NEG_INFINITY]), Some(Fault::NotFinite));
+        assert_eq!(check(&[8.0]), Some(Fault::AtRail));
+        assert_eq!(check(&[4095.0]), Some(Fault::AtRail));
+        assert_eq!(check(&[100.0, 100.0, 100.0]), None);
+        assert_eq!(check(&[100.0, 100.0, 100.0, 100.0]), Some(Fault::Stuck));
+        assert_eq!(check(&[100.0, 100.0, 100.0, 101.0, 101.0]), None);
+    }
+}

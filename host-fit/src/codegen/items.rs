@@ -1,0 +1,488 @@
+//! The items of the generated file.
+
+use super::layout::{array, documented, number, numbers};
+use super::{CodegenError, jets, outputs, spec_of};
+use crate::model::{Added, Delay, Model};
+use model_core::effect::Spec;
+use model_core::effects;
+use std::fmt::Write as _;
+
+pub(super) fn imports(out: &mut String, model: &Model, graded: bool) {
+    let mut lines = vec!["use model_core::checks;".to_owned()];
+    if matches!(model.delay, Delay::Fixed { .. }) {
+        lines.push("use model_core::delay::FixedDelay;".to_owned());
+    }
+    let mut named: Vec<&str> = Vec::new();
+    let mut setting = false;
+    match model.delay {
+        Delay::Fixed { .. } => {}
+        Delay::StateDependent { .. } => named.push("StateDependentDelay"),
+        Delay::EdgeDependent { .. } => {
+            named.push("EdgeDependentDelay");
+            setting = true;
+        }
+    }
+    for added in &model.effects {
+        setting = true;
+        if let Some(spec) = effects::spec(&added.name) {
+            named.push(rust_name(spec));
+        }
+    }
+    named.sort_unstable();
+    named.dedup();
+    if setting {
+        lines.push("use model_core::effect::{Physics, Setting};".to_owned());
+    }
+    lines.extend(
+        named
+            .iter()
+            .map(|name| format!("use model_core::effects::{name};")),
+    );
+    let state = if graded { "GradedState" } else { "OnOffState" };
+    lines.push(format!(
+        "use model_core::model::{{Averaging, {state}, Params, Parts, matrix, vector}};"
+    ));
+    lines.push("use model_core::recursion::LagConvention;".to_owned());
+    lines.push("use model_core::self_test::Golden;".to_owned());
+    out.push('\n');
+    for line in lines {
+        out.push_str(&line);
+        out.push('\n');
+    }
+}
+
+pub(super) fn sizes(out: &mut String, model: &Model, graded: bool) {
+    let _ = write!(
+        out,
+        "
+/// Sample period, s.
+pub const SAMPLE_PERIOD_S: f32 = {};
+/// Outputs kept: more than the longest lag and the averaging window; a power of two.
+pub const OUTPUTS: usize = {};
+",
+        number(model.sample_period_s),
+        outputs(model)
+    );
+    if graded {
+        let _ = write!(
+            out,
+            "/// Jet strengths kept: more than the longest input delay; a power of two.
+pub const JETS: usize = {};
+",
+            jets(model).next_power_of_two()
+        );
+    } else {
+        let _ = write!(
+            out,
+            "/// Commands kept, in words of 32: more than the longest input delay.
+pub const WORDS: usize = {};
+",
+            jets(model).div_ceil(32)
+        );
+    }
+    let channels = model.channels();
+    let references: Vec<f64> = channels
+        .iter()
+        .map(|channel| {
+            let of_channel = |added: &&Added| added.channel.as_ref() == Some(channel);
+            let added = model.effects.iter().find(of_channel);
+            added.and_then(|added| added.reference).unwrap_or(1.0)
+        })
+        .collect();
+    let names: Vec<String> = channels.iter().map(|name| format!("{name:?}")).collect();
+    let _ = writeln!(
+        out,
+        "/// Measured channels that the effects need, in the order in which they are passed."
+    );
+    array(out, "CHANNELS", &format!("[&str; {}]", names.len()), &names);
+    let _ = writeln!(out, "/// Usual values of the channels, in their units.");
+    array(
+        out,
+        "REFERENCES",
+        &format!("[f32; {}]", names.len()),
+        &numbers(&references),
+    );
+}
+
+pub(super) fn effect_type(model: &Model, added: &Added) -> Result<String, CodegenError> {
+    let spec = spec_of(added)?;
+    let name = rust_name(spec);
+    Ok(match spec.name {
+        "echo-path" => format!("{name}<f32, {}>", echo_samples(model, added)),
+        "rectifying-sensor" => name.to_owned(),
+        _ => format!("{name}<f32>"),
+    })
+}
+
+pub(super) fn types(out: &mut String, model: &Model, graded: bool) -> Result<(), CodegenError> {
+    let inputs = model.b.len();
+    let delay = match model.delay {
+        Delay::Fixed { .. } => format!("FixedDelay<[u16; {inputs}]>"),
+        Delay::StateDependent { .. } => format!("StateDependentDelay<f32, [f32; {inputs}]>"),
+        Delay::EdgeDependent { .. } => "EdgeDependentDelay<f32>".to_owned(),
+    };
+    out.push('\n');
+    for (i, added) in model.effects.iter().enumerate() {
+        let _ = writeln!(
+            out,
+            "/// {}.\npub type Effect{} = {};",
+            added.name,
+            i + 1,
+            effect_type(model, added)?
+        );
+    }
+    let chain = nested(model.effects.len(), "Effect");
+    let state = if graded {
+        "GradedState<f32, OUTPUTS, JETS, Identified>"
+    } else {
+        "OnOffState<f32, OUTPUTS, WORDS, Identified>"
+    };
+    let _ = write!(
+        out,
+        "/// The delay law.
+pub type Delay = {delay};
+/// The effects, in the order of the physics.
+pub type Effects = {chain};
+/// The model: N1, N2, N3 as identified.
+pub type Identified = Params<f32, {}, {}, {inputs}, Delay, Effects>;
+/// What the model remembers.
+pub type IdentifiedState = {state};
+",
+        model.a.len(),
+        model.product_lags.len(),
+    );
+    Ok(())
+}
+
+pub(super) fn coefficients(out: &mut String, model: &Model) {
+    let lags = |lags: &[u16]| lags.iter().map(u16::to_string).collect::<Vec<_>>();
+    let (n1, n2, n3) = (model.a.len(), model.product_lags.len(), model.b.len());
+    out.push('\n');
+    documented(
+        out,
+        "τ_i, samples.",
+        "STATE_LAGS",
+        &format!("[u16; {n1}]"),
+        &lags(&model.state_lags),
+    );
+    documented(
+        out,
+        "a_i.",
+        "A",
+        &format!("[f32; {n1}]"),
+        &numbers(&model.a),
+    );
+    documented(
+        out,
+        "τ̄_j, samples.",
+        "PRODUCT_LAGS",
+        &format!("[u16; {n2}]"),
+        &lags(&model.product_lags),
+    );
+    documented(
+        out,
+        "b_l.",
+        "B",
+        &format!("[f32; {n3}]"),
+        &numbers(&model.b),
+    );
+    for l in 0..n3 {
+        let column: Vec<f64> = model.c.iter().copied().skip(l * n2).take(n2).collect();
+        documented(
+            out,
+            &format!("c_j{}.", l + 1),
+            &format!("C{}", l + 1),
+            &format!("[f32; {n2}]"),
+            &numbers(&column),
+        );
+    }
+    match &model.delay {
+        Delay::Fixed { delays } => {
+            documented(
+                out,
+                "h_l, samples.",
+                "DELAYS",
+                &format!("[u16; {n3}]"),
+                &lags(delays),
+            );
+        }
+        Delay::StateDependent {
+            delay_floor,
+            delay_rise,
+            delay_rate,
+            factors,
+        } => {
+            let _ = write!(
+                out,
+                "/// p0, samples.
+pub const DELAY_FLOOR: f32 = {};
+/// p1, samples.
+pub const DELAY_RISE: f32 = {};
+/// p2, 1/y.
+pub const DELAY_RATE: f32 = {};
+/// f_l.
+",
+                number(*delay_floor),
+                number(*delay_rise),
+                number(*delay_rate),
+            );
+            array(
+                out,
+                "DELAY_FACTORS",
+                &format!("[f32; {n3}]"),
+                &numbers(factors),
+            );
+        }
+        Delay::EdgeDependent {
+            rise_delay,
+            fall_delay,
+        } => documented(
+            out,
+            "Delays of rising and falling edges, s.",
+            "EDGE_DELAYS",
+            "[f32; 2]",
+            &numbers(&[*rise_delay, *fall_delay]),
+        ),
+    }
+    for (i, added) in model.effects.iter().enumerate() {
+        let Some(spec) = effects::spec(&added.name) else {
+            continue;
+        };
+        let units: Vec<String> = spec
+            .parameters
+            .iter()
+            .map(|parameter| format!("{} ({})", parameter.name, parameter.unit))
+            .collect();
+        let doc = match units.as_slice() {
+            [] => format!("{}: no parameters.", spec.name),
+            units => format!("{}: {}.", spec.name, units.join(", ")),
+        };
+        documented(
+            out,
+            &doc,
+            &format!("EFFECT{}", i + 1),
+            &format!("[f32; {}]", added.parameters.len()),
+            &numbers(&added.parameters),
+        );
+    }
+}
+
+pub(super) fn compile_time_checks(out: &mut String, model: &Model, graded: bool) {
+    let kept = if graded { "JETS" } else { "32 * WORDS" };
+    let averaged = if model.averaging.averaged_model {
+        " + WINDOW as usize"
+    } else {
+        ""
+    };
+    let _ = write!(
+        out,
+        "
+/// W, samples.
+pub const WINDOW: u32 = {};
+/// What lags mean.
+pub const CONVENTION: LagConvention = LagConvention::{:?};
+/// d, what drives the flow without jets.
+pub const CONSTANT: f32 = {};
+
+const _: () = {{
+    assert!(CONSTANT.is_finite(), \"the constant is not finite\");
+    assert!(checks::finite(&A), \"a coefficient a is not finite\");
+    assert!(checks::finite(&B), \"a coefficient b is not finite\");
+",
+        model.averaging.window,
+        model.convention,
+        number(model.constant),
+    );
+    for l in 1..=model.b.len() {
+        let _ = writeln!(
+            out,
+            "    assert!(checks::finite(&C{l}), \"a coefficient c is not finite\");"
+        );
+    }
+    let _ = write!(
+        out,
+        "    assert!(
+        OUTPUTS >= checks::outputs_for(&STATE_LAGS, CONVENTION),
+        \"a state lag reaches beyond the outputs kept\"
+    );
+    assert!(
+        OUTPUTS >= checks::outputs_for(&PRODUCT_LAGS, CONVENTION),
+        \"a product lag reaches beyond the outputs kept\"
+    );
+    assert!(
+        OUTPUTS >= WINDOW as usize,
+        \"the averaging window reaches beyond the outputs kept\"
+    );
+"
+    );
+    let mut fits = |delay: String| {
+        let condition = format!("{kept} >= {delay} + 1{averaged}");
+        let _ = write!(
+            out,
+            "    assert!(
+        {condition},
+        \"an input delay reaches beyond the commands kept\"
+    );
+"
+        );
+    };
+    match &model.delay {
+        Delay::Fixed { delays } => {
+            for l in 0..delays.len() {
+                fits(format!("DELAYS[{l}] as usize"));
+            }
+        }
+        Delay::StateDependent { factors, .. } => {
+            // The law is monotonic in ỹ ≥ 0: longest at one of its ends.
+            for l in 0..factors.len() {
+                fits(format!(
+                    "(DELAY_FACTORS[{l}] * (DELAY_FLOOR + DELAY_RISE) + 0.5) as usize"
+                ));
+                fits(format!("(DELAY_FACTORS[{l}] * DELAY_FLOOR + 0.5) as usize"));
+            }
+        }
+        Delay::EdgeDependent { .. } => {
+            for l in 0..2 {
+                fits(format!("(EDGE_DELAYS[{l}] / SAMPLE_PERIOD_S) as usize + 1"));
+            }
+        }
+    }
+    out.push_str("};\n");
+}
+
+pub(super) fn constructors(out: &mut String, model: &Model, graded: bool) {
+    let constant = model.effects.is_empty() && !matches!(model.delay, Delay::EdgeDependent { .. });
+    let delay = match &model.delay {
+        Delay::Fixed { .. } => "FixedDelay { delays: DELAYS }".to_owned(),
+        Delay::StateDependent { .. } => "StateDependentDelay {
+        floor: DELAY_FLOOR,
+        rise: DELAY_RISE,
+        rate: DELAY_RATE,
+        factors: DELAY_FACTORS,
+    }"
+        .to_owned(),
+        Delay::EdgeDependent { .. } => "EdgeDependentDelay::new(&EDGE_DELAYS, &SETTING)".to_owned(),
+    };
+    let effects = if model.effects.is_empty() {
+        "()"
+    } else {
+        "effects()"
+    };
+    let columns: Vec<String> = (1..=model.b.len()).map(|l| format!("C{l}")).collect();
+    let params = format!(
+        "Params {{
+    convention: CONVENTION,
+    averaging: Averaging {{
+        window: WINDOW,
+        averaged_model: {},
+    }},
+    constant: CONSTANT,
+    state_lags: STATE_LAGS,
+    a: vector(A),
+    product_lags: PRODUCT_LAGS,
+    b: vector(B),
+    c: matrix([{}]),
+    delay: {delay},
+    effects: {effects},
+}}",
+        model.averaging.averaged_model,
+        columns.join(", "),
+    );
+    if constant {
+        let _ = write!(
+            out,
+            "
+/// The model.
+pub const MODEL: Identified = {params};
+
+/// The model.
+#[must_use]
+pub const fn model() -> Identified {{
+    MODEL
+}}
+"
+        );
+    } else {
+        let _ = write!(
+            out,
+            "
+/// The model, its effects prepared for the sample period.
+#[must_use]
+pub fn model() -> Identified {{
+    {}
+}}
+",
+            params.replace('\n', "\n    ")
+        );
+    }
+    if !constant {
+        out.push_str(
+            "
+const SETTING: Setting<f32> = Setting {
+    period: SAMPLE_PERIOD_S,
+    channel: 0,
+    reference: 1.0,
+};
+",
+        );
+    }
+    if !model.effects.is_empty() {
+        out.push_str("\nfn effects() -> Effects {\n");
+        let channels = model.channels();
+        for (i, added) in model.effects.iter().enumerate() {
+            let n = i + 1;
+            let channel = channels
+                .iter()
+                .position(|name| added.channel.as_ref() == Some(name));
+            let _ = match channel {
+                None => writeln!(
+                    out,
+                    "    let effect{n} = Effect{n}::new(&EFFECT{n}, &SETTING);"
+                ),
+                Some(channel) => writeln!(
+                    out,
+                    "    let effect{n} = Effect{n}::new(
+        &EFFECT{n},
+        &Setting {{
+            channel: {channel},
+            reference: REFERENCES[{channel}],
+            ..SETTING
+        }},
+    );"
+                ),
+            };
+        }
+        let _ = writeln!(out, "    {}\n}}", nested(model.effects.len(), "effect"));
+    }
+    let method = if graded {
+        "graded_state"
+    } else {
+        "on_off_state"
+    };
+    let _ = write!(
+        out,
+        "
+/// The state at rest.
+#[must_use]
+pub fn state(model: &Identified) -> IdentifiedState {{
+    model.{method}()
+}}
+"
+    );
+}
+
+pub(super) fn rust_name(spec: &Spec) -> &'static str {
+    spec.rust.rsplit("::").next().unwrap_or(spec.rust)
+}
+
+pub(super) fn echo_samples(model: &Model, added: &Added) -> usize {
+    let delay = added.parameters.get(1).copied().unwrap_or(0.0) / model.sample_period_s;
+    delay.clamp(0.0, effects::LONGEST_ECHO as f64) as usize + 3
+}
+
+/// `(name1, (name2, ()))`.
+fn nested(effects: usize, name: &str) -> String {
+    (1..=effects)
+        .rev()
+        .fold("()".to_owned(), |chain, i| format!("({name}{i}, {chain})"))
+}

@@ -55,6 +55,7 @@ pub fn checksum<M: Parts<f32>>(model: &M) -> u32 {
     let (recursion, averaging) = (model.recursion(), model.averaging());
     let mut crc = Crc32::new()
         .word(recursion.convention as u32)
+        .word(recursion.grading as u32)
         .word(averaging.window)
         .word(averaging.averaged_model.into())
         .word(recursion.constant.to_bits());
@@ -137,7 +138,7 @@ mod tests {
     use super::*;
     use crate::delay::FixedDelay;
     use crate::model::{Averaging, Params, matrix, vector};
-    use crate::recursion::LagConvention;
+    use crate::recursion::{Grading, LagConvention};
 
     #[test]
     fn the_checksum_is_the_usual_one() {
@@ -149,6 +150,7 @@ mod tests {
 
     const MODEL: Params<f32, 1, 1, 1, FixedDelay<[u16; 1]>, ()> = Params {
         convention: LagConvention::OneStep,
+        grading: Grading::Proportional,
         averaging: Averaging {
             window: 2,
             averaged_model: false,

@@ -7,7 +7,7 @@
 use model_core::checks;
 use model_core::delay::FixedDelay;
 use model_core::model::{Averaging, OnOffState, Params, Parts, matrix, vector};
-use model_core::recursion::LagConvention;
+use model_core::recursion::{Grading, LagConvention};
 use model_core::self_test::Golden;
 
 /// Sample period, s.
@@ -49,6 +49,8 @@ pub const DELAYS: [u16; 2] = [49, 417];
 pub const WINDOW: u32 = 250;
 /// What lags mean.
 pub const CONVENTION: LagConvention = LagConvention::OneStep;
+/// The response to jets of part strength.
+pub const GRADING: Grading = Grading::Proportional;
 /// d, what drives the flow without jets.
 pub const CONSTANT: f32 = 0.0;
 
@@ -71,11 +73,11 @@ const _: () = {
         "the averaging window reaches beyond the outputs kept"
     );
     assert!(
-        32 * WORDS >= DELAYS[0] as usize + 1 + WINDOW as usize,
+        32 * WORDS > DELAYS[0] as usize + WINDOW as usize,
         "an input delay reaches beyond the commands kept"
     );
     assert!(
-        32 * WORDS >= DELAYS[1] as usize + 1 + WINDOW as usize,
+        32 * WORDS > DELAYS[1] as usize + WINDOW as usize,
         "an input delay reaches beyond the commands kept"
     );
 };
@@ -83,6 +85,7 @@ const _: () = {
 /// The model.
 pub const MODEL: Identified = Params {
     convention: CONVENTION,
+    grading: GRADING,
     averaging: Averaging {
         window: WINDOW,
         averaged_model: true,
@@ -110,7 +113,7 @@ pub fn state(model: &Identified) -> IdentifiedState {
 }
 
 /// CRC-32 of structure and coefficients, for the start-up self-test.
-pub const CHECKSUM: u32 = 0xd235_8872;
+pub const CHECKSUM: u32 = 0x5d67_305e;
 /// What the model says to the golden run, bit for bit, as the host computed it.
 pub const GOLDEN: Golden<32> = Golden {
     every: 32,

@@ -12,7 +12,7 @@ use model_core::effects::HotFilmNonlinearity;
 use model_core::effects::StateDependentDelay;
 use model_core::effects::ValveLag;
 use model_core::model::{Averaging, GradedState, Params, Parts, matrix, vector};
-use model_core::recursion::LagConvention;
+use model_core::recursion::{Grading, LagConvention};
 use model_core::self_test::Golden;
 
 /// Sample period, s.
@@ -72,6 +72,8 @@ pub const EFFECT3: [f32; 2] = [1.0, 0.1];
 pub const WINDOW: u32 = 250;
 /// What lags mean.
 pub const CONVENTION: LagConvention = LagConvention::OneStep;
+/// The response to jets of part strength.
+pub const GRADING: Grading = Grading::Proportional;
 /// d, what drives the flow without jets.
 pub const CONSTANT: f32 = 0.0;
 
@@ -93,11 +95,11 @@ const _: () = {
         "the averaging window reaches beyond the outputs kept"
     );
     assert!(
-        JETS >= (DELAY_FACTORS[0] * (DELAY_FLOOR + DELAY_RISE) + 0.5) as usize + 1,
+        JETS > (DELAY_FACTORS[0] * (DELAY_FLOOR + DELAY_RISE) + 0.5) as usize,
         "an input delay reaches beyond the commands kept"
     );
     assert!(
-        JETS >= (DELAY_FACTORS[0] * DELAY_FLOOR + 0.5) as usize + 1,
+        JETS > (DELAY_FACTORS[0] * DELAY_FLOOR + 0.5) as usize,
         "an input delay reaches beyond the commands kept"
     );
 };
@@ -107,6 +109,7 @@ const _: () = {
 pub fn model() -> Identified {
     Params {
         convention: CONVENTION,
+        grading: GRADING,
         averaging: Averaging {
             window: WINDOW,
             averaged_model: false,
@@ -147,7 +150,7 @@ pub fn state(model: &Identified) -> IdentifiedState {
 }
 
 /// CRC-32 of structure and coefficients, for the start-up self-test.
-pub const CHECKSUM: u32 = 0x4b5f_7ba2;
+pub const CHECKSUM: u32 = 0xbe4d_6d44;
 /// What the model says to the golden run, bit for bit, as the host computed it.
 pub const GOLDEN: Golden<32> = Golden {
     every: 32,

@@ -8,7 +8,7 @@
 use model_core::checks;
 use model_core::effects::StateDependentDelay;
 use model_core::model::{Averaging, OnOffState, Params, Parts, matrix, vector};
-use model_core::recursion::LagConvention;
+use model_core::recursion::{Grading, LagConvention};
 use model_core::self_test::Golden;
 
 /// Sample period, s.
@@ -56,6 +56,8 @@ pub const DELAY_FACTORS: [f32; 1] = [1.0];
 pub const WINDOW: u32 = 250;
 /// What lags mean.
 pub const CONVENTION: LagConvention = LagConvention::OneStep;
+/// The response to jets of part strength.
+pub const GRADING: Grading = Grading::Proportional;
 /// d, what drives the flow without jets.
 pub const CONSTANT: f32 = 0.0;
 
@@ -77,11 +79,11 @@ const _: () = {
         "the averaging window reaches beyond the outputs kept"
     );
     assert!(
-        32 * WORDS >= (DELAY_FACTORS[0] * (DELAY_FLOOR + DELAY_RISE) + 0.5) as usize + 1,
+        32 * WORDS > (DELAY_FACTORS[0] * (DELAY_FLOOR + DELAY_RISE) + 0.5) as usize,
         "an input delay reaches beyond the commands kept"
     );
     assert!(
-        32 * WORDS >= (DELAY_FACTORS[0] * DELAY_FLOOR + 0.5) as usize + 1,
+        32 * WORDS > (DELAY_FACTORS[0] * DELAY_FLOOR + 0.5) as usize,
         "an input delay reaches beyond the commands kept"
     );
 };
@@ -89,6 +91,7 @@ const _: () = {
 /// The model.
 pub const MODEL: Identified = Params {
     convention: CONVENTION,
+    grading: GRADING,
     averaging: Averaging {
         window: WINDOW,
         averaged_model: false,
@@ -121,7 +124,7 @@ pub fn state(model: &Identified) -> IdentifiedState {
 }
 
 /// CRC-32 of structure and coefficients, for the start-up self-test.
-pub const CHECKSUM: u32 = 0x4b5f_7ba2;
+pub const CHECKSUM: u32 = 0xbe4d_6d44;
 /// What the model says to the golden run, bit for bit, as the host computed it.
 pub const GOLDEN: Golden<32> = Golden {
     every: 32,

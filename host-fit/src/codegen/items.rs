@@ -42,7 +42,7 @@ pub(super) fn imports(out: &mut String, model: &Model, graded: bool) {
     lines.push(format!(
         "use model_core::model::{{Averaging, {state}, Params, Parts, matrix, vector}};"
     ));
-    lines.push("use model_core::recursion::LagConvention;".to_owned());
+    lines.push("use model_core::recursion::{Grading, LagConvention};".to_owned());
     lines.push("use model_core::self_test::Golden;".to_owned());
     out.push('\n');
     for line in lines {
@@ -118,7 +118,10 @@ pub(super) fn types(out: &mut String, model: &Model, graded: bool) -> Result<(),
     let inputs = model.b.len();
     let delay = match model.delay {
         Delay::Fixed { .. } => format!("FixedDelay<[u16; {inputs}]>"),
-        Delay::StateDependent { .. } => format!("StateDependentDelay<f32, [f32; {inputs}]>"),
+        Delay::StateDependent { interpolated, .. } => format!(
+            "StateDependentDelay<f32, [f32; {inputs}]{}>",
+            if interpolated { ", false" } else { "" }
+        ),
         Delay::EdgeDependent { .. } => "EdgeDependentDelay<f32>".to_owned(),
     };
     out.push('\n');
@@ -211,6 +214,7 @@ pub(super) fn coefficients(out: &mut String, model: &Model) {
             delay_rise,
             delay_rate,
             factors,
+            ..
         } => {
             let _ = write!(
                 out,
@@ -281,6 +285,8 @@ pub(super) fn compile_time_checks(out: &mut String, model: &Model, graded: bool)
 pub const WINDOW: u32 = {};
 /// What lags mean.
 pub const CONVENTION: LagConvention = LagConvention::{:?};
+/// The response to jets of part strength.
+pub const GRADING: Grading = Grading::{:?};
 /// d, what drives the flow without jets.
 pub const CONSTANT: f32 = {};
 
@@ -291,6 +297,7 @@ const _: () = {{
 ",
         model.averaging.window,
         model.convention,
+        model.grading,
         number(model.constant),
     );
     for l in 1..=model.b.len() {
@@ -316,7 +323,7 @@ const _: () = {{
 "
     );
     let mut fits = |delay: String| {
-        let condition = format!("{kept} >= {delay} + 1{averaged}");
+        let condition = format!("{kept} > {delay}{averaged}");
         let _ = write!(
             out,
             "    assert!(
@@ -372,6 +379,7 @@ pub(super) fn constructors(out: &mut String, model: &Model, graded: bool) {
     let params = format!(
         "Params {{
     convention: CONVENTION,
+    grading: GRADING,
     averaging: Averaging {{
         window: WINDOW,
         averaged_model: {},

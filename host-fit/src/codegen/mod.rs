@@ -93,6 +93,7 @@ fn check(model: &Model) -> Result<(), CodegenError> {
             delay_rise,
             delay_rate,
             factors,
+            ..
         } => {
             fits("delay", &[*delay_floor, *delay_rise, *delay_rate])?;
             fits("factors", factors)?;

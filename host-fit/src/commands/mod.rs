@@ -6,6 +6,7 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 
 pub(crate) mod average;
+pub(crate) mod codegen;
 pub(crate) mod compare;
 pub(crate) mod delay;
 pub(crate) mod diagnose;
@@ -14,7 +15,6 @@ pub(crate) mod extend;
 mod interrupt;
 mod scores;
 pub(crate) mod simulate;
-pub(crate) mod codegen;
 
 /// How a command talks to the user.
 #[derive(Debug, Clone, Copy)]

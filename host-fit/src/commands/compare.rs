@@ -33,6 +33,8 @@ struct Document<'a> {
     records: &'a [Indicators],
     identify: &'a Option<Indicators>,
     validate: &'a Option<Indicators>,
+    #[serde(rename = "where")]
+    places: &'a [serde_json::Value],
 }
 
 /// A model and the records it is judged on, as it sees them.
@@ -79,6 +81,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         records: &scores.records,
         identify: &scores.identify,
         validate: &scores.validate,
+        places: &[],
     })
 }
 

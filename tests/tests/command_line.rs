@@ -1,0 +1,320 @@
+//! The program as its users meet it: exit codes, JSON shapes, messages, files.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../data")
+        .join(name)
+}
+
+/// The program, built beside this test.
+fn program() -> PathBuf {
+    let test = std::env::current_exe().expect("this test");
+    let folder = test.ancestors().nth(2).expect("target/PROFILE/deps");
+    let program = folder.join(format!("host-fit{}", std::env::consts::EXE_SUFFIX));
+    if !program.is_file() {
+        let built = Command::new(env!("CARGO"))
+            .args(["build", "--release", "--package", "host-fit", "--quiet"])
+            .status()
+            .expect("cargo");
+        assert!(built.success());
+    }
+    program
+}
+
+fn run(arguments: &[&Path]) -> Output {
+    Command::new(program())
+        .args(arguments)
+        .output()
+        .expect("the program starts")
+}
+
+fn p(text: &str) -> &Path {
+    Path::new(text)
+}
+
+#[track_caller]
+fn json(arguments: &[&Path]) -> Value {
+    let mut all = vec![p("--json")];
+    all.extend(arguments);
+    let output = run(&all);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{error}");
+    serde_json::from_slice(&output.stdout).expect("one JSON document and nothing else")
+}
+
+/// Exit 1, one paragraph with every part, nothing on standard output.
+#[track_caller]
+fn refused(arguments: &[&Path], parts: &[&str]) {
+    let output = run(arguments);
+    let error = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    assert!(output.stdout.is_empty());
+    assert!(
+        error.starts_with("error: ") && error.trim_end().lines().count() == 1,
+        "{error}"
+    );
+    assert!(!error.contains("panicked"), "{error}");
+    for part in parts {
+        assert!(error.contains(part), "no `{part}` in: {error}");
+    }
+}
+
+#[track_caller]
+fn keys(value: &Value, expected: &[&str]) {
+    let object = value.as_object().expect("an object");
+    for key in expected {
+        assert!(object.contains_key(*key), "no key `{key}` in {value}");
+    }
+}
+
+const INDICATORS: [&str; 8] = [
+    "name",
+    "use",
+    "samples",
+    "epsilon",
+    "fit_percent",
+    "correlation",
+    "rmse",
+    "noise_rmse",
+];
+
+#[test]
+fn wrong_usage_is_exit_2() {
+    for arguments in [
+        &["nonsense"][..],
+        &["compare"],
+        &["extend", "a", "b", "-o", "c"],
+        &["simulate", "a", "b"],
+    ] {
+        let paths: Vec<&Path> = arguments.iter().map(|a| p(a)).collect();
+        assert_eq!(run(&paths).status.code(), Some(2), "{arguments:?}");
+    }
+    assert_eq!(run(&[p("--help")]).status.code(), Some(0));
+}
+
+#[test]
+fn compare_prints_the_indicators_of_the_contract() {
+    let model = data("paper/table-2-state-dependent.toml");
+    let found = json(&[p("compare"), &model, &data("paper-like")]);
+    keys(&found, &["records", "identify", "validate", "where"]);
+    let records = found["records"].as_array().expect("records");
+    assert_eq!(records.len(), 6);
+    for record in records
+        .iter()
+        .chain([&found["identify"], &found["validate"]])
+    {
+        keys(record, &INDICATORS);
+        assert!(record["noise_rmse"].is_null(), "no y_sd in this set");
+    }
+    // ε² of the records add up; RMSE = ε/√n.
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let of = |role: &str| {
+        let all = records.iter().filter(|r| r["use"] == role);
+        all.map(|r| number(&r["epsilon"]).powi(2))
+            .sum::<f64>()
+            .sqrt()
+    };
+    for role in ["identify", "validate"] {
+        let all = &found[role];
+        assert!((number(&all["epsilon"]) - of(role)).abs() < 1e-9);
+        let rmse = number(&all["epsilon"]) / number(&all["samples"]).sqrt();
+        assert!((number(&all["rmse"]) - rmse).abs() < 1e-12);
+    }
+    assert_eq!(found["identify"]["samples"], 40_000);
+}
+
+#[test]
+fn a_comparison_leaves_a_page_and_pictures() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let page = folder.path().join("out.html");
+    let pictures = folder.path().join("pictures");
+    let model = data("paper/table-2-state-dependent.toml");
+    let output = run(&[
+        p("compare"),
+        &model,
+        &data("hidden-ramp"),
+        p("--report"),
+        &page,
+        p("--pictures"),
+        &pictures,
+    ]);
+    assert_eq!(output.status.code(), Some(0));
+    let text = String::from_utf8(output.stdout).expect("text");
+    assert!(
+        text.contains("random-b  validate") && text.contains("together"),
+        "{text}"
+    );
+    let page = std::fs::read_to_string(page).expect("the page");
+    assert!(page.starts_with("<!doctype html>") && page.contains("<svg"));
+    assert!(!page.contains("<script"));
+    assert_eq!(std::fs::read_dir(pictures).expect("pictures").count(), 8);
+}
+
+#[test]
+fn simulate_is_the_models_free_run() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let input = folder.path().join("in.csv");
+    let out = folder.path().join("out.csv");
+    let mut text = "t,u\n".to_owned();
+    let u: Vec<f64> = (0..3000)
+        .map(|k| f64::from(u8::from(k > 100 && k % 400 < 200)))
+        .collect();
+    for (k, u) in u.iter().enumerate() {
+        text.push_str(&format!("{:.3},{u}\n", k as f64 * 0.001));
+    }
+    std::fs::write(&input, text).expect("written");
+    let path = data("paper/table-2-state-dependent.toml");
+    let found = json(&[p("simulate"), &path, &input, p("-o"), &out]);
+    keys(&found, &["model", "output", "samples"]);
+    let model = host_fit::model::Model::load(&path).expect("bundled");
+    let expected = model
+        .run_free(&host_fit::simulate::Signals {
+            u: &u,
+            y: None,
+            channels: Vec::new(),
+        })
+        .expect("bounded");
+    let written = std::fs::read_to_string(&out).expect("written");
+    let mut lines = written.lines();
+    assert_eq!(lines.next(), Some("t,u,y"));
+    for (k, (line, expected)) in lines.zip(&expected).enumerate() {
+        let y: f64 = line
+            .rsplit(',')
+            .next()
+            .and_then(|y| y.parse().ok())
+            .expect("a number");
+        assert_eq!(y.to_bits(), expected.to_bits(), "sample {k}");
+    }
+    assert_eq!(written.lines().count(), 3001);
+}
+
+#[test]
+fn extend_finds_the_hidden_plenum() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("new.toml");
+    let arguments = [
+        p("extend"),
+        &data("paper/table-2-state-dependent.toml"),
+        &data("hidden-ramp"),
+        p("--effect"),
+        p("plenum-droop"),
+        p("-o"),
+        &out,
+    ];
+    let found = json(&arguments);
+    keys(
+        &found,
+        &["model", "effect", "parameters", "before", "after"],
+    );
+    keys(&found["before"], &INDICATORS);
+    keys(&found["after"], &INDICATORS);
+    assert_eq!(found["effect"], "plenum-droop");
+    let number = |value: &Value| value.as_f64().expect("a number");
+    // The truth is in answer.toml: 0.840 s and 0.386 1/s.
+    let parameter = |name: &str| number(&found["parameters"][name]["value"]);
+    assert!((parameter("recovery_time") / 0.8403 - 1.0).abs() < 0.1);
+    assert!((parameter("depletion_rate") / 0.3859 - 1.0).abs() < 0.1);
+    keys(
+        &found["parameters"]["recovery_time"],
+        &["value", "unit", "low", "high"],
+    );
+    let after = &found["after"];
+    assert!(number(&after["rmse"]) < 1.05 * number(&after["noise_rmse"]));
+    // The same run again gives the same file, and what was written scores what was said.
+    let first = std::fs::read(&out).expect("written");
+    json(&arguments);
+    assert_eq!(std::fs::read(&out).expect("written"), first);
+    let compared = json(&[p("compare"), &out, &data("hidden-ramp")]);
+    assert_eq!(compared["validate"]["rmse"], after["rmse"]);
+}
+
+#[test]
+fn the_catalogue_is_listed_whole() {
+    let found = json(&[p("effects")]);
+    let names: Vec<&str> = found
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter_map(|entry| entry["name"].as_str())
+        .collect();
+    assert_eq!(names.len(), 21);
+    let text = String::from_utf8(run(&[p("effects")]).stdout).expect("text");
+    assert!(names.iter().all(|name| text.contains(name)));
+}
+
+#[test]
+fn bad_input_is_one_paragraph_and_leaves_no_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).expect("written");
+        path
+    };
+    let model = data("paper/table-2-state-dependent.toml");
+    let out = folder.path().join("never.toml");
+    let nan = file("nan.csv", "t,u,y\n0,0,0\n0.001,1,nan\n0.002,1,0\n");
+    refused(
+        &[p("compare"), &model, &nan],
+        &["nan.csv", "line 3", "column `y`"],
+    );
+    let slow = file("slow.csv", "t,u,y\n0,0,0\n0.01,1,0\n0.02,1,0\n");
+    refused(&[p("compare"), &model, &slow], &["sample_period_s", "0.01"]);
+    let text = std::fs::read_to_string(&model).expect("bundled");
+    let version = file(
+        "version.toml",
+        &text.replace("format_version = 1", "format_version = 7"),
+    );
+    refused(
+        &[p("compare"), &version, &data("paper-like")],
+        &["version.toml", "format_version"],
+    );
+    let short = file(
+        "short.toml",
+        &text.replace("b = [0.008]", "b = [0.008, 0.1]"),
+    );
+    refused(
+        &[p("compare"), &short, &data("paper-like")],
+        &["short.toml", "coefficients"],
+    );
+    refused(
+        &[p("compare"), &model, &folder.path().join("none")],
+        &["none"],
+    );
+    let extend = |effect: &str, parts: &[&str]| {
+        let arguments = [
+            p("extend"),
+            &model,
+            &data("hidden-ramp"),
+            p("--effect"),
+            p(effect),
+            p("-o"),
+            &out,
+        ];
+        refused(&arguments, parts);
+    };
+    extend("plenum-drop", &["Did you mean `plenum-droop`?"]);
+    extend("free-stream-variation", &["u_inf", "column"]);
+    extend("state-dependent-delay", &["in the model already"]);
+    let diverging = file(
+        "diverging.toml",
+        &text.replace("a = [0.9759", "a = [1.9759"),
+    );
+    refused(
+        &[p("compare"), &diverging, &data("paper-like")],
+        &["diverges", "t ="],
+    );
+    let input = file("in.csv", "t,u\n0,0\n0.001,1\n0.002,x\n");
+    let csv = folder.path().join("never.csv");
+    refused(
+        &[p("simulate"), &model, &input, p("-o"), &csv],
+        &["in.csv", "line 4", "column `u`"],
+    );
+    assert!(!out.exists() && !csv.exists());
+    let left = std::fs::read_dir(folder.path()).expect("the folder");
+    assert_eq!(left.count(), 6, "only what the test wrote");
+}

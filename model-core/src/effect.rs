@@ -105,6 +105,9 @@ pub struct Flow<T> {
     pub now: T,
     /// s_{k−1}.
     pub before: T,
+    /// s_{k+1} as it would be without flow effects: what resists a motion must
+    /// know the motion, or it chatters where it should hold still.
+    pub next: T,
     /// 1 − Σa − Σc·j, per sample: turns an equilibrium level into a drive.
     pub relaxation: T,
 }

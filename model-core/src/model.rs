@@ -303,6 +303,7 @@ where
         let flow = Flow {
             now: flow,
             before: state.outputs.back(1),
+            next,
             relaxation: recursion.relaxation(&mut strength),
         };
         next = next + effects.drive(&mut state.effects, &flow, &at);

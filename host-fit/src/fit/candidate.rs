@@ -1,5 +1,6 @@
 //! A base model refitted, all of it, with one more effect.
 
+use super::lean::fresh_starts;
 use super::{Fit, FitOptions, fit};
 use crate::data::Record;
 use crate::model::{Delay, Model};
@@ -67,17 +68,28 @@ pub fn fit_with_effect(
         Place::Delay | Place::Flow | Place::Sensor => &[base.grading],
     };
     let starts = starts(base, spec, &scale, records);
-    let models: Vec<Model> = starts
+    let with = |base: &Model, parameters: &[f64], grading: Grading| {
+        let mut model = base.clone();
+        model.grading = grading;
+        model.add(spec, parameters, reference);
+        model
+    };
+    let mut models: Vec<Model> = starts
         .iter()
         .flat_map(|parameters| {
-            gradings.iter().map(move |grading| {
-                let mut model = base.clone();
-                model.grading = *grading;
-                model.add(spec, parameters, reference);
-                model
-            })
+            gradings
+                .iter()
+                .map(|grading| with(base, parameters, *grading))
         })
         .collect();
+    if spec.parameters.is_empty() {
+        // Nothing leads from a base that never saw the effect to one that has it.
+        models.extend(
+            fresh_starts(base, records)
+                .iter()
+                .map(|b| with(b, &[], b.grading)),
+        );
+    }
     let tried: Vec<Option<Fit>> = models
         .par_iter()
         .map(|model| fit(model, records, &brief).ok())

@@ -20,38 +20,11 @@ const TIME_CONSTANTS: [f64; 3] = [0.02, 0.06, 0.2];
 /// # Errors
 /// When no starting point gives a stable free run.
 pub fn lean_base(given: &Model, records: &[&Record]) -> Result<Fit, SimulateError> {
-    let level = steady_level(records);
-    let start = |delay: u16, time_constant: f64| {
-        let kept = (-given.sample_period_s / time_constant).exp();
-        Model {
-            convention: LagConvention::OneStep,
-            start: Start::Rest,
-            grading: Grading::Proportional,
-            constant: 0.0,
-            state_lags: vec![1],
-            a: vec![kept],
-            product_lags: vec![1],
-            b: vec![(1.0 - kept) * level],
-            c: vec![0.0],
-            delay: Delay::Fixed {
-                delays: vec![delay],
-            },
-            effects: Vec::new(),
-            ..given.clone()
-        }
-    };
-    // The delays to set out from: spread evenly, and the given model's own.
-    let longest = (0.12 / given.sample_period_s).round().clamp(8.0, 400.0) as u16;
-    let mut delays: Vec<u16> = (0..8).map(|i| longest * i / 8 + longest / 16).collect();
-    delays.push(given.longest_delay().min(usize::from(u16::MAX)) as u16);
+    let starts = fresh_starts(given, records);
     let brief = FitOptions {
         iterations: 4,
         ..FitOptions::default()
     };
-    let starts: Vec<Model> = delays
-        .iter()
-        .flat_map(|h| TIME_CONSTANTS.iter().map(|time| start(*h, *time)))
-        .collect();
     let tried: Vec<_> = starts
         .par_iter()
         .map(|model| fit(model, records, &brief))
@@ -83,6 +56,38 @@ pub fn lean_base(given: &Model, records: &[&Record]) -> Result<Fit, SimulateErro
             with_law_of(&best.model, given, records)
         }
     }
+}
+
+/// Lean models with a fixed delay that know nothing but the level of y: delays
+/// spread evenly, and `given`'s own, with several time constants each.
+pub(super) fn fresh_starts(given: &Model, records: &[&Record]) -> Vec<Model> {
+    let level = steady_level(records);
+    let start = |delay: u16, time_constant: f64| {
+        let kept = (-given.sample_period_s / time_constant).exp();
+        Model {
+            convention: LagConvention::OneStep,
+            start: Start::Rest,
+            grading: Grading::Proportional,
+            constant: 0.0,
+            state_lags: vec![1],
+            a: vec![kept],
+            product_lags: vec![1],
+            b: vec![(1.0 - kept) * level],
+            c: vec![0.0],
+            delay: Delay::Fixed {
+                delays: vec![delay],
+            },
+            effects: Vec::new(),
+            ..given.clone()
+        }
+    };
+    let longest = (0.12 / given.sample_period_s).round().clamp(8.0, 400.0) as u16;
+    let mut delays: Vec<u16> = (0..8).map(|i| longest * i / 8 + longest / 16).collect();
+    delays.push(given.longest_delay().min(usize::from(u16::MAX)) as u16);
+    let pairs = delays
+        .iter()
+        .flat_map(|h| TIME_CONSTANTS.iter().map(|time| start(*h, *time)));
+    pairs.collect()
 }
 
 /// What y settles at under u = 1: the 95 % quantile of y while the input is on.

@@ -362,6 +362,7 @@ fn descend(
     let coordinates = model.coordinates();
     let moves = |index: usize, coordinate: &Coordinate| match coordinate.parameter() {
         None => options.linear && (index > 0 || options.constant),
+        Some(parameter) if parameter.low >= parameter.high => false,
         Some(_) => options.delay || !matches!(coordinate.kind, Kind::Delay(_)),
     };
     let axes: Vec<Axis> = coordinates

@@ -4,8 +4,9 @@ use crate::effect::{Effect, Flow, Influence, Instant, Parameter, Physics, Place,
 use crate::real::Real;
 
 
-/// ż = A·ṡ − β·|ṡ|·z − γ·ṡ·|z|; adds −α·z to s_{k+1}. Rate-independent, so
-/// ṡ enters through the change over a sample.
+/// ż = A·ṡ − β·|ṡ|·z − γ·ṡ·|z|; adds −α·z to the drive. Rate-independent,
+/// so ṡ enters through the change over a sample. Only α·A can be told from data:
+/// A is 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoucWenHysteresis<T> {
     stiffness: T,
@@ -31,7 +32,7 @@ impl<T: Real> Effect<T> for BoucWenHysteresis<T> {
         let closing = self.beta * change.abs();
         let opening = self.gamma * change;
         *z = (*z + self.stiffness * change - opening * z.abs()) / (T::ONE + closing.abs());
-        -(self.alpha * *z)
+        -(self.alpha * *z * flow.relaxation)
     }
 }
 
@@ -43,10 +44,10 @@ impl<T: Real> Physics<T> for BoucWenHysteresis<T> {
         summary: "a smooth hysteresis loop in the restoring force",
         equation: "ż = A·ṡ − β·|ṡ|·z − γ·ṡ·|z|; adds −α·z",
         parameters: &[
-            Parameter { name: "stiffness", unit: "-", low: 0.0, high: 10.0, starts: &[1.0], influence: Influence::Smooth },
-            Parameter { name: "beta", unit: "1/y", low: 0.01, high: 1000.0, starts: &[2.0, 20.0], influence: Influence::Smooth },
-            Parameter { name: "gamma", unit: "1/y", low: -1000.0, high: 1000.0, starts: &[-1.0], influence: Influence::Smooth },
-            Parameter { name: "alpha", unit: "-", low: -1.0, high: 1.0, starts: &[0.002], influence: Influence::Smooth },
+            Parameter { name: "stiffness", unit: "-", low: 1.0, high: 1.0, starts: &[1.0], influence: Influence::Smooth },
+            Parameter { name: "beta", unit: "1/y", low: 0.01, high: 1000.0, starts: &[2.0, 10.0], influence: Influence::Smooth },
+            Parameter { name: "gamma", unit: "1/y", low: -1000.0, high: 1000.0, starts: &[0.5], influence: Influence::Smooth },
+            Parameter { name: "alpha", unit: "-", low: -5.0, high: 5.0, starts: &[0.3], influence: Influence::Smooth },
         ],
         channel: None,
         source: "Wen, J. Eng. Mech. Div. 102 (1976)",

@@ -4,7 +4,8 @@ use crate::effect::{Effect, Flow, Influence, Instant, Parameter, Physics, Place,
 use crate::real::Real;
 
 
-/// Adds −F·sign(s_k − s_{k−1}) to s_{k+1}.
+/// Adds −F·sign(ṡ), and holds the flow where the motion would be less than F a
+/// sample: the sign is that of the step being taken, as in continuous time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DryFriction<T> {
     level: T,
@@ -19,13 +20,8 @@ impl<T: Real> Effect<T> for DryFriction<T> {
     }
     #[inline]
     fn drive(&self, _state: &mut (), flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
-        if flow.now > flow.before {
-            -self.level
-        } else if flow.now < flow.before {
-            self.level
-        } else {
-            T::ZERO
-        }
+        let step = flow.next - flow.now;
+        -step.at_least(-self.level).at_most(self.level)
     }
 }
 
@@ -37,7 +33,7 @@ impl<T: Real> Physics<T> for DryFriction<T> {
         summary: "Coulomb friction acts against the motion",
         equation: "adds −F·sign(s_k − s_{k−1})",
         parameters: &[
-            Parameter { name: "level", unit: "y per sample", low: -1.0, high: 1.0, starts: &[0.0001], influence: Influence::Smooth },
+            Parameter { name: "level", unit: "y per sample", low: 0.0, high: 1.0, starts: &[0.0001, 0.001], influence: Influence::Smooth },
         ],
         channel: None,
         source: "Coulomb friction; Armstrong-Hélouvry et al., Automatica 30 (1994)",

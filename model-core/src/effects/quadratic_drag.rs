@@ -4,7 +4,8 @@ use crate::effect::{Effect, Flow, Influence, Instant, Parameter, Physics, Place,
 use crate::real::Real;
 
 
-/// Adds −d·(s_k − s_{k−1})·|s_k − s_{k−1}| to s_{k+1}.
+/// Adds −d·Δ·|Δ| with Δ the step being taken, s_{k+1} − s_k: the implicit form,
+/// which is stable for any d ≥ 0 and what continuous time comes to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QuadraticDrag<T> {
     coefficient: T,
@@ -19,8 +20,11 @@ impl<T: Real> Effect<T> for QuadraticDrag<T> {
     }
     #[inline]
     fn drive(&self, _state: &mut (), flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
-        let change = flow.now - flow.before;
-        -(self.coefficient * change * change.abs())
+        // Δ + d·Δ·|Δ| = Δ₀ solved for Δ.
+        let free = flow.next - flow.now;
+        let two = T::ONE + T::ONE;
+        let root = (T::ONE + two * two * self.coefficient * free.abs()).sqrt();
+        two * free / (T::ONE + root) - free
     }
 }
 

@@ -7,6 +7,7 @@ pub mod diagnose;
 pub mod dual;
 pub mod extend;
 pub mod fit;
+pub mod identify;
 pub mod indicators;
 pub mod model;
 pub mod output;

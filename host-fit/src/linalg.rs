@@ -1,13 +1,131 @@
-//! Linear algebra: the one place that knows faer.
+//! Dense linear algebra, the only module that knows faer.
 
+use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::Solve;
+use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
+
+/// Singular values below this share of the largest count as zero.
+const RANK_TOLERANCE: f64 = 1e-12;
+
+/// A decomposition that did not converge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("a matrix decomposition did not converge: look for values of very different size in the data")]
+pub struct NotConverged;
+
+/// Minimum-norm least-squares solution x = A⁺y, eq. (8).
+///
+/// `columns` are the columns of A, each as long as `rhs`. Dependent columns
+/// share their coefficient, as the Moore–Penrose pseudo-inverse has it.
+///
+/// # Errors
+/// [`NotConverged`] when the singular value decomposition fails.
+pub(crate) fn least_squares(columns: &[Vec<f64>], rhs: &[f64]) -> Result<Vec<f64>, NotConverged> {
+    let matrix = Mat::from_fn(rhs.len(), columns.len(), |i, j| {
+        columns.get(j).and_then(|c| c.get(i)).copied().unwrap_or(0.0)
+    });
+    if columns.is_empty() || rhs.is_empty() {
+        return Ok(vec![0.0; columns.len()]);
+    }
+    let svd = matrix.thin_svd().map_err(|_| NotConverged)?;
+    let values: Vec<f64> = svd.S().column_vector().iter().copied().collect();
+    let floor = values.first().copied().unwrap_or(0.0) * RANK_TOLERANCE * (rhs.len() as f64).sqrt();
+    let right = MatRef::from_column_major_slice(rhs, rhs.len(), 1);
+    let mut scaled = svd.U().transpose() * right;
+    for (i, value) in values.iter().enumerate() {
+        scaled[(i, 0)] = if *value > floor { scaled[(i, 0)] / value } else { 0.0 };
+    }
+    let solution = svd.V() * scaled;
+    Ok((0..columns.len()).map(|i| solution[(i, 0)]).collect())
+}
 
 /// Solves A·x = b for a symmetric positive definite A (row-major); `None` if it
 /// is not.
 pub(crate) fn solve_symmetric(a: &[f64], b: &[f64]) -> Option<Vec<f64>> {
     let n = b.len();
-    let a = faer::MatRef::from_row_major_slice(a, n, n);
-    let factor = a.llt(faer::Side::Lower).ok()?;
+    let a = MatRef::from_row_major_slice(a, n, n);
+    let factor = a.llt(Side::Lower).ok()?;
     let x = factor.solve(faer::ColRef::from_slice(b));
     Some(x.iter().copied().collect())
+}
+
+/// Adds AᵀB to `out`; A and B are `rows` × `size`, column by column, `out` is
+/// `size` × `size`, column by column. Slices of other lengths are left alone.
+pub(crate) fn add_cross_products(out: &mut [f64], a: &[f64], b: &[f64], rows: usize, size: usize) {
+    if out.len() != size * size || a.len() != rows * size || b.len() != rows * size {
+        return;
+    }
+    matmul(
+        MatMut::from_column_major_slice_mut(out, size, size),
+        Accum::Add,
+        MatRef::from_column_major_slice(a, rows, size).transpose(),
+        MatRef::from_column_major_slice(b, rows, size),
+        1.0,
+        Par::Seq,
+    );
+}
+
+/// Magnitudes of the roots of zⁿ − Σ_i w_i z^(n−i), largest first: the poles of
+/// x_{k+1} = Σ_i w_i x_{k+1−i}, with `weights[i − 1]` = w_i.
+///
+/// # Errors
+/// [`NotConverged`] when the eigenvalue iteration fails.
+pub(crate) fn pole_magnitudes(weights: &[f64]) -> Result<Vec<f64>, NotConverged> {
+    let n = weights.len() - weights.iter().rev().take_while(|w| **w == 0.0).count();
+    if n == 0 {
+        return Ok(Vec::new());
+    }
+    let companion = Mat::from_fn(n, n, |i, j| match i {
+        0 => weights.get(j).copied().unwrap_or(0.0),
+        _ => f64::from(u8::from(i == j + 1)),
+    });
+    let poles = companion.eigenvalues().map_err(|_| NotConverged)?;
+    let mut magnitudes: Vec<f64> = poles.iter().map(|z| z.re.hypot(z.im)).collect();
+    magnitudes.sort_by(|a, b| b.total_cmp(a));
+    Ok(magnitudes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(a: &[f64], b: &[f64], tolerance: f64) {
+        assert_eq!(a.len(), b.len());
+        for (x, y) in a.iter().zip(b) {
+            assert!((x - y).abs() < tolerance, "{a:?} and {b:?}");
+        }
+    }
+
+    #[test]
+    fn least_squares_of_a_line() {
+        let t: Vec<f64> = (0..50).map(f64::from).collect();
+        let y: Vec<f64> = t.iter().map(|t| 3.0 - 0.5 * t).collect();
+        close(&least_squares(&[vec![1.0; 50], t], &y).expect("converges"), &[3.0, -0.5], 1e-12);
+    }
+
+    #[test]
+    fn dependent_columns_share_the_coefficient() {
+        let t: Vec<f64> = (1..50).map(f64::from).collect();
+        let y: Vec<f64> = t.iter().map(|t| 4.0 * t).collect();
+        let x = least_squares(&[t.clone(), t.clone()], &y).expect("converges");
+        close(&x, &[2.0, 2.0], 1e-12);
+    }
+
+    #[test]
+    fn cross_products_are_added() {
+        let (a, b) = ([1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0]);
+        let mut out = vec![1.0; 4];
+        add_cross_products(&mut out, &a, &b, 2, 2);
+        close(&out, &[18.0, 40.0, 24.0, 54.0], 1e-12);
+    }
+
+    #[test]
+    fn poles_of_known_recursions() {
+        close(&pole_magnitudes(&[0.9]).expect("converges"), &[0.9], 1e-12);
+        // (z − 0.5)(z + 0.8) z
+        close(&pole_magnitudes(&[-0.3, 0.4, 0.0]).expect("converges"), &[0.8, 0.5], 1e-12);
+        let mut circle = vec![0.0; 10];
+        circle[9] = 0.5;
+        close(&pole_magnitudes(&circle).expect("converges"), &[0.5f64.powf(0.1); 10], 1e-12);
+        assert!(pole_magnitudes(&[0.0]).expect("converges").is_empty());
+    }
 }

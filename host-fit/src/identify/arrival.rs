@@ -1,0 +1,268 @@
+//! The command as it arrives at the sensor, for any input delay.
+
+use model_core::average::WindowSum;
+use model_core::delay::DelayLaw as _;
+use model_core::effects::StateDependentDelay;
+
+use super::structure::{DelayLaw, InputDelay, Series, Structure, WINDOW};
+
+/// Step in which factors f are searched.
+pub(crate) const FACTOR_STEP: f64 = 1e-4;
+
+/// Strength with which samples enter a sum of products.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Weights {
+    /// 1 inside the intervals of each record, 0 outside.
+    Intervals(Vec<Vec<(usize, usize)>>),
+    /// Any value at each sample of each record.
+    Samples(Vec<Vec<f64>>),
+}
+
+impl Weights {
+    /// Sample by sample product of two sequences.
+    pub(crate) fn product(&self, other: &Self) -> Self {
+        match (self, other) {
+            (Self::Intervals(a), Self::Intervals(b)) => {
+                Self::Intervals(a.iter().zip(b).map(|(a, b)| intersection(a, b)).collect())
+            }
+            (Self::Samples(a), Self::Samples(b)) => Self::Samples(
+                a.iter()
+                    .zip(b)
+                    .map(|(a, b)| a.iter().zip(b).map(|(x, y)| x * y).collect())
+                    .collect(),
+            ),
+            (Self::Intervals(on), Self::Samples(values)) | (Self::Samples(values), Self::Intervals(on)) => {
+                Self::Samples(
+                    values
+                        .iter()
+                        .zip(on)
+                        .map(|(values, on)| {
+                            let mut masked = vec![0.0; values.len()];
+                            for &(start, end) in on {
+                                if let (Some(to), Some(from)) = (masked.get_mut(start..end), values.get(start..end)) {
+                                    to.copy_from_slice(from);
+                                }
+                            }
+                            masked
+                        })
+                        .collect(),
+                )
+            }
+        }
+    }
+
+    /// Whether the weights are 0 and 1 only.
+    pub(crate) fn is_binary(&self) -> bool {
+        matches!(self, Self::Intervals(_))
+    }
+}
+
+fn intersection(a: &[(usize, usize)], b: &[(usize, usize)]) -> Vec<(usize, usize)> {
+    let (mut i, mut j, mut common) = (0, 0, Vec::new());
+    while let (Some(x), Some(y)) = (a.get(i), b.get(j)) {
+        let (start, end) = (x.0.max(y.0), x.1.min(y.1));
+        if start < end {
+            common.push((start, end));
+        }
+        if x.1 < y.1 { i += 1 } else { j += 1 }
+    }
+    common
+}
+
+/// Where two binary sequences differ: start, end and the sign of `to − from`.
+pub(crate) fn difference(from: &[(usize, usize)], to: &[(usize, usize)]) -> Vec<(usize, usize, f64)> {
+    let mut edges: Vec<(usize, i32, i32)> = Vec::with_capacity(2 * (from.len() + to.len()));
+    edges.extend(from.iter().flat_map(|&(s, e)| [(s, 1, 0), (e, -1, 0)]));
+    edges.extend(to.iter().flat_map(|&(s, e)| [(s, 0, 1), (e, 0, -1)]));
+    edges.sort_unstable_by_key(|e| e.0);
+    let (mut in_from, mut in_to, mut since) = (0, 0, 0);
+    let mut pieces = Vec::new();
+    for (at, d_from, d_to) in edges {
+        if at > since && in_from != in_to {
+            pieces.push((since, at, f64::from(in_to - in_from)));
+        }
+        since = at;
+        in_from += d_from;
+        in_to += d_to;
+    }
+    pieces
+}
+
+/// The signals that the recursion is fitted to, one entry per record.
+#[derive(Debug, Clone)]
+pub(crate) struct Signals {
+    /// Input: u, or its average for an averaged model.
+    pub(crate) u: Vec<Vec<f64>>,
+    /// Output: y, or its average for an averaged model.
+    pub(crate) y: Vec<Vec<f64>>,
+    /// h̃_k from the measured output, samples; empty for fixed delays.
+    base_delay: Vec<Vec<f64>>,
+    /// Whether every input is 0 or 1.
+    binary: bool,
+}
+
+impl Signals {
+    /// Prepares the records for a structure.
+    pub(crate) fn new(records: &[Series<'_>], structure: &Structure) -> Self {
+        let pick = |signal: &[f64]| {
+            if structure.averaged { moving_average(signal) } else { signal.to_vec() }
+        };
+        let u: Vec<Vec<f64>> = records.iter().map(|r| pick(r.u)).collect();
+        let y: Vec<Vec<f64>> = records.iter().map(|r| pick(r.y)).collect();
+        let base_delay = match &structure.delay {
+            InputDelay::Fixed { .. } => Vec::new(),
+            InputDelay::StateDependent { law, .. } => y
+                .iter()
+                .map(|y| {
+                    let law = core_law(law, 1.0);
+                    let follows = if structure.averaged { y.clone() } else { averaged_past(y) };
+                    follows.iter().map(|f| law.evaluate(f.max(0.0))).collect()
+                })
+                .collect(),
+        };
+        let binary = u.iter().flatten().all(|u| *u == 0.0 || *u == 1.0);
+        Self { u, y, base_delay, binary }
+    }
+
+    /// d_k = u_{k−h_k} for one input, at k = 0 … N−2 of each record. `tick` is h
+    /// in samples, or f in steps of [`FACTOR_STEP`].
+    pub(crate) fn arrived(&self, tick: i64) -> Weights {
+        let factor = factor(tick);
+        let samples = self.u.iter().enumerate().map(|(r, u)| {
+            let rows = u.len().saturating_sub(1);
+            let at = |k: usize| -> f64 {
+                let delay = match self.base_delay.get(r).and_then(|d| d.get(k)) {
+                    Some(base) => delay_samples(factor, *base),
+                    None => tick.max(0) as usize,
+                };
+                k.checked_sub(delay).and_then(|i| u.get(i)).copied().unwrap_or(0.0)
+            };
+            (0..rows).map(at).collect::<Vec<f64>>()
+        });
+        if !self.binary {
+            return Weights::Samples(samples.collect());
+        }
+        Weights::Intervals(
+            samples
+                .map(|d| {
+                    let mut intervals = Vec::new();
+                    let mut start = None;
+                    for (k, on) in d.iter().map(|d| *d != 0.0).chain([false]).enumerate() {
+                        match (on, start) {
+                            (true, None) => start = Some(k),
+                            (false, Some(s)) => {
+                                intervals.push((s, k));
+                                start = None;
+                            }
+                            _ => {}
+                        }
+                    }
+                    intervals
+                })
+                .collect(),
+        )
+    }
+
+    /// Ticks of an input delay that move it by one sample.
+    pub(crate) fn ticks_per_sample(&self) -> f64 {
+        let longest = self.base_delay.iter().flatten().fold(0.0f64, |m, d| m.max(*d));
+        if longest > 0.0 { 1.0 / (FACTOR_STEP * longest) } else { 1.0 }
+    }
+
+    /// Weight 1 at every row of the regression.
+    pub(crate) fn everywhere(&self) -> Weights {
+        Weights::Intervals(self.y.iter().map(|y| vec![(0, y.len().saturating_sub(1))]).collect())
+    }
+}
+
+/// The factor that a tick stands for.
+pub(crate) fn factor(tick: i64) -> f64 {
+    tick as f64 * FACTOR_STEP
+}
+
+/// The law as the model's core runs it.
+pub(crate) fn core_law(law: &DelayLaw, factor: f64) -> StateDependentDelay<f64> {
+    StateDependentDelay { floor: law.floor, rise: law.rise, rate: law.rate, factors: [factor] }
+}
+
+fn delay_samples(factor: f64, base: f64) -> usize {
+    let law = StateDependentDelay { floor: 0.0, rise: 0.0, rate: 0.0, factors: [factor] };
+    law.tap(0, base).whole
+}
+
+/// ỹ_k of eq. (1): the W − 1 values before y_k, divided by W.
+pub(crate) fn averaged_past(y: &[f64]) -> Vec<f64> {
+    let terms = WINDOW as usize - 1;
+    let mut sum = WindowSum::new();
+    y.iter()
+        .enumerate()
+        .map(|(k, y_k)| {
+            let average = sum.value() / f64::from(WINDOW);
+            let leaving = k.checked_sub(terms).and_then(|i| y.get(i)).copied().unwrap_or(0.0);
+            sum.slide(*y_k, leaving, WINDOW - 1);
+            average
+        })
+        .collect()
+}
+
+/// Mean of the last W values, eqs. (12) and (13).
+pub(crate) fn moving_average(x: &[f64]) -> Vec<f64> {
+    let mut sum = WindowSum::new();
+    x.iter()
+        .enumerate()
+        .map(|(k, x_k)| {
+            let leaving = k.checked_sub(WINDOW as usize).and_then(|i| x.get(i)).copied().unwrap_or(0.0);
+            sum.slide(*x_k, leaving, WINDOW);
+            sum.value() / f64::from(WINDOW)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wave() -> (Vec<f64>, Vec<f64>) {
+        let u: Vec<f64> = (0..900).map(|k| f64::from(u8::from((k / 70) % 2 == 1))).collect();
+        let y = (0..900).map(|k| 0.5 + 0.6 * (k as f64 * 0.01).sin()).collect();
+        (u, y)
+    }
+
+    #[test]
+    fn averages_equal_their_definitions() {
+        let (_, y) = wave();
+        let (past, mean) = (averaged_past(&y), moving_average(&y));
+        for k in [0usize, 1, 5, 249, 250, 251, 600, 899] {
+            let at = |s: usize| k.checked_sub(s).map_or(0.0, |i| y[i]);
+            let expected: f64 = (1..250).map(at).sum::<f64>() / 250.0;
+            assert!((past[k] - expected).abs() < 1e-14);
+            let expected: f64 = (0..250).map(at).sum::<f64>() / 250.0;
+            assert!((mean[k] - expected).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn the_arriving_command_follows_the_definition() {
+        let (u, y) = wave();
+        let law = DelayLaw { floor: 20.0, rise: 30.0, rate: 3.0 };
+        let structure = Structure {
+            delay: InputDelay::StateDependent { law, factors: None },
+            ..Structure::default()
+        };
+        let signals = Signals::new(&[Series { u: &u, y: &y }], &structure);
+        let Weights::Intervals(on) = signals.arrived(12_500) else { panic!("u is on/off") };
+        let follows = averaged_past(&y);
+        for k in 0..899 {
+            let delay = (1.25 * (20.0 + 30.0 * (-3.0 * follows[k].max(0.0)).exp())).round() as usize;
+            let expected = k >= delay && u[k - delay] == 1.0;
+            assert_eq!(on[0].iter().any(|&(s, e)| (s..e).contains(&k)), expected, "{k}");
+        }
+    }
+
+    #[test]
+    fn differences_and_products_of_sequences() {
+        let (a, b) = (vec![(2, 5), (8, 12)], vec![(3, 6), (8, 10), (11, 12)]);
+        assert_eq!(difference(&a, &b), [(2, 3, -1.0), (5, 6, 1.0), (10, 11, -1.0)]);
+        assert_eq!(intersection(&a, &b), [(3, 5), (8, 10), (11, 12)]);
+    }
+}

@@ -1,0 +1,8 @@
+//! Identification.
+mod arrival;
+mod cholesky;
+mod lagged_products;
+mod layout;
+mod regression;
+mod structure;
+pub use structure::*;

@@ -1,0 +1,91 @@
+//! What is to be identified: sizes, delays and conventions of a model.
+
+use model_core::recursion::LagConvention;
+
+/// Samples W of the averages, eqs. (1), (12) and (13).
+pub const WINDOW: u32 = 250;
+
+/// The three numbers of the delay law h̃(ỹ) = p0 + p1·exp(−p2·ỹ), eq. (2).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DelayLaw {
+    /// p0, samples: delay of the attached flow.
+    pub floor: f64,
+    /// p1, samples: how much longer the delay of the separated flow is.
+    pub rise: f64,
+    /// p2, 1/y: how quickly the delay shortens as the flow attaches.
+    pub rate: f64,
+}
+
+impl DelayLaw {
+    /// The law published in the paper, for its rig.
+    pub const PAPER: Self = Self { floor: 47.35, rise: 12.69, rate: 20.18 };
+
+    /// The longest delay of the law over ỹ ≥ 0, samples.
+    pub fn longest(&self) -> f64 {
+        self.floor + self.rise.max(0.0)
+    }
+}
+
+/// Where the input delays come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum InputDelay {
+    /// h_l constant, eq. (3).
+    Fixed {
+        /// Given delays in samples, one per input, or `None` to search them.
+        delays: Option<Vec<u32>>,
+    },
+    /// h_l = round(f_l·h̃), eq. (4).
+    StateDependent {
+        /// The law h̃.
+        law: DelayLaw,
+        /// Given factors f_l, one per input, or `None` to search them in steps of 10⁻⁴.
+        factors: Option<Vec<f64>>,
+    },
+}
+
+/// Sizes and conventions of the model to identify.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Structure {
+    /// N1, number of state lags τ, at least 1.
+    pub state_lags: usize,
+    /// N2, number of product lags τ̄; 0 for a linear model.
+    pub product_lags: usize,
+    /// N3, number of input delays; 0 for a model without input.
+    pub inputs: usize,
+    /// Longest lag, samples, at least 1; lags run from 1 to it. Searched input
+    /// delays do not exceed it either.
+    pub longest_lag: u16,
+    /// What a lag means.
+    pub convention: LagConvention,
+    /// Where the input delays come from.
+    pub delay: InputDelay,
+    /// Whether the model is of the averaged signals, eqs. (14) and (15).
+    pub averaged: bool,
+    /// Whether the recursion has a constant term.
+    pub constant: bool,
+}
+
+impl Default for Structure {
+    /// The full model of the paper's Table II, state-dependent, law given and f = 1.
+    fn default() -> Self {
+        Self {
+            state_lags: 5,
+            product_lags: 10,
+            inputs: 1,
+            longest_lag: 500,
+            convention: LagConvention::OneStep,
+            delay: InputDelay::StateDependent { law: DelayLaw::PAPER, factors: Some(vec![1.0]) },
+            averaged: false,
+            constant: false,
+        }
+    }
+}
+
+/// One recording: command and response, equally long, from rest.
+#[derive(Debug, Clone, Copy)]
+pub struct Series<'a> {
+    /// u_k: 0 or 1 for on/off, any real otherwise.
+    pub u: &'a [f64],
+    /// y_k.
+    pub y: &'a [f64],
+}

@@ -1,6 +1,7 @@
 //! Identification.
 mod arrival;
 mod cholesky;
+mod exchange;
 mod lagged_products;
 mod layout;
 mod regression;

@@ -73,9 +73,9 @@ impl Layout {
         }
     }
 
-    /// Whether the input delays are searched.
-    pub(crate) fn searches_inputs(&self) -> bool {
-        self.given.is_none()
+    /// Bounds in ticks of the input delays that are searched.
+    pub(crate) fn input_bounds(&self) -> Vec<(i64, i64)> {
+        self.variables.iter().skip(self.state_lags + self.product_lags).map(|v| (v.lower, v.upper)).collect()
     }
 
     /// The variables that are lags, and those that are input delays.

@@ -1,0 +1,216 @@
+//! The delays as a search problem: the one-step objective and its search steps.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::exchange::{Exchange, best_input, set};
+use super::layout::Delays;
+use super::regression::Regression;
+use crate::search::{
+    Around, Evaluation, Evaluator, Point, Problem, SearchStep, StopReason, Success, Variable,
+};
+
+/// A search problem over the delays of a regression.
+pub(crate) trait OverDelays: Problem {
+    /// The regression behind it.
+    fn regression(&self) -> &Regression;
+    /// The regression, to build tables in it.
+    fn regression_mut(&mut self) -> &mut Regression;
+}
+
+/// Norm of the one-step prediction errors as a function of the delays.
+pub(crate) struct OneStep {
+    pub(crate) regression: Regression,
+}
+
+impl OverDelays for OneStep {
+    fn regression(&self) -> &Regression {
+        &self.regression
+    }
+    fn regression_mut(&mut self) -> &mut Regression {
+        &mut self.regression
+    }
+}
+
+impl Problem for OneStep {
+    fn variables(&self) -> &[Variable] {
+        &self.regression.layout.variables
+    }
+
+    fn canonical(&self, point: &[i64]) -> Point {
+        self.regression.layout.canonical(point)
+    }
+
+    fn groups(&self) -> Vec<Vec<usize>> {
+        self.regression.layout.groups()
+    }
+
+    fn prepare(&mut self, points: &[&Point]) {
+        for point in points {
+            let delays = self.regression.layout.delays(point);
+            self.regression.tabulate_near(&delays.ticks);
+        }
+    }
+
+    fn evaluate(&self, point: &Point, _give_up_at: f64) -> Evaluation {
+        let delays = self.regression.layout.delays(point);
+        Evaluation::Value(self.regression.normal(&delays).squared_residual().sqrt())
+    }
+}
+
+/// Brings a candidate to where no single exchange of a lag and no other delay
+/// of one input lowers the one-step residual. Returns the squared norm.
+pub(crate) fn settle(regression: &mut Regression, delays: &mut Delays, screened: &mut usize) -> f64 {
+    let inputs = regression.layout.input_bounds();
+    loop {
+        regression.tabulate(&delays.ticks);
+        let mut exchange = Exchange::new(regression, &delays.ticks);
+        let residual = exchange.descend(delays);
+        *screened += exchange.screened();
+        let mut moved = false;
+        for (input, bounds) in inputs.iter().enumerate() {
+            if let Some((tick, better)) = best_input(regression, delays, input, *bounds, screened)
+                && better < residual * (1.0 - 1e-9)
+                && !delays.ticks.contains(&tick)
+            {
+                delays.ticks[input] = tick;
+                moved = true;
+                break;
+            }
+        }
+        if !moved {
+            return residual;
+        }
+        delays.ticks.sort_unstable();
+    }
+}
+
+/// Search step: exchanges single lags and input delays until none helps.
+#[derive(Default)]
+pub(crate) struct ExchangeStep {
+    settled_at: Option<Point>,
+    screened: usize,
+}
+
+impl SearchStep<OneStep> for ExchangeStep {
+    fn search(
+        &mut self,
+        evaluator: &mut Evaluator<'_, OneStep>,
+        around: &mut Around<'_>,
+    ) -> Result<Option<Success>, StopReason> {
+        if self.settled_at.as_deref() == Some(around.point) {
+            return Ok(None);
+        }
+        let regression = evaluator.problem_mut().regression_mut();
+        let mut delays = regression.layout.delays(around.point);
+        settle(regression, &mut delays, &mut self.screened);
+        let point = regression.layout.point(&delays);
+        self.settled_at = Some(point.clone());
+        evaluator.first_better(&[point], around.value)
+    }
+
+    fn screened(&self) -> usize {
+        self.screened
+    }
+}
+
+/// Search step: exchanges pairs of lags, once single exchanges no longer help.
+#[derive(Default)]
+pub(crate) struct PairStep {
+    settled_at: Option<Point>,
+    screened: usize,
+}
+
+impl SearchStep<OneStep> for PairStep {
+    fn search(
+        &mut self,
+        evaluator: &mut Evaluator<'_, OneStep>,
+        around: &mut Around<'_>,
+    ) -> Result<Option<Success>, StopReason> {
+        if self.settled_at.as_deref() == Some(around.point) {
+            return Ok(None);
+        }
+        let regression = evaluator.problem_mut().regression_mut();
+        let mut delays = regression.layout.delays(around.point);
+        regression.tabulate(&delays.ticks);
+        let mut exchange = Exchange::new(regression, &delays.ticks);
+        exchange.descend_in_pairs(&mut delays, || true);
+        self.screened += exchange.screened();
+        let point = regression.layout.point(&delays);
+        self.settled_at = Some(point.clone());
+        evaluator.first_better(&[point], around.value)
+    }
+
+    fn screened(&self) -> usize {
+        self.screened
+    }
+}
+
+/// Search step: from a local optimum, replaces a few lags at random, settles
+/// again, and gives up after `patience` fruitless kicks.
+pub(crate) struct KickStep {
+    patience: usize,
+    fruitless: usize,
+    screened: usize,
+}
+
+impl KickStep {
+    pub(crate) fn new(patience: usize) -> Self {
+        Self { patience, fruitless: 0, screened: 0 }
+    }
+}
+
+impl SearchStep<OneStep> for KickStep {
+    fn search(
+        &mut self,
+        evaluator: &mut Evaluator<'_, OneStep>,
+        around: &mut Around<'_>,
+    ) -> Result<Option<Success>, StopReason> {
+        if !around.locally_optimal || self.fruitless >= self.patience {
+            return Ok(None);
+        }
+        self.fruitless += 1;
+        if evaluator.is_interrupted() {
+            return Err(StopReason::Interrupted);
+        }
+        let regression = evaluator.problem_mut().regression_mut();
+        let mut delays = regression.layout.delays(around.point);
+        let strength = 2 + self.fruitless % 5;
+        kick(regression, &mut delays, strength, around.rng);
+        settle(regression, &mut delays, &mut self.screened);
+        let point = regression.layout.point(&delays);
+        let success = evaluator.first_better(&[point], around.value)?;
+        if success.is_some() {
+            self.fruitless = 0;
+        }
+        Ok(success)
+    }
+
+    fn has_given_up(&self) -> bool {
+        self.fruitless >= self.patience
+    }
+
+    fn screened(&self) -> usize {
+        self.screened
+    }
+}
+
+/// Replaces `strength` lags by random ones, and now and then an input delay.
+pub(crate) fn kick(
+    regression: &Regression,
+    delays: &mut Delays,
+    strength: usize,
+    rng: &mut ChaCha8Rng,
+) {
+    let slots = Exchange::new(regression, &delays.ticks).slots(delays);
+    for _ in 0..strength.min(slots.len()) {
+        let slot = slots[rng.random_range(0..slots.len())];
+        set(delays, slot, rng.random_range(1..=regression.layout.longest_lag));
+    }
+    for (input, (low, high)) in regression.layout.input_bounds().into_iter().enumerate() {
+        if rng.random_bool(0.3) {
+            delays.ticks[input] = rng.random_range(low..=high);
+        }
+    }
+    *delays = regression.layout.delays(&regression.layout.point(delays));
+}

@@ -97,6 +97,10 @@ pub(crate) struct Signals {
     pub(crate) y: Vec<Vec<f64>>,
     /// h̃_k from the measured output, samples; empty for fixed delays.
     base_delay: Vec<Vec<f64>>,
+    /// Its smallest and largest value.
+    base_range: Vec<(f64, f64)>,
+    /// Where the input changes.
+    edges: Vec<Vec<usize>>,
     /// Whether every input is 0 or 1.
     binary: bool,
 }
@@ -121,46 +125,64 @@ impl Signals {
                 .collect(),
         };
         let binary = u.iter().flatten().all(|u| *u == 0.0 || *u == 1.0);
-        Self { u, y, base_delay, binary }
+        let base_range = base_delay
+            .iter()
+            .map(|d: &Vec<f64>| d.iter().fold((f64::INFINITY, 0.0f64), |(l, h), x| (l.min(*x), h.max(*x))))
+            .collect();
+        let edges = u
+            .iter()
+            .map(|u| {
+                let before = std::iter::once(&0.0).chain(u);
+                u.iter().zip(before).enumerate().filter(|(_, (now, before))| now != before).map(|(k, _)| k).collect()
+            })
+            .collect();
+        Self { u, y, base_delay, base_range, edges, binary }
     }
 
     /// d_k = u_{k−h_k} for one input, at k = 0 … N−2 of each record. `tick` is h
     /// in samples, or f in steps of [`FACTOR_STEP`].
     pub(crate) fn arrived(&self, tick: i64) -> Weights {
         let factor = factor(tick);
-        let samples = self.u.iter().enumerate().map(|(r, u)| {
-            let rows = u.len().saturating_sub(1);
-            let at = |k: usize| -> f64 {
-                let delay = match self.base_delay.get(r).and_then(|d| d.get(k)) {
-                    Some(base) => delay_samples(factor, *base),
-                    None => tick.max(0) as usize,
-                };
-                k.checked_sub(delay).and_then(|i| u.get(i)).copied().unwrap_or(0.0)
-            };
-            (0..rows).map(at).collect::<Vec<f64>>()
-        });
+        let delay = |record: usize, k: usize| match self.base_delay.get(record).and_then(|d| d.get(k)) {
+            Some(base) => delay_samples(factor, *base),
+            None => tick.max(0) as usize,
+        };
         if !self.binary {
-            return Weights::Samples(samples.collect());
+            let arrived = |(record, u): (usize, &Vec<f64>)| -> Vec<f64> {
+                (0..u.len().saturating_sub(1))
+                    .map(|k| k.checked_sub(delay(record, k)).and_then(|i| u.get(i)).copied().unwrap_or(0.0))
+                    .collect()
+            };
+            return Weights::Samples(self.u.iter().enumerate().map(arrived).collect());
         }
-        Weights::Intervals(
-            samples
-                .map(|d| {
-                    let mut intervals = Vec::new();
-                    let mut start = None;
-                    for (k, on) in d.iter().map(|d| *d != 0.0).chain([false]).enumerate() {
-                        match (on, start) {
-                            (true, None) => start = Some(k),
-                            (false, Some(s)) => {
-                                intervals.push((s, k));
-                                start = None;
-                            }
-                            _ => {}
+        let arrived = |(record, u): (usize, &Vec<f64>)| {
+            let rows = u.len().saturating_sub(1);
+            let (shortest, longest) = match self.base_range.get(record) {
+                Some((low, high)) => (delay_samples(factor, *low), delay_samples(factor, *high)),
+                None => (delay(record, 0), delay(record, 0)),
+            };
+            // An edge of u can arrive only this much later: elsewhere nothing changes.
+            let mut intervals = Vec::new();
+            let mut on_since = None;
+            let mut next = 0;
+            for edge in self.edges.get(record).into_iter().flatten() {
+                for k in next.max(edge + shortest)..(edge + longest + 1).min(rows) {
+                    let on = k >= delay(record, k) && u[k - delay(record, k)] != 0.0;
+                    match (on, on_since) {
+                        (true, None) => on_since = Some(k),
+                        (false, Some(start)) => {
+                            intervals.push((start, k));
+                            on_since = None;
                         }
+                        _ => {}
                     }
-                    intervals
-                })
-                .collect(),
-        )
+                    next = k + 1;
+                }
+            }
+            intervals.extend(on_since.map(|start| (start, rows)));
+            intervals
+        };
+        Weights::Intervals(self.u.iter().enumerate().map(arrived).collect())
     }
 
     /// Ticks of an input delay that move it by one sample.

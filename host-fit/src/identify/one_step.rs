@@ -60,9 +60,22 @@ impl Problem for OneStep {
 
 /// Brings a candidate to where no single exchange of a lag and no other delay
 /// of one input lowers the one-step residual. Returns the squared norm.
-pub(crate) fn settle(regression: &mut Regression, delays: &mut Delays, screened: &mut usize) -> f64 {
-    let inputs = regression.layout.input_bounds();
+///
+/// `reach` limits how far input delays may move from where they are, in samples.
+pub(crate) fn settle(
+    regression: &mut Regression,
+    delays: &mut Delays,
+    reach: Option<f64>,
+    screened: &mut usize,
+) -> f64 {
     loop {
+        let reach = reach.map_or(i64::MAX / 4, |r| (r * regression.signals.ticks_per_sample()) as i64);
+        let bounds = regression.layout.input_bounds();
+        let inputs: Vec<(i64, i64)> = bounds
+            .iter()
+            .zip(&delays.ticks)
+            .map(|((low, high), tick)| ((*low).max(tick - reach), (*high).min(tick + reach)))
+            .collect();
         regression.tabulate(&delays.ticks);
         let mut exchange = Exchange::new(regression, &delays.ticks);
         let residual = exchange.descend(delays);
@@ -103,7 +116,7 @@ impl SearchStep<OneStep> for ExchangeStep {
         }
         let regression = evaluator.problem_mut().regression_mut();
         let mut delays = regression.layout.delays(around.point);
-        settle(regression, &mut delays, &mut self.screened);
+        settle(regression, &mut delays, None, &mut self.screened);
         let point = regression.layout.point(&delays);
         self.settled_at = Some(point.clone());
         evaluator.first_better(&[point], around.value)
@@ -146,6 +159,9 @@ impl SearchStep<OneStep> for PairStep {
     }
 }
 
+/// How far input delays are searched after a kick, samples.
+const KICK_REACH: f64 = 12.0;
+
 /// Search step: from a local optimum, replaces a few lags at random, settles
 /// again, and gives up after `patience` fruitless kicks.
 pub(crate) struct KickStep {
@@ -177,7 +193,7 @@ impl SearchStep<OneStep> for KickStep {
         let mut delays = regression.layout.delays(around.point);
         let strength = 2 + self.fruitless % 5;
         kick(regression, &mut delays, strength, around.rng);
-        settle(regression, &mut delays, &mut self.screened);
+        settle(regression, &mut delays, Some(KICK_REACH), &mut self.screened);
         let point = regression.layout.point(&delays);
         let success = evaluator.first_better(&[point], around.value)?;
         if success.is_some() {

@@ -96,13 +96,15 @@ pub(crate) struct Signals {
     /// Output: y, or its average for an averaged model.
     pub(crate) y: Vec<Vec<f64>>,
     /// h̃_k from the measured output, samples; empty for fixed delays.
-    base_delay: Vec<Vec<f64>>,
+    pub(crate) base_delay: Vec<Vec<f64>>,
     /// Its smallest and largest value.
     base_range: Vec<(f64, f64)>,
     /// Where the input changes.
     edges: Vec<Vec<usize>>,
     /// Whether every input is 0 or 1.
     binary: bool,
+    /// Rows at the start of each record that are not fitted.
+    pub(crate) skipped: usize,
 }
 
 impl Signals {
@@ -136,7 +138,7 @@ impl Signals {
                 u.iter().zip(before).enumerate().filter(|(_, (now, before))| now != before).map(|(k, _)| k).collect()
             })
             .collect();
-        Self { u, y, base_delay, base_range, edges, binary }
+        Self { u, y, base_delay, base_range, edges, binary, skipped: structure.skipped() }
     }
 
     /// d_k = u_{k−h_k} for one input, at k = 0 … N−2 of each record. `tick` is h
@@ -150,7 +152,10 @@ impl Signals {
         if !self.binary {
             let arrived = |(record, u): (usize, &Vec<f64>)| -> Vec<f64> {
                 (0..u.len().saturating_sub(1))
-                    .map(|k| k.checked_sub(delay(record, k)).and_then(|i| u.get(i)).copied().unwrap_or(0.0))
+                    .map(|k| match k.checked_sub(delay(record, k)) {
+                        Some(i) if k >= self.skipped => u.get(i).copied().unwrap_or(0.0),
+                        _ => 0.0,
+                    })
                     .collect()
             };
             return Weights::Samples(self.u.iter().enumerate().map(arrived).collect());
@@ -180,7 +185,7 @@ impl Signals {
                 }
             }
             intervals.extend(on_since.map(|start| (start, rows)));
-            intervals
+            intersection(&intervals, &[(self.skipped, rows)])
         };
         Weights::Intervals(self.u.iter().enumerate().map(arrived).collect())
     }
@@ -193,7 +198,7 @@ impl Signals {
 
     /// Weight 1 at every row of the regression.
     pub(crate) fn everywhere(&self) -> Weights {
-        Weights::Intervals(self.y.iter().map(|y| vec![(0, y.len().saturating_sub(1))]).collect())
+        Weights::Intervals(self.y.iter().map(|y| intersection(&[(0, y.len().saturating_sub(1))], &[(self.skipped, usize::MAX)])).collect())
     }
 }
 

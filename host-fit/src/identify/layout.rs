@@ -46,15 +46,12 @@ impl Layout {
         variables.extend(
             (1..=structure.product_lags).map(|j| Variable::integer(format!("product lag {j}"), 1, longest)),
         );
-        let (given, input) = match &structure.delay {
-            InputDelay::Fixed { delays } => (
-                delays.as_ref().map(|h| h.iter().map(|h| i64::from(*h)).collect::<Vec<_>>()),
-                Variable::integer("", 0, longest),
-            ),
-            InputDelay::StateDependent { law, factors } => (
-                factors.as_ref().map(|f| f.iter().map(|f| (f / FACTOR_STEP).round() as i64).collect()),
-                Variable::granular("", 0.0, longest as f64 / law.longest().max(1.0), FACTOR_STEP),
-            ),
+        let given = structure.given_ticks();
+        let input = match &structure.delay {
+            InputDelay::Fixed { .. } => Variable::integer("", 0, longest),
+            InputDelay::StateDependent { law, .. } => {
+                Variable::granular("", 0.0, longest as f64 / law.longest().max(1.0), FACTOR_STEP)
+            }
         };
         if given.is_none() {
             variables.extend((1..=structure.inputs).map(|l| Variable {

@@ -2,6 +2,9 @@
 
 use model_core::recursion::LagConvention;
 
+use super::arrival::FACTOR_STEP;
+use crate::model::Start;
+
 /// Samples W of the averages, eqs. (1), (12) and (13).
 pub const WINDOW: u32 = 250;
 
@@ -63,6 +66,9 @@ pub struct Structure {
     pub averaged: bool,
     /// Whether the recursion has a constant term.
     pub constant: bool,
+    /// How records begin. With [`Start::Measured`] the rows whose past is not
+    /// recorded are left out.
+    pub start: Start,
 }
 
 impl Default for Structure {
@@ -77,6 +83,37 @@ impl Default for Structure {
             delay: InputDelay::StateDependent { law: DelayLaw::PAPER, factors: Some(vec![1.0]) },
             averaged: false,
             constant: false,
+            start: Start::Rest,
+        }
+    }
+}
+
+impl Structure {
+    /// Rows at a record's start that have no recorded past.
+    pub(crate) fn skipped(&self) -> usize {
+        let longest_delay = match &self.delay {
+            InputDelay::Fixed { delays: Some(h) } => h.iter().copied().max().unwrap_or(0) as usize,
+            InputDelay::StateDependent { law, factors: Some(f) } => {
+                let factor = f.iter().fold(0.0f64, |m, f| m.max(*f));
+                (factor * law.longest()).ceil() as usize
+            }
+            _ => usize::from(self.longest_lag),
+        };
+        match self.start {
+            Start::Rest => 0,
+            Start::Measured => longest_delay.max(self.longest_lag.into()) + 1,
+        }
+    }
+
+    /// Ticks for given input delays.
+    pub(crate) fn given_ticks(&self) -> Option<Vec<i64>> {
+        match &self.delay {
+            InputDelay::Fixed { delays } => {
+                delays.as_ref().map(|h| h.iter().map(|h| i64::from(*h)).collect())
+            }
+            InputDelay::StateDependent { factors, .. } => {
+                factors.as_ref().map(|f| f.iter().map(|f| (f / FACTOR_STEP).round() as i64).collect())
+            }
         }
     }
 }

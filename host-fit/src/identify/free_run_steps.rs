@@ -1,0 +1,194 @@
+//! Search steps for the free-run objective.
+
+use super::exchange::{Exchange, List, Slot, set};
+use super::free_run::FreeRun;
+use super::layout::Delays;
+use super::linearised::Linearised;
+use super::one_step::kick;
+use crate::search::{Around, Evaluator, Point, SearchStep, StopReason, Success};
+
+/// Exchanges of one slot that are simulated first: the deepest minima of the
+/// prediction over the lag.
+const MINIMA: usize = 7;
+
+/// Then these far around the best of them.
+const AROUND: [i32; 6] = [-1, 1, -2, 2, -4, 4];
+
+/// Search step: exchanges lags where the linearised free run predicts the best.
+#[derive(Default)]
+pub(crate) struct PredictedStep {
+    settled_at: Option<Point>,
+    screened: usize,
+}
+
+/// Sweeps over all slots from a candidate until a sweep gains little, or until
+/// `hopeless` says that it is not worth going on.
+fn descend(
+    evaluator: &mut Evaluator<'_, FreeRun>,
+    mut best: Success,
+    screened: &mut usize,
+    hopeless: impl Fn(usize, f64) -> bool,
+) -> Result<Success, StopReason> {
+    for sweep in 1.. {
+        let before = best.value;
+        let delays = evaluator.problem().regression.layout.delays(&best.point);
+        evaluator.problem_mut().regression.tabulate(&delays.ticks);
+        let Some(linearised) = evaluator.problem().linearise(&delays) else { return Ok(best) };
+        let slots = Exchange::new(&evaluator.problem().regression, &delays.ticks).slots(&delays);
+        for slot in slots {
+            let delays = evaluator.problem().regression.layout.delays(&best.point);
+            let minima = predicted_minima(evaluator.problem(), &linearised, &delays, slot);
+            *screened += usize::from(evaluator.problem().regression.layout.longest_lag);
+            let trials: Vec<Point> =
+                minima.iter().map(|lag| with_lag(evaluator.problem(), &delays, slot, *lag)).collect();
+            let found = best_of(evaluator, &trials, &mut best)?;
+            // Walk on from the best lag of the slot, whether it is new or not.
+            let mut lag = match found {
+                Some(at) => minima[at],
+                None => lag_in(&delays, slot),
+            };
+            loop {
+                let near: Vec<u16> = AROUND
+                    .iter()
+                    .map(|d| i32::from(lag) + d)
+                    .filter(|l| *l >= 1 && *l <= i32::from(evaluator.problem().regression.layout.longest_lag))
+                    .map(|l| l as u16)
+                    .collect();
+                let trials: Vec<Point> =
+                    near.iter().map(|lag| with_lag(evaluator.problem(), &delays, slot, *lag)).collect();
+                match best_of(evaluator, &trials, &mut best)? {
+                    Some(at) => lag = near[at],
+                    None => break,
+                }
+            }
+        }
+        if best.value >= before * (1.0 - SMALL_GAIN) || hopeless(sweep, best.value) {
+            break;
+        }
+    }
+    Ok(best)
+}
+
+/// A sweep that gains less than this share ends a descent.
+const SMALL_GAIN: f64 = 2e-4;
+
+/// Evaluates all points and keeps the best; gives the place of a better one.
+fn best_of(
+    evaluator: &mut Evaluator<'_, FreeRun>,
+    points: &[Point],
+    best: &mut Success,
+) -> Result<Option<usize>, StopReason> {
+    let mut found = None;
+    let mut from = 0;
+    while let Some(better) = evaluator.first_better(points.get(from..).unwrap_or_default(), best.value)? {
+        let at = points.iter().skip(from).position(|p| *p == better.point).map_or(points.len(), |i| from + i);
+        found = Some(at);
+        from = at + 1;
+        *best = better;
+    }
+    Ok(found)
+}
+
+fn with_lag(problem: &FreeRun, delays: &Delays, slot: Slot, lag: u16) -> Point {
+    let mut trial = delays.clone();
+    set(&mut trial, slot, lag);
+    problem.regression.layout.point(&trial)
+}
+
+fn lag_in(delays: &Delays, slot: Slot) -> u16 {
+    let list = match slot.list {
+        List::State => &delays.state,
+        List::Product => &delays.product,
+    };
+    list.get(slot.index).copied().unwrap_or(1)
+}
+
+/// The deepest minima of the predicted ε over the lag in a slot.
+fn predicted_minima(problem: &FreeRun, linearised: &Linearised, delays: &Delays, slot: Slot) -> Vec<u16> {
+    let layout = &problem.regression.layout;
+    let mut trial = delays.clone();
+    let predicted: Vec<f64> = (1..=layout.longest_lag)
+        .map(|lag| {
+            set(&mut trial, slot, lag);
+            linearised.predict(&problem.regression, &trial)
+        })
+        .collect();
+    let at = |i: usize| predicted.get(i).copied().unwrap_or(f64::INFINITY);
+    // Even and odd lags can form two curves: compare with the second neighbours too.
+    let mut minima: Vec<(f64, u16)> = (0..predicted.len())
+        .filter(|&i| {
+            [i.wrapping_sub(1), i + 1, i.wrapping_sub(2), i + 2].iter().all(|j| at(i) <= at(*j))
+        })
+        .map(|i| (at(i), i as u16 + 1))
+        .collect();
+    minima.sort_by(|a, b| a.0.total_cmp(&b.0));
+    minima.into_iter().take(MINIMA).map(|(_, lag)| lag).collect()
+}
+
+impl SearchStep<FreeRun> for PredictedStep {
+    fn search(
+        &mut self,
+        evaluator: &mut Evaluator<'_, FreeRun>,
+        around: &mut Around<'_>,
+    ) -> Result<Option<Success>, StopReason> {
+        if self.settled_at.as_deref() == Some(around.point) {
+            return Ok(None);
+        }
+        let start = Success { point: around.point.to_vec(), value: around.value };
+        let best = descend(evaluator, start, &mut self.screened, |_, _| false)?;
+        self.settled_at = Some(best.point.clone());
+        Ok((best.value < around.value).then_some(best))
+    }
+
+    fn screened(&self) -> usize {
+        self.screened
+    }
+}
+
+/// Search step: kicks and descends again.
+pub(crate) struct FreeKickStep {
+    patience: usize,
+    fruitless: usize,
+    screened: usize,
+}
+
+impl FreeKickStep {
+    pub(crate) fn new(patience: usize) -> Self {
+        Self { patience, fruitless: 0, screened: 0 }
+    }
+}
+
+impl SearchStep<FreeRun> for FreeKickStep {
+    fn search(
+        &mut self,
+        evaluator: &mut Evaluator<'_, FreeRun>,
+        around: &mut Around<'_>,
+    ) -> Result<Option<Success>, StopReason> {
+        if !around.locally_optimal || self.fruitless >= self.patience {
+            return Ok(None);
+        }
+        self.fruitless += 1;
+        let regression = &evaluator.problem().regression;
+        let mut delays = regression.layout.delays(around.point);
+        kick(regression, &mut delays, 2 + self.fruitless % 3, around.rng);
+        let point = regression.layout.point(&delays);
+        let value = evaluator.value(&point)?;
+        let end = descend(evaluator, Success { point, value }, &mut self.screened, |sweep, value| {
+            sweep >= 2 && value > around.value * (1.0 + 0.15 / sweep as f64)
+        })?;
+        if std::env::var("TRACE").is_ok() { println!("   kick {value:.4} -> {:.5} (best {:.5}) evals {}", end.value, around.value, evaluator.evaluations()); }
+        if end.value < around.value {
+            self.fruitless = 0;
+            return Ok(Some(end));
+        }
+        Ok(None)
+    }
+
+    fn has_given_up(&self) -> bool {
+        self.fruitless >= self.patience
+    }
+
+    fn screened(&self) -> usize {
+        self.screened
+    }
+}

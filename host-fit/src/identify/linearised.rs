@@ -1,0 +1,213 @@
+//! What the free run of a changed model would come to, without running it.
+//!
+//! Around an incumbent with coefficients θ the simulated output moves, to first
+//! order, by Σ_i Δθ_i s_i, where the sensitivity s_i is the incumbent's own
+//! recursion driven by regressor i taken at the simulated output (the exact
+//! Gauss–Newton direction). This holds for lags that the incumbent does not use
+//! as well: their θ is 0. With the products of all sensitivities in one table,
+//! ε of any exchange of lags is predicted by a quadratic form in the
+//! least-squares coefficients of the candidate, in microseconds.
+
+use super::arrival::Signals;
+use super::free_run::Coefficients;
+use super::lagged_products::ONE;
+use super::layout::{Column, Delays, Layout};
+use super::regression::Regression;
+use crate::linalg;
+
+/// One sample in so many enters the products. Odd, so that patterns of two
+/// samples are seen.
+const STRIDE: usize = 23;
+
+/// Sensitivities run side by side.
+const LANES: usize = 8;
+
+/// Sampled rows multiplied at a time.
+const BLOCK_ROWS: usize = 512;
+
+/// A simulated candidate: output and arriving commands of each record.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Trajectory {
+    /// y_sim, as many values as samples.
+    pub(crate) simulated: Vec<Vec<f64>>,
+    /// d_k of each input.
+    pub(crate) arrived: Vec<Vec<Vec<f64>>>,
+}
+
+/// One record of the run that is linearised.
+struct Run<'a> {
+    padded: &'a [f32],
+    arrived: &'a [Vec<f32>],
+    state: &'a [(usize, f32)],
+    product: &'a [Vec<(usize, f32)>],
+    rows: &'a [usize],
+}
+
+/// The free run linearised at an incumbent.
+#[derive(Debug)]
+pub(crate) struct Linearised {
+    size: usize,
+    /// Products of the sensitivities and, last, of the incumbent's error.
+    products: Vec<f64>,
+    incumbent: Vec<(usize, f64)>,
+    lags: usize,
+    first_element: usize,
+    inputs: usize,
+}
+
+impl Linearised {
+    /// Linearises at `delays` and the solution of their regression, given their run.
+    pub(crate) fn new(
+        signals: &Signals,
+        layout: &Layout,
+        delays: &Delays,
+        solution: &[f64],
+        trajectory: &Trajectory,
+    ) -> Self {
+        let lags = usize::from(layout.longest_lag);
+        let inputs = delays.ticks.len();
+        let size = (1 + inputs) * (1 + lags) + 1;
+        let mut linearised = Self {
+            size,
+            products: vec![0.0; size * size],
+            incumbent: Vec::new(),
+            lags,
+            first_element: layout.element(1),
+            inputs,
+        };
+        let columns = layout.columns(delays);
+        linearised.incumbent =
+            columns.iter().zip(solution).map(|(column, theta)| (linearised.index(column), *theta)).collect();
+        let coefficients = Coefficients::new(solution, delays);
+        let behind = |lag: &u16| layout.element(*lag) - 2;
+        // Single precision is enough to rank candidates and runs twice as fast.
+        let state: Vec<(usize, f32)> =
+            delays.state.iter().map(behind).zip(coefficients.a.iter().map(|a| *a as f32)).collect();
+        let product: Vec<Vec<(usize, f32)>> = (0..inputs)
+            .map(|l| {
+                let c = coefficients.c.iter().skip(l * delays.product.len());
+                delays.product.iter().map(behind).zip(c.map(|c| *c as f32)).collect()
+            })
+            .collect();
+        for (record, measured) in signals.y.iter().enumerate() {
+            let simulated = &trajectory.simulated[record];
+            let arrived: Vec<Vec<f32>> = trajectory.arrived[record]
+                .iter()
+                .map(|d| d.iter().map(|d| *d as f32).collect())
+                .collect();
+            let rows: Vec<usize> = (signals.skipped..measured.len()).step_by(STRIDE).collect();
+            let mut sampled = vec![0.0; rows.len() * size];
+            // Zeros before the record and room for lanes beyond the longest lag.
+            let mut padded = vec![0.0f32; lags + 1 + LANES];
+            padded.extend(simulated.iter().map(|y| *y as f32));
+            padded.push(0.0);
+            let run = Run { padded: &padded, arrived: &arrived, state: &state, product: &product, rows: &rows };
+            for block in 0..=inputs {
+                for first in (0..=lags).step_by(LANES) {
+                    linearised.filter(&run, block, first, &mut sampled);
+                }
+            }
+            let error = &mut sampled[(size - 1) * rows.len()..];
+            for (e, k) in error.iter_mut().zip(&rows) {
+                *e = measured[*k] - simulated[*k];
+            }
+            linearised.add_products(&sampled, rows.len());
+        }
+        linearised
+    }
+
+    /// Place of a regressor's sensitivity.
+    fn index(&self, column: &Column) -> usize {
+        let within = if column.element == ONE { 0 } else { column.element + 1 - self.first_element };
+        column.input * (1 + self.lags) + within
+    }
+
+    /// Runs the incumbent's recursion on `LANES` regressors from lag `first` of
+    /// a block on and samples the result. Block 0 are the outputs alone, block
+    /// l the outputs times the command that arrives through input l.
+    fn filter(&self, run: &Run<'_>, block: usize, first: usize, sampled: &mut [f64]) {
+        let Run { padded, arrived, state, product, rows } = run;
+        let reach = self.lags + 1;
+        let samples = padded.len() - reach - LANES - 1;
+        let mut s = vec![[0.0f32; LANES]; reach + 1];
+        s.reserve(samples);
+        let ones = vec![1.0f32; samples];
+        let gate = block.checked_sub(1).and_then(|l| arrived.get(l)).unwrap_or(&ones);
+        // Lane 0 is the constant 1 if it starts the block, then lags ascend.
+        let mut rows = rows.iter().enumerate().peekable();
+        let count = rows.len();
+        for k in 0..samples {
+            if let Some((at, _)) = rows.next_if(|(_, row)| **row == k) {
+                for (i, value) in s[reach + k].iter().enumerate().take(1 + self.lags - first) {
+                    sampled[(block * (1 + self.lags) + first + i) * count + at] = f64::from(*value);
+                }
+            }
+            let mut next = [0.0f32; LANES];
+            let gate = gate[k];
+            if gate != 0.0 {
+                // The newest output that a lane reads is the last of these.
+                let newest = LANES + reach + k + 4 - first - self.first_element;
+                let past = &padded[newest - LANES..newest];
+                next.iter_mut().zip(past.iter().rev()).for_each(|(n, y)| *n = gate * y);
+                if first == 0 {
+                    next[0] = gate;
+                }
+            }
+            for &(m, a) in state.iter() {
+                let past = &s[reach + k - m];
+                next.iter_mut().zip(past).for_each(|(n, p)| *n += a * p);
+            }
+            for (terms, d) in product.iter().zip(arrived.iter()) {
+                let d = d[k];
+                if d != 0.0 {
+                    for &(m, c) in terms {
+                        let (past, gain) = (&s[reach + k - m], c * d);
+                        next.iter_mut().zip(past).for_each(|(n, p)| *n += gain * p);
+                    }
+                }
+            }
+            s.push(next);
+        }
+    }
+
+    fn add_products(&mut self, sampled: &[f64], rows: usize) {
+        for start in (0..rows).step_by(BLOCK_ROWS) {
+            let count = BLOCK_ROWS.min(rows - start);
+            let block: Vec<f64> = (0..self.size)
+                .flat_map(|column| sampled[column * rows + start..][..count].iter().copied())
+                .collect();
+            linalg::add_cross_products(&mut self.products, &block, &block, count, self.size);
+        }
+    }
+
+    /// Predicted ε² of a candidate with the incumbent's input delays.
+    pub(crate) fn predict(&self, regression: &Regression, delays: &Delays) -> f64 {
+        let (solution, _) = regression.normal(delays).solve();
+        let mut change: Vec<(usize, f64)> = Vec::with_capacity(2 * solution.len() + 1);
+        for (column, theta) in regression.layout.columns(delays).iter().zip(&solution) {
+            change.push((self.index(column), -theta));
+        }
+        for (index, theta) in &self.incumbent {
+            match change.iter_mut().find(|(i, _)| i == index) {
+                Some((_, delta)) => *delta += theta,
+                None => change.push((*index, *theta)),
+            }
+        }
+        change.push((self.size - 1, 1.0));
+        let mut sum = 0.0;
+        for (n, (i, x)) in change.iter().enumerate() {
+            let row = &self.products[i * self.size..(i + 1) * self.size];
+            let mut part = 0.5 * row[*i] * x;
+            for (j, y) in &change[..n] {
+                part += row[*j] * y;
+            }
+            sum += 2.0 * x * part;
+        }
+        sum * STRIDE as f64
+    }
+
+    /// Number of inputs at the linearisation.
+    pub(crate) fn inputs(&self) -> usize {
+        self.inputs
+    }
+}

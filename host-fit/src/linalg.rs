@@ -9,7 +9,9 @@ const RANK_TOLERANCE: f64 = 1e-12;
 
 /// A decomposition that did not converge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("a matrix decomposition did not converge: look for values of very different size in the data")]
+#[error(
+    "a matrix decomposition did not converge: look for values of very different size in the data"
+)]
 pub struct NotConverged;
 
 /// Minimum-norm least-squares solution x = A⁺y, eq. (8).
@@ -21,7 +23,11 @@ pub struct NotConverged;
 /// [`NotConverged`] when the singular value decomposition fails.
 pub(crate) fn least_squares(columns: &[Vec<f64>], rhs: &[f64]) -> Result<Vec<f64>, NotConverged> {
     let matrix = Mat::from_fn(rhs.len(), columns.len(), |i, j| {
-        columns.get(j).and_then(|c| c.get(i)).copied().unwrap_or(0.0)
+        columns
+            .get(j)
+            .and_then(|c| c.get(i))
+            .copied()
+            .unwrap_or(0.0)
     });
     if columns.is_empty() || rhs.is_empty() {
         return Ok(vec![0.0; columns.len()]);
@@ -32,7 +38,11 @@ pub(crate) fn least_squares(columns: &[Vec<f64>], rhs: &[f64]) -> Result<Vec<f64
     let right = MatRef::from_column_major_slice(rhs, rhs.len(), 1);
     let mut scaled = svd.U().transpose() * right;
     for (i, value) in values.iter().enumerate() {
-        scaled[(i, 0)] = if *value > floor { scaled[(i, 0)] / value } else { 0.0 };
+        scaled[(i, 0)] = if *value > floor {
+            scaled[(i, 0)] / value
+        } else {
+            0.0
+        };
     }
     let solution = svd.V() * scaled;
     Ok((0..columns.len()).map(|i| solution[(i, 0)]).collect())
@@ -99,7 +109,11 @@ mod tests {
     fn least_squares_of_a_line() {
         let t: Vec<f64> = (0..50).map(f64::from).collect();
         let y: Vec<f64> = t.iter().map(|t| 3.0 - 0.5 * t).collect();
-        close(&least_squares(&[vec![1.0; 50], t], &y).expect("converges"), &[3.0, -0.5], 1e-12);
+        close(
+            &least_squares(&[vec![1.0; 50], t], &y).expect("converges"),
+            &[3.0, -0.5],
+            1e-12,
+        );
     }
 
     #[test]
@@ -122,10 +136,18 @@ mod tests {
     fn poles_of_known_recursions() {
         close(&pole_magnitudes(&[0.9]).expect("converges"), &[0.9], 1e-12);
         // (z − 0.5)(z + 0.8) z
-        close(&pole_magnitudes(&[-0.3, 0.4, 0.0]).expect("converges"), &[0.8, 0.5], 1e-12);
+        close(
+            &pole_magnitudes(&[-0.3, 0.4, 0.0]).expect("converges"),
+            &[0.8, 0.5],
+            1e-12,
+        );
         let mut circle = vec![0.0; 10];
         circle[9] = 0.5;
-        close(&pole_magnitudes(&circle).expect("converges"), &[0.5f64.powf(0.1); 10], 1e-12);
+        close(
+            &pole_magnitudes(&circle).expect("converges"),
+            &[0.5f64.powf(0.1); 10],
+            1e-12,
+        );
         assert!(pole_magnitudes(&[0.0]).expect("converges").is_empty());
     }
 }

@@ -31,23 +31,24 @@ impl Weights {
                     .map(|(a, b)| a.iter().zip(b).map(|(x, y)| x * y).collect())
                     .collect(),
             ),
-            (Self::Intervals(on), Self::Samples(values)) | (Self::Samples(values), Self::Intervals(on)) => {
-                Self::Samples(
-                    values
-                        .iter()
-                        .zip(on)
-                        .map(|(values, on)| {
-                            let mut masked = vec![0.0; values.len()];
-                            for &(start, end) in on {
-                                if let (Some(to), Some(from)) = (masked.get_mut(start..end), values.get(start..end)) {
-                                    to.copy_from_slice(from);
-                                }
+            (Self::Intervals(on), Self::Samples(values))
+            | (Self::Samples(values), Self::Intervals(on)) => Self::Samples(
+                values
+                    .iter()
+                    .zip(on)
+                    .map(|(values, on)| {
+                        let mut masked = vec![0.0; values.len()];
+                        for &(start, end) in on {
+                            if let (Some(to), Some(from)) =
+                                (masked.get_mut(start..end), values.get(start..end))
+                            {
+                                to.copy_from_slice(from);
                             }
-                            masked
-                        })
-                        .collect(),
-                )
-            }
+                        }
+                        masked
+                    })
+                    .collect(),
+            ),
         }
     }
 
@@ -70,7 +71,10 @@ fn intersection(a: &[(usize, usize)], b: &[(usize, usize)]) -> Vec<(usize, usize
 }
 
 /// Where two binary sequences differ: start, end and the sign of `to − from`.
-pub(crate) fn difference(from: &[(usize, usize)], to: &[(usize, usize)]) -> Vec<(usize, usize, f64)> {
+pub(crate) fn difference(
+    from: &[(usize, usize)],
+    to: &[(usize, usize)],
+) -> Vec<(usize, usize, f64)> {
     let mut edges: Vec<(usize, i32, i32)> = Vec::with_capacity(2 * (from.len() + to.len()));
     edges.extend(from.iter().flat_map(|&(s, e)| [(s, 1, 0), (e, -1, 0)]));
     edges.extend(to.iter().flat_map(|&(s, e)| [(s, 0, 1), (e, 0, -1)]));
@@ -111,7 +115,11 @@ impl Signals {
     /// Prepares the records for a structure.
     pub(crate) fn new(records: &[Series<'_>], structure: &Structure) -> Self {
         let pick = |signal: &[f64]| {
-            if structure.averaged { moving_average(signal) } else { signal.to_vec() }
+            if structure.averaged {
+                moving_average(signal)
+            } else {
+                signal.to_vec()
+            }
         };
         let u: Vec<Vec<f64>> = records.iter().map(|r| pick(r.u)).collect();
         let y: Vec<Vec<f64>> = records.iter().map(|r| pick(r.y)).collect();
@@ -121,7 +129,11 @@ impl Signals {
                 .iter()
                 .map(|y| {
                     let law = core_law(law, 1.0);
-                    let follows = if structure.averaged { y.clone() } else { averaged_past(y) };
+                    let follows = if structure.averaged {
+                        y.clone()
+                    } else {
+                        averaged_past(y)
+                    };
                     follows.iter().map(|f| law.evaluate(f.max(0.0))).collect()
                 })
                 .collect(),
@@ -129,26 +141,43 @@ impl Signals {
         let binary = u.iter().flatten().all(|u| *u == 0.0 || *u == 1.0);
         let base_range = base_delay
             .iter()
-            .map(|d: &Vec<f64>| d.iter().fold((f64::INFINITY, 0.0f64), |(l, h), x| (l.min(*x), h.max(*x))))
+            .map(|d: &Vec<f64>| {
+                d.iter()
+                    .fold((f64::INFINITY, 0.0f64), |(l, h), x| (l.min(*x), h.max(*x)))
+            })
             .collect();
         let edges = u
             .iter()
             .map(|u| {
                 let before = std::iter::once(&0.0).chain(u);
-                u.iter().zip(before).enumerate().filter(|(_, (now, before))| now != before).map(|(k, _)| k).collect()
+                u.iter()
+                    .zip(before)
+                    .enumerate()
+                    .filter(|(_, (now, before))| now != before)
+                    .map(|(k, _)| k)
+                    .collect()
             })
             .collect();
-        Self { u, y, base_delay, base_range, edges, binary, skipped: structure.skipped() }
+        Self {
+            u,
+            y,
+            base_delay,
+            base_range,
+            edges,
+            binary,
+            skipped: structure.skipped(),
+        }
     }
 
     /// d_k = u_{k−h_k} for one input, at k = 0 … N−2 of each record. `tick` is h
     /// in samples, or f in steps of [`FACTOR_STEP`].
     pub(crate) fn arrived(&self, tick: i64) -> Weights {
         let factor = factor(tick);
-        let delay = |record: usize, k: usize| match self.base_delay.get(record).and_then(|d| d.get(k)) {
-            Some(base) => delay_samples(factor, *base),
-            None => tick.max(0) as usize,
-        };
+        let delay =
+            |record: usize, k: usize| match self.base_delay.get(record).and_then(|d| d.get(k)) {
+                Some(base) => delay_samples(factor, *base),
+                None => tick.max(0) as usize,
+            };
         if !self.binary {
             let arrived = |(record, u): (usize, &Vec<f64>)| -> Vec<f64> {
                 (0..u.len().saturating_sub(1))
@@ -192,13 +221,31 @@ impl Signals {
 
     /// Ticks of an input delay that move it by one sample.
     pub(crate) fn ticks_per_sample(&self) -> f64 {
-        let longest = self.base_delay.iter().flatten().fold(0.0f64, |m, d| m.max(*d));
-        if longest > 0.0 { 1.0 / (FACTOR_STEP * longest) } else { 1.0 }
+        let longest = self
+            .base_delay
+            .iter()
+            .flatten()
+            .fold(0.0f64, |m, d| m.max(*d));
+        if longest > 0.0 {
+            1.0 / (FACTOR_STEP * longest)
+        } else {
+            1.0
+        }
     }
 
     /// Weight 1 at every row of the regression.
     pub(crate) fn everywhere(&self) -> Weights {
-        Weights::Intervals(self.y.iter().map(|y| intersection(&[(0, y.len().saturating_sub(1))], &[(self.skipped, usize::MAX)])).collect())
+        Weights::Intervals(
+            self.y
+                .iter()
+                .map(|y| {
+                    intersection(
+                        &[(0, y.len().saturating_sub(1))],
+                        &[(self.skipped, usize::MAX)],
+                    )
+                })
+                .collect(),
+        )
     }
 }
 
@@ -209,11 +256,21 @@ pub(crate) fn factor(tick: i64) -> f64 {
 
 /// The law as the model's core runs it.
 pub(crate) fn core_law(law: &DelayLaw, factor: f64) -> StateDependentDelay<f64> {
-    StateDependentDelay { floor: law.floor, rise: law.rise, rate: law.rate, factors: [factor] }
+    StateDependentDelay {
+        floor: law.floor,
+        rise: law.rise,
+        rate: law.rate,
+        factors: [factor],
+    }
 }
 
 fn delay_samples(factor: f64, base: f64) -> usize {
-    let law = StateDependentDelay { floor: 0.0, rise: 0.0, rate: 0.0, factors: [factor] };
+    let law: StateDependentDelay<f64> = StateDependentDelay {
+        floor: 0.0,
+        rise: 0.0,
+        rate: 0.0,
+        factors: [factor],
+    };
     law.tap(0, base).whole
 }
 
@@ -225,7 +282,11 @@ pub(crate) fn averaged_past(y: &[f64]) -> Vec<f64> {
         .enumerate()
         .map(|(k, y_k)| {
             let average = sum.value() / f64::from(WINDOW);
-            let leaving = k.checked_sub(terms).and_then(|i| y.get(i)).copied().unwrap_or(0.0);
+            let leaving = k
+                .checked_sub(terms)
+                .and_then(|i| y.get(i))
+                .copied()
+                .unwrap_or(0.0);
             sum.slide(*y_k, leaving, WINDOW - 1);
             average
         })
@@ -238,7 +299,11 @@ pub(crate) fn moving_average(x: &[f64]) -> Vec<f64> {
     x.iter()
         .enumerate()
         .map(|(k, x_k)| {
-            let leaving = k.checked_sub(WINDOW as usize).and_then(|i| x.get(i)).copied().unwrap_or(0.0);
+            let leaving = k
+                .checked_sub(WINDOW as usize)
+                .and_then(|i| x.get(i))
+                .copied()
+                .unwrap_or(0.0);
             sum.slide(*x_k, leaving, WINDOW);
             sum.value() / f64::from(WINDOW)
         })
@@ -250,8 +315,12 @@ mod tests {
     use super::*;
 
     fn wave() -> (Vec<f64>, Vec<f64>) {
-        let u: Vec<f64> = (0..900).map(|k| f64::from(u8::from((k / 70) % 2 == 1))).collect();
-        let y = (0..900).map(|k| 0.5 + 0.6 * (k as f64 * 0.01).sin()).collect();
+        let u: Vec<f64> = (0..900)
+            .map(|k| f64::from(u8::from((k / 70) % 2 == 1)))
+            .collect();
+        let y = (0..900)
+            .map(|k| 0.5 + 0.6 * (k as f64 * 0.01).sin())
+            .collect();
         (u, y)
     }
 
@@ -271,25 +340,39 @@ mod tests {
     #[test]
     fn the_arriving_command_follows_the_definition() {
         let (u, y) = wave();
-        let law = DelayLaw { floor: 20.0, rise: 30.0, rate: 3.0 };
+        let law = DelayLaw {
+            floor: 20.0,
+            rise: 30.0,
+            rate: 3.0,
+        };
         let structure = Structure {
             delay: InputDelay::StateDependent { law, factors: None },
             ..Structure::default()
         };
         let signals = Signals::new(&[Series { u: &u, y: &y }], &structure);
-        let Weights::Intervals(on) = signals.arrived(12_500) else { panic!("u is on/off") };
+        let Weights::Intervals(on) = signals.arrived(12_500) else {
+            panic!("u is on/off")
+        };
         let follows = averaged_past(&y);
         for k in 0..899 {
-            let delay = (1.25 * (20.0 + 30.0 * (-3.0 * follows[k].max(0.0)).exp())).round() as usize;
+            let delay =
+                (1.25 * (20.0 + 30.0 * (-3.0 * follows[k].max(0.0)).exp())).round() as usize;
             let expected = k >= delay && u[k - delay] == 1.0;
-            assert_eq!(on[0].iter().any(|&(s, e)| (s..e).contains(&k)), expected, "{k}");
+            assert_eq!(
+                on[0].iter().any(|&(s, e)| (s..e).contains(&k)),
+                expected,
+                "{k}"
+            );
         }
     }
 
     #[test]
     fn differences_and_products_of_sequences() {
         let (a, b) = (vec![(2, 5), (8, 12)], vec![(3, 6), (8, 10), (11, 12)]);
-        assert_eq!(difference(&a, &b), [(2, 3, -1.0), (5, 6, 1.0), (10, 11, -1.0)]);
+        assert_eq!(
+            difference(&a, &b),
+            [(2, 3, -1.0), (5, 6, 1.0), (10, 11, -1.0)]
+        );
         assert_eq!(intersection(&a, &b), [(3, 5), (8, 10), (11, 12)]);
     }
 }

@@ -31,7 +31,11 @@ impl Cholesky {
                 }
             }
         }
-        Self { n, lower, inverse_diagonal }
+        Self {
+            n,
+            lower,
+            inverse_diagonal,
+        }
     }
 
     /// Entry (i, j) of the factor, j < i.
@@ -49,8 +53,8 @@ impl Cholesky {
         let mut w = rhs.to_vec();
         for i in 0..self.n {
             let mut sum = w[i];
-            for k in 0..i {
-                sum -= self.below(i, k) * w[k];
+            for (k, w) in w.iter().enumerate().take(i) {
+                sum -= self.below(i, k) * w;
             }
             w[i] = sum * self.inverse_diagonal[i];
         }
@@ -77,7 +81,9 @@ mod tests {
     fn solves_and_measures_what_is_explained() {
         let gram = [4.0, 2.0, 0.4, 2.0, 5.0, 1.0, 0.4, 1.0, 3.0];
         let x = [0.5, -1.0, 2.0];
-        let rhs: Vec<f64> = (0..3).map(|i| (0..3).map(|j| gram[i * 3 + j] * x[j]).sum()).collect();
+        let rhs: Vec<f64> = (0..3)
+            .map(|i| (0..3).map(|j| gram[i * 3 + j] * x[j]).sum())
+            .collect();
         let factor = Cholesky::new(&gram, 3);
         let w = factor.forward(&rhs);
         let explained: f64 = w.iter().map(|w| w * w).sum();
@@ -93,6 +99,9 @@ mod tests {
         let gram = [2.0, 2.0, 1.0, 2.0, 2.0, 1.0, 1.0, 1.0, 3.0];
         let factor = Cholesky::new(&gram, 3);
         let x = factor.backward(factor.forward(&[2.0, 2.0, 1.0]));
-        assert!((x[0] - 1.0).abs() < 1e-12 && x[1] == 0.0 && x[2].abs() < 1e-12, "{x:?}");
+        assert!(
+            (x[0] - 1.0).abs() < 1e-12 && x[1] == 0.0 && x[2].abs() < 1e-12,
+            "{x:?}"
+        );
     }
 }

@@ -51,7 +51,11 @@ pub(crate) struct Exchange<'a> {
 impl<'a> Exchange<'a> {
     /// The tables at `ticks` must have been built.
     pub(crate) fn new(regression: &'a Regression, ticks: &[i64]) -> Self {
-        Self { regression, ticks: ticks.to_vec(), screened: 0 }
+        Self {
+            regression,
+            ticks: ticks.to_vec(),
+            screened: 0,
+        }
     }
 
     /// Candidates judged so far.
@@ -90,7 +94,11 @@ impl<'a> Exchange<'a> {
 
     /// Replaces pairs of lags by the best pair until none helps or the number of
     /// sweeps is used up; single exchanges are included.
-    pub(crate) fn descend_in_pairs(&mut self, delays: &mut Delays, mut keep_going: impl FnMut() -> bool) -> f64 {
+    pub(crate) fn descend_in_pairs(
+        &mut self,
+        delays: &mut Delays,
+        mut keep_going: impl FnMut() -> bool,
+    ) -> f64 {
         let mut best = self.descend(delays);
         let slots = self.slots(delays);
         let pairs: Vec<(Slot, Slot)> = slots
@@ -119,9 +127,10 @@ impl<'a> Exchange<'a> {
     /// Fills lists shortened by repeated lags with lags not yet used.
     fn complete(&self, delays: &mut Delays) {
         let layout = &self.regression.layout;
-        for (list, count) in
-            [(&mut delays.state, layout.state_lags), (&mut delays.product, layout.product_lags)]
-        {
+        for (list, count) in [
+            (&mut delays.state, layout.state_lags),
+            (&mut delays.product, layout.product_lags),
+        ] {
             for lag in 1..=layout.longest_lag {
                 if list.len() >= count {
                     break;
@@ -135,8 +144,14 @@ impl<'a> Exchange<'a> {
     }
 
     pub(crate) fn slots(&self, delays: &Delays) -> Vec<Slot> {
-        let state = (0..delays.state.len()).map(|index| Slot { list: List::State, index });
-        let product = (0..delays.product.len()).map(|index| Slot { list: List::Product, index });
+        let state = (0..delays.state.len()).map(|index| Slot {
+            list: List::State,
+            index,
+        });
+        let product = (0..delays.product.len()).map(|index| Slot {
+            list: List::Product,
+            index,
+        });
         state.chain(product).collect()
     }
 
@@ -170,7 +185,12 @@ impl<'a> Exchange<'a> {
 
     /// The pair of lags that leaves the smallest residual in two slots, where a
     /// lag is one regressor (a single input).
-    pub(crate) fn best_pair(&mut self, delays: &Delays, first: Slot, second: Slot) -> Option<((u16, u16), f64)> {
+    pub(crate) fn best_pair(
+        &mut self,
+        delays: &Delays,
+        first: Slot,
+        second: Slot,
+    ) -> Option<((u16, u16), f64)> {
         let (one, two) = (self.inputs(first.list), self.inputs(second.list));
         if one.len() != 1 || two.len() != 1 {
             return None;
@@ -181,8 +201,10 @@ impl<'a> Exchange<'a> {
         let a = self.project(&kept, &factor, &w, &one)?;
         let b = self.project(&kept, &factor, &w, &two)?;
         let table = self.table(one[0], two[0])?;
-        let (used_one, used_two) =
-            (used(delays, first.list, &[first, second]), used(delays, second.list, &[first, second]));
+        let (used_one, used_two) = (
+            used(delays, first.list, &[first, second]),
+            used(delays, second.list, &[first, second]),
+        );
         let lags = usize::from(self.regression.layout.longest_lag);
         let same = first.list == second.list;
         let mut best: Option<((u16, u16), f64)> = None;
@@ -214,7 +236,11 @@ impl<'a> Exchange<'a> {
                 }
             }
         }
-        self.screened += if same { lags * (lags - 1) / 2 } else { lags * lags };
+        self.screened += if same {
+            lags * (lags - 1) / 2
+        } else {
+            lags * lags
+        };
         best
     }
 
@@ -226,7 +252,8 @@ impl<'a> Exchange<'a> {
     }
 
     fn table(&self, l: usize, m: usize) -> Option<&'a Table> {
-        self.regression.table(self.regression.which(l, m, &self.ticks))
+        self.regression
+            .table(self.regression.which(l, m, &self.ticks))
     }
 
     fn lag_range<'r>(&self, row: &'r [f64]) -> &'r [f64] {
@@ -241,25 +268,38 @@ impl<'a> Exchange<'a> {
         let mut kept: Vec<Column> = Vec::new();
         for (index, lag) in delays.state.iter().enumerate() {
             if keep(List::State, index) {
-                kept.push(Column { input: 0, element: layout.element(*lag) });
+                kept.push(Column {
+                    input: 0,
+                    element: layout.element(*lag),
+                });
             }
         }
         for input in 1..=self.ticks.len() {
-            kept.push(Column { input, element: ONE });
+            kept.push(Column {
+                input,
+                element: ONE,
+            });
             for (index, lag) in delays.product.iter().enumerate() {
                 if keep(List::Product, index) {
-                    kept.push(Column { input, element: layout.element(*lag) });
+                    kept.push(Column {
+                        input,
+                        element: layout.element(*lag),
+                    });
                 }
             }
         }
         if layout.constant {
-            kept.push(Column { input: 0, element: ONE });
+            kept.push(Column {
+                input: 0,
+                element: ONE,
+            });
         }
         kept
     }
 
     fn entry(&self, a: Column, b: Column) -> f64 {
-        self.table(a.input, b.input).map_or(0.0, |t| t.at(a.element, b.element))
+        self.table(a.input, b.input)
+            .map_or(0.0, |t| t.at(a.element, b.element))
     }
 
     fn factorise(&self, kept: &[Column]) -> (Cholesky, Vec<f64>) {
@@ -271,32 +311,53 @@ impl<'a> Exchange<'a> {
             }
         }
         let factor = Cholesky::new(&gram, n);
-        let target = Column { input: 0, element: TARGET };
+        let target = Column {
+            input: 0,
+            element: TARGET,
+        };
         let rhs: Vec<f64> = kept.iter().map(|c| self.entry(*c, target)).collect();
         let w = factor.forward(&rhs);
         (factor, w)
     }
 
     fn rest(&self, w: &[f64]) -> f64 {
-        let target = Column { input: 0, element: TARGET };
+        let target = Column {
+            input: 0,
+            element: TARGET,
+        };
         self.entry(target, target) - w.iter().map(|w| w * w).sum::<f64>()
     }
 
-    fn project(&self, kept: &[Column], factor: &Cholesky, w: &[f64], inputs: &[usize]) -> Option<Projected> {
+    fn project(
+        &self,
+        kept: &[Column],
+        factor: &Cholesky,
+        w: &[f64],
+        inputs: &[usize],
+    ) -> Option<Projected> {
         let lags = usize::from(self.regression.layout.longest_lag);
-        let mut projected = Projected { rows: Vec::new(), target: Vec::new(), left: vec![0.0; lags] };
+        let mut projected = Projected {
+            rows: Vec::new(),
+            target: Vec::new(),
+            left: vec![0.0; lags],
+        };
         for &input in inputs {
             let mut rows: Vec<Vec<f64>> = Vec::with_capacity(kept.len());
             let mut target = self.lag_range(self.table(input, 0)?.row(TARGET)).to_vec();
             for (i, column) in kept.iter().enumerate() {
-                let mut row = self.lag_range(self.table(input, column.input)?.row(column.element)).to_vec();
+                let mut row = self
+                    .lag_range(self.table(input, column.input)?.row(column.element))
+                    .to_vec();
                 for (j, before) in rows.iter().enumerate() {
                     let l = factor.below(i, j);
                     row.iter_mut().zip(before).for_each(|(x, b)| *x -= l * b);
                 }
                 let inverse = factor.inverse(i);
                 row.iter_mut().for_each(|x| *x *= inverse);
-                target.iter_mut().zip(&row).for_each(|(t, x)| *t -= w[i] * x);
+                target
+                    .iter_mut()
+                    .zip(&row)
+                    .for_each(|(t, x)| *t -= w[i] * x);
                 rows.push(row);
             }
             if inputs.len() == 1 {
@@ -307,7 +368,11 @@ impl<'a> Exchange<'a> {
                 }
                 let whole = projected.left.clone();
                 for row in &rows {
-                    projected.left.iter_mut().zip(row).for_each(|(l, x)| *l -= x * x);
+                    projected
+                        .left
+                        .iter_mut()
+                        .zip(row)
+                        .for_each(|(l, x)| *l -= x * x);
                 }
                 for (left, whole) in projected.left.iter_mut().zip(whole) {
                     if *left <= DEPENDENT * whole {
@@ -337,12 +402,22 @@ impl<'a> Exchange<'a> {
             }
         }
         let target: Vec<f64> = projected.target.iter().map(|t| t[c]).collect();
-        Some(Cholesky::new(&left, q).forward(&target).iter().map(|w| w * w).sum())
+        Some(
+            Cholesky::new(&left, q)
+                .forward(&target)
+                .iter()
+                .map(|w| w * w)
+                .sum(),
+        )
     }
 }
 
 fn gain(target: f64, left: f64) -> f64 {
-    if left > 0.0 { target * target / left } else { 0.0 }
+    if left > 0.0 {
+        target * target / left
+    } else {
+        0.0
+    }
 }
 
 fn used(delays: &Delays, list: List, without: &[Slot]) -> Vec<u16> {
@@ -352,7 +427,12 @@ fn used(delays: &Delays, list: List, without: &[Slot]) -> Vec<u16> {
     };
     lags.iter()
         .enumerate()
-        .filter(|(index, _)| !without.contains(&Slot { list, index: *index }))
+        .filter(|(index, _)| {
+            !without.contains(&Slot {
+                list,
+                index: *index,
+            })
+        })
         .map(|(_, lag)| *lag)
         .collect()
 }
@@ -389,9 +469,15 @@ pub(crate) fn best_input(
     let (mut low, mut high) = bounds;
     let mut best: Option<(i64, f64)> = None;
     loop {
-        let ticks: Vec<i64> = (0..).map(|i| low + i * stride).take_while(|t| *t <= high).collect();
+        let ticks: Vec<i64> = (0..)
+            .map(|i| low + i * stride)
+            .take_while(|t| *t <= high)
+            .collect();
         *screened += ticks.len();
-        for (tick, residual) in ticks.iter().zip(regression.scan_input(delays, input, &ticks)) {
+        for (tick, residual) in ticks
+            .iter()
+            .zip(regression.scan_input(delays, input, &ticks))
+        {
             if best.is_none_or(|(_, b)| residual < b) {
                 best = Some((*tick, residual));
             }
@@ -400,7 +486,10 @@ pub(crate) fn best_input(
             return best;
         }
         let centre = best?.0;
-        (low, high) = ((centre - stride).max(bounds.0), (centre + stride).min(bounds.1));
+        (low, high) = (
+            (centre - stride).max(bounds.0),
+            (centre + stride).min(bounds.1),
+        );
         stride = (stride / 8).max(1);
     }
 }
@@ -412,7 +501,9 @@ mod tests {
 
     fn regression(inputs: usize) -> Regression {
         let n = 1500;
-        let u: Vec<f64> = (0..n).map(|k| f64::from(u8::from((k / 83) % 2 == 1 && k % 7 != 3))).collect();
+        let u: Vec<f64> = (0..n)
+            .map(|k| f64::from(u8::from((k / 83) % 2 == 1 && k % 7 != 3)))
+            .collect();
         let mut y = vec![0.0f64; n];
         let mut noise = 7u32;
         for k in 1..n {
@@ -439,21 +530,33 @@ mod tests {
         for (inputs, ticks) in [(1, vec![11]), (2, vec![5, 11])] {
             let mut regression = regression(inputs);
             regression.tabulate(&ticks);
-            let delays = Delays { state: vec![2, 9], product: vec![3, 14], ticks: ticks.clone() };
+            let delays = Delays {
+                state: vec![2, 9],
+                product: vec![3, 14],
+                ticks: ticks.clone(),
+            };
             let mut exchange = Exchange::new(&regression, &ticks);
             let slots = exchange.slots(&delays);
             let residual = |slot_lags: &[(Slot, u16)]| {
                 let mut trial = delays.clone();
-                slot_lags.iter().for_each(|(slot, lag)| set(&mut trial, *slot, *lag));
+                slot_lags
+                    .iter()
+                    .for_each(|(slot, lag)| set(&mut trial, *slot, *lag));
                 if trial.state[0] == trial.state[1] || trial.product[0] == trial.product[1] {
                     return f64::INFINITY;
                 }
                 regression.normal(&trial).squared_residual()
             };
             for slot in &slots {
-                let (lag, found) = exchange.best_single(&delays, *slot).expect("tables are built");
-                let best = (1..=30).map(|lag| residual(&[(*slot, lag)])).fold(f64::INFINITY, f64::min);
-                assert!((found - best).abs() < 1e-9 && (residual(&[(*slot, lag)]) - best).abs() < 1e-9);
+                let (lag, found) = exchange
+                    .best_single(&delays, *slot)
+                    .expect("tables are built");
+                let best = (1..=30)
+                    .map(|lag| residual(&[(*slot, lag)]))
+                    .fold(f64::INFINITY, f64::min);
+                assert!(
+                    (found - best).abs() < 1e-9 && (residual(&[(*slot, lag)]) - best).abs() < 1e-9
+                );
             }
             for (first, second) in [(0, 1), (0, 2), (2, 3)] {
                 let (first, second) = (slots[first], slots[second]);
@@ -475,13 +578,18 @@ mod tests {
     fn descent_and_input_scan_find_the_truth() {
         let mut regression = regression(1);
         regression.tabulate(&[20]);
-        let mut delays = Delays { state: vec![4, 4], product: vec![9, 17], ticks: vec![20] };
+        let mut delays = Delays {
+            state: vec![4, 4],
+            product: vec![9, 17],
+            ticks: vec![20],
+        };
         let mut screened = 0;
         for _ in 0..3 {
             let ticks = delays.ticks.clone();
             regression.tabulate(&ticks);
             Exchange::new(&regression, &ticks).descend_in_pairs(&mut delays, || true);
-            let (tick, _) = best_input(&regression, &delays, 0, (0, 30), &mut screened).expect("30 delays");
+            let (tick, _) =
+                best_input(&regression, &delays, 0, (0, 30), &mut screened).expect("30 delays");
             delays.ticks = vec![tick];
         }
         assert_eq!(delays.ticks, [11]);

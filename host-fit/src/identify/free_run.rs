@@ -4,12 +4,11 @@
 use model_core::average::WindowSum;
 use model_core::delay::DelayLaw as _;
 use model_core::history::Past;
-use model_core::recursion::{Bilinear, LagConvention};
+use model_core::recursion::{Bilinear, Grading, LagConvention};
 
 use super::arrival::{Signals, core_law, factor};
 use super::layout::Delays;
 use super::linearised::{Linearised, Trajectory};
-use super::one_step::OverDelays;
 use super::regression::Regression;
 use super::structure::{DelayLaw, InputDelay, Structure, WINDOW};
 use crate::search::{Evaluation, Point, Problem, Variable};
@@ -42,7 +41,12 @@ impl Coefficients {
             b.push(next());
             c.extend(delays.product.iter().map(|_| next()));
         }
-        Self { a, b, c, constant: next() }
+        Self {
+            a,
+            b,
+            c,
+            constant: next(),
+        }
     }
 }
 
@@ -83,7 +87,11 @@ impl Past<f64> for Tail<'_> {
 
 impl FreeRunner {
     pub(crate) fn new(signals: &Signals, structure: &Structure) -> Self {
-        let largest = signals.y.iter().flatten().fold(0.0f64, |m, y| m.max(y.abs()));
+        let largest = signals
+            .y
+            .iter()
+            .flatten()
+            .fold(0.0f64, |m, y| m.max(y.abs()));
         let changes = signals
             .u
             .iter()
@@ -123,6 +131,7 @@ impl FreeRunner {
     ) -> Outcome {
         let recursion = Bilinear {
             convention: self.convention,
+            grading: Grading::Proportional,
             constant: coefficients.constant,
             state_lags: &delays.state,
             a: &coefficients.a,
@@ -152,12 +161,17 @@ impl FreeRunner {
         let mut arriving = vec![0.0; laws.len()];
         for (record, measured) in signals.y.iter().enumerate() {
             if let Some(keep) = keep.as_deref_mut() {
-                keep.arrived.push(vec![Vec::with_capacity(measured.len()); laws.len()]);
+                keep.arrived
+                    .push(vec![Vec::with_capacity(measured.len()); laws.len()]);
             }
             let (u, changes) = (&signals.u[record], &self.changes[record]);
             simulated.clear();
             simulated.resize(self.longest, 0.0);
-            simulated.push(if signals.skipped > 0 { measured.first().copied().unwrap_or(0.0) } else { 0.0 });
+            simulated.push(if signals.skipped > 0 {
+                measured.first().copied().unwrap_or(0.0)
+            } else {
+                0.0
+            });
             let mut average = WindowSum::new();
             for (k, y) in measured.iter().enumerate() {
                 let now = simulated[self.longest + k];
@@ -178,8 +192,11 @@ impl FreeRunner {
                     {
                         // The input switched within the range of the delay: where exactly counts.
                         let evaluated = *evaluated.get_or_insert_with(|| {
-                            let follows =
-                                if self.averaged { now } else { average.value() / f64::from(WINDOW) };
+                            let follows = if self.averaged {
+                                now
+                            } else {
+                                average.value() / f64::from(WINDOW)
+                            };
                             law.evaluate(follows.max(0.0))
                         });
                         delay = law.tap(0, evaluated).whole;
@@ -187,15 +204,21 @@ impl FreeRunner {
                     arriving[l] = k.checked_sub(delay).map_or(0.0, |i| u[i]);
                     arriving[l]
                 });
-                if let Some(arrived) = keep.as_deref_mut().and_then(|keep| keep.arrived.last_mut()) {
-                    arrived.iter_mut().zip(&arriving).for_each(|(all, now)| all.push(*now));
+                if let Some(arrived) = keep.as_deref_mut().and_then(|keep| keep.arrived.last_mut())
+                {
+                    arrived
+                        .iter_mut()
+                        .zip(&arriving)
+                        .for_each(|(all, now)| all.push(*now));
                 }
                 if next.abs() > self.bound || next.is_nan() {
                     return Outcome::Diverged((done + k) as f64 / self.samples as f64);
                 }
                 if !self.averaged {
                     let terms = WINDOW as usize - 1;
-                    let leaving = k.checked_sub(terms).map_or(0.0, |i| simulated[self.longest + i]);
+                    let leaving = k
+                        .checked_sub(terms)
+                        .map_or(0.0, |i| simulated[self.longest + i]);
                     average.slide(now, leaving, WINDOW - 1);
                 }
                 simulated.push(if k + 1 < signals.skipped {
@@ -206,7 +229,8 @@ impl FreeRunner {
             }
             done += measured.len();
             if let Some(keep) = keep.as_deref_mut() {
-                keep.simulated.push(simulated[self.longest..self.longest + measured.len()].to_vec());
+                keep.simulated
+                    .push(simulated[self.longest..self.longest + measured.len()].to_vec());
             }
         }
         Outcome::Squared(sum)
@@ -225,7 +249,10 @@ impl FreeRun {
         let (solution, _) = self.regression.normal(delays).solve();
         let coefficients = Coefficients::new(&solution, delays);
         let limit = give_up_at * give_up_at;
-        match self.runner.run(&self.regression.signals, delays, &coefficients, limit, None) {
+        match self
+            .runner
+            .run(&self.regression.signals, delays, &coefficients, limit, None)
+        {
             Outcome::Squared(sum) => Evaluation::Value(sum.sqrt()),
             Outcome::AtLeast(_) => Evaluation::AtLeast(give_up_at),
             Outcome::Diverged(done) => Evaluation::Value(DIVERGED_VALUE * (1.0 - 0.5 * done)),
@@ -238,20 +265,22 @@ impl FreeRun {
         let coefficients = Coefficients::new(&solution, delays);
         let mut trajectory = Trajectory::default();
         let signals = &self.regression.signals;
-        let outcome =
-            self.runner.run(signals, delays, &coefficients, f64::INFINITY, Some(&mut trajectory));
+        let outcome = self.runner.run(
+            signals,
+            delays,
+            &coefficients,
+            f64::INFINITY,
+            Some(&mut trajectory),
+        );
         matches!(outcome, Outcome::Squared(_)).then(|| {
-            Linearised::new(signals, &self.regression.layout, delays, &solution, &trajectory)
+            Linearised::new(
+                signals,
+                &self.regression.layout,
+                delays,
+                &solution,
+                &trajectory,
+            )
         })
-    }
-}
-
-impl OverDelays for FreeRun {
-    fn regression(&self) -> &Regression {
-        &self.regression
-    }
-    fn regression_mut(&mut self) -> &mut Regression {
-        &mut self.regression
     }
 }
 

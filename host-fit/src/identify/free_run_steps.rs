@@ -1,7 +1,7 @@
 //! Search steps for the free-run objective.
 
 use super::exchange::{Exchange, List, Slot, set};
-use super::free_run::FreeRun;
+use super::free_run::{DIVERGED_VALUE, FreeRun};
 use super::layout::Delays;
 use super::linearised::Linearised;
 use super::one_step::kick;
@@ -33,14 +33,18 @@ fn descend(
         let before = best.value;
         let delays = evaluator.problem().regression.layout.delays(&best.point);
         evaluator.problem_mut().regression.tabulate(&delays.ticks);
-        let Some(linearised) = evaluator.problem().linearise(&delays) else { return Ok(best) };
+        let Some(linearised) = evaluator.problem().linearise(&delays) else {
+            return Ok(best);
+        };
         let slots = Exchange::new(&evaluator.problem().regression, &delays.ticks).slots(&delays);
         for slot in slots {
             let delays = evaluator.problem().regression.layout.delays(&best.point);
             let minima = predicted_minima(evaluator.problem(), &linearised, &delays, slot);
             *screened += usize::from(evaluator.problem().regression.layout.longest_lag);
-            let trials: Vec<Point> =
-                minima.iter().map(|lag| with_lag(evaluator.problem(), &delays, slot, *lag)).collect();
+            let trials: Vec<Point> = minima
+                .iter()
+                .map(|lag| with_lag(evaluator.problem(), &delays, slot, *lag))
+                .collect();
             let found = best_of(evaluator, &trials, &mut best)?;
             // Walk on from the best lag of the slot, whether it is new or not.
             let mut lag = match found {
@@ -51,11 +55,16 @@ fn descend(
                 let near: Vec<u16> = AROUND
                     .iter()
                     .map(|d| i32::from(lag) + d)
-                    .filter(|l| *l >= 1 && *l <= i32::from(evaluator.problem().regression.layout.longest_lag))
+                    .filter(|l| {
+                        *l >= 1
+                            && *l <= i32::from(evaluator.problem().regression.layout.longest_lag)
+                    })
                     .map(|l| l as u16)
                     .collect();
-                let trials: Vec<Point> =
-                    near.iter().map(|lag| with_lag(evaluator.problem(), &delays, slot, *lag)).collect();
+                let trials: Vec<Point> = near
+                    .iter()
+                    .map(|lag| with_lag(evaluator.problem(), &delays, slot, *lag))
+                    .collect();
                 match best_of(evaluator, &trials, &mut best)? {
                     Some(at) => lag = near[at],
                     None => break,
@@ -80,8 +89,14 @@ fn best_of(
 ) -> Result<Option<usize>, StopReason> {
     let mut found = None;
     let mut from = 0;
-    while let Some(better) = evaluator.first_better(points.get(from..).unwrap_or_default(), best.value)? {
-        let at = points.iter().skip(from).position(|p| *p == better.point).map_or(points.len(), |i| from + i);
+    while let Some(better) =
+        evaluator.first_better(points.get(from..).unwrap_or_default(), best.value)?
+    {
+        let at = points
+            .iter()
+            .skip(from)
+            .position(|p| *p == better.point)
+            .map_or(points.len(), |i| from + i);
         found = Some(at);
         from = at + 1;
         *best = better;
@@ -104,7 +119,12 @@ fn lag_in(delays: &Delays, slot: Slot) -> u16 {
 }
 
 /// The deepest minima of the predicted ε over the lag in a slot.
-fn predicted_minima(problem: &FreeRun, linearised: &Linearised, delays: &Delays, slot: Slot) -> Vec<u16> {
+fn predicted_minima(
+    problem: &FreeRun,
+    linearised: &Linearised,
+    delays: &Delays,
+    slot: Slot,
+) -> Vec<u16> {
     let layout = &problem.regression.layout;
     let mut trial = delays.clone();
     let predicted: Vec<f64> = (1..=layout.longest_lag)
@@ -117,12 +137,18 @@ fn predicted_minima(problem: &FreeRun, linearised: &Linearised, delays: &Delays,
     // Even and odd lags can form two curves: compare with the second neighbours too.
     let mut minima: Vec<(f64, u16)> = (0..predicted.len())
         .filter(|&i| {
-            [i.wrapping_sub(1), i + 1, i.wrapping_sub(2), i + 2].iter().all(|j| at(i) <= at(*j))
+            [i.wrapping_sub(1), i + 1, i.wrapping_sub(2), i + 2]
+                .iter()
+                .all(|j| at(i) <= at(*j))
         })
         .map(|i| (at(i), i as u16 + 1))
         .collect();
     minima.sort_by(|a, b| a.0.total_cmp(&b.0));
-    minima.into_iter().take(MINIMA).map(|(_, lag)| lag).collect()
+    minima
+        .into_iter()
+        .take(MINIMA)
+        .map(|(_, lag)| lag)
+        .collect()
 }
 
 impl SearchStep<FreeRun> for PredictedStep {
@@ -134,7 +160,10 @@ impl SearchStep<FreeRun> for PredictedStep {
         if self.settled_at.as_deref() == Some(around.point) {
             return Ok(None);
         }
-        let start = Success { point: around.point.to_vec(), value: around.value };
+        let start = Success {
+            point: around.point.to_vec(),
+            value: around.value,
+        };
         let best = descend(evaluator, start, &mut self.screened, |_, _| false)?;
         self.settled_at = Some(best.point.clone());
         Ok((best.value < around.value).then_some(best))
@@ -145,16 +174,72 @@ impl SearchStep<FreeRun> for PredictedStep {
     }
 }
 
-/// Search step: kicks and descends again.
+/// Search step: walks the input delays, with everything else as it is.
+#[derive(Default)]
+pub(crate) struct InputStep {
+    settled_at: Option<Point>,
+}
+
+/// How far an input delay is moved in one step, samples.
+const INPUT_MOVES: [f64; 9] = [0.02, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0, 6.0, 12.0];
+
+impl SearchStep<FreeRun> for InputStep {
+    fn search(
+        &mut self,
+        evaluator: &mut Evaluator<'_, FreeRun>,
+        around: &mut Around<'_>,
+    ) -> Result<Option<Success>, StopReason> {
+        if self.settled_at.as_deref() == Some(around.point) {
+            return Ok(None);
+        }
+        let layout = &evaluator.problem().regression.layout;
+        let bounds = layout.input_bounds();
+        let first = layout.variables.len() - bounds.len();
+        let per_sample = evaluator.problem().regression.signals.ticks_per_sample();
+        let mut best = Success {
+            point: around.point.to_vec(),
+            value: around.value,
+        };
+        let mut moved = true;
+        while moved && !bounds.is_empty() {
+            let mut trials: Vec<Point> = Vec::new();
+            for (input, (low, high)) in bounds.iter().enumerate() {
+                for shift in INPUT_MOVES.iter().flat_map(|m| [-m, *m]) {
+                    let mut trial = best.point.clone();
+                    let ticks = (shift * per_sample).round() as i64;
+                    trial[first + input] = (trial[first + input] + ticks).clamp(*low, *high);
+                    trials.push(trial);
+                }
+            }
+            moved = best_of(evaluator, &trials, &mut best)?.is_some();
+        }
+        self.settled_at = Some(best.point.clone());
+        Ok((best.value < around.value).then_some(best))
+    }
+}
+
+/// Search step: from a local optimum, replaces a few lags at random and descends
+/// again. Gives up after `patience` fruitless kicks or `most` kicks in all.
 pub(crate) struct FreeKickStep {
     patience: usize,
+    most: usize,
     fruitless: usize,
+    kicks: usize,
     screened: usize,
 }
 
+/// Kicks tried until one gives a model that does not diverge.
+const KICK_TRIES: usize = 8;
+
 impl FreeKickStep {
-    pub(crate) fn new(patience: usize) -> Self {
-        Self { patience, fruitless: 0, screened: 0 }
+    pub(crate) fn new(patience: usize, most: usize) -> Self {
+        Self {
+            patience,
+            most,
+            fruitless: 0,
+            kicks: 0,
+            screened: 0,
+        }
     }
 }
 
@@ -164,28 +249,39 @@ impl SearchStep<FreeRun> for FreeKickStep {
         evaluator: &mut Evaluator<'_, FreeRun>,
         around: &mut Around<'_>,
     ) -> Result<Option<Success>, StopReason> {
-        if !around.locally_optimal || self.fruitless >= self.patience {
+        if !around.locally_optimal || SearchStep::<FreeRun>::has_given_up(self) {
             return Ok(None);
         }
+        self.kicks += 1;
         self.fruitless += 1;
-        let regression = &evaluator.problem().regression;
-        let mut delays = regression.layout.delays(around.point);
-        kick(regression, &mut delays, 2 + self.fruitless % 3, around.rng);
-        let point = regression.layout.point(&delays);
-        let value = evaluator.value(&point)?;
-        let end = descend(evaluator, Success { point, value }, &mut self.screened, |sweep, value| {
-            sweep >= 2 && value > around.value * (1.0 + 0.15 / sweep as f64)
-        })?;
-        if std::env::var("TRACE").is_ok() { println!("   kick {value:.4} -> {:.5} (best {:.5}) evals {}", end.value, around.value, evaluator.evaluations()); }
-        if end.value < around.value {
-            self.fruitless = 0;
-            return Ok(Some(end));
+        for _ in 0..KICK_TRIES {
+            let regression = &evaluator.problem().regression;
+            let mut delays = regression.layout.delays(around.point);
+            kick(regression, &mut delays, 2 + self.kicks % 3, around.rng);
+            let point = regression.layout.point(&delays);
+            let value = evaluator.value(&point)?;
+            if value >= 0.5 * DIVERGED_VALUE {
+                continue;
+            }
+            let hopeless =
+                |sweep: usize, value: f64| value > around.value * (1.0 + 0.15 / sweep as f64);
+            let end = descend(
+                evaluator,
+                Success { point, value },
+                &mut self.screened,
+                hopeless,
+            )?;
+            if end.value < around.value {
+                self.fruitless = 0;
+                return Ok(Some(end));
+            }
+            break;
         }
         Ok(None)
     }
 
     fn has_given_up(&self) -> bool {
-        self.fruitless >= self.patience
+        self.fruitless >= self.patience || self.kicks >= self.most
     }
 
     fn screened(&self) -> usize {

@@ -69,12 +69,10 @@ impl LaggedOutputs {
                 padded
             })
             .collect();
-        Self { padded, size: longest + 3 }
-    }
-
-    /// Number of elements of a table.
-    pub(crate) fn size(&self) -> usize {
-        self.size
+        Self {
+            padded,
+            size: longest + 3,
+        }
     }
 
     fn padding(&self) -> usize {
@@ -119,13 +117,20 @@ impl LaggedOutputs {
                 let mut diagonal = vec![0.0; shifts - p];
                 for (padded, intervals) in self.padded.iter().zip(intervals) {
                     self.add_diagonal(&mut diagonal, padded, intervals, |n| {
-                        if n >= p { padded[n] * padded[n - p] } else { 0.0 }
+                        if n >= p {
+                            padded[n] * padded[n - p]
+                        } else {
+                            0.0
+                        }
                     });
                 }
                 diagonal
             })
             .collect();
-        let mut table = Table { size: self.size, values: vec![0.0; self.size * self.size] };
+        let mut table = Table {
+            size: self.size,
+            values: vec![0.0; self.size * self.size],
+        };
         for (p, diagonal) in diagonals.iter().enumerate() {
             for (j, value) in diagonal.iter().enumerate() {
                 table.set(1 + j, 1 + j + p, *value);
@@ -188,7 +193,10 @@ impl LaggedOutputs {
             }
         }
         // The matrix product rounds the two halves differently.
-        let mut table = Table { size: self.size, values };
+        let mut table = Table {
+            size: self.size,
+            values,
+        };
         for a in 0..self.size {
             for b in 0..a {
                 table.set(a, b, table.at(a, b));
@@ -222,7 +230,11 @@ mod tests {
             _ => (k + 2).checked_sub(e).map_or(0.0, |n| y[r][n]),
         };
         (0..y.len())
-            .map(|r| (0..y[r].len() - 1).map(|k| w(r, k) * value(r, k, a) * value(r, k, b)).sum::<f64>())
+            .map(|r| {
+                (0..y[r].len() - 1)
+                    .map(|k| w(r, k) * value(r, k, a) * value(r, k, b))
+                    .sum::<f64>()
+            })
             .sum()
     }
 
@@ -233,18 +245,33 @@ mod tests {
         let intervals = vec![vec![(0, 7), (30, 89)], vec![(12, 40)]];
         let inside = |r: usize, k: usize| intervals[r].iter().any(|&(s, e)| (s..e).contains(&k));
         let as_samples: Vec<Vec<f64>> = (0..2)
-            .map(|r| (0..lagged.rows(r)).map(|k| f64::from(u8::from(inside(r, k)))).collect())
+            .map(|r| {
+                (0..lagged.rows(r))
+                    .map(|k| f64::from(u8::from(inside(r, k))))
+                    .collect()
+            })
             .collect();
-        let graded: Vec<Vec<f64>> =
-            (0..2).map(|r| (0..lagged.rows(r)).map(|k| (k as f64 * 0.05).sin()).collect()).collect();
+        let graded: Vec<Vec<f64>> = (0..2)
+            .map(|r| {
+                (0..lagged.rows(r))
+                    .map(|k| (k as f64 * 0.05).sin())
+                    .collect()
+            })
+            .collect();
         let tables = [
-            (lagged.table(&Weights::Intervals(intervals.clone())), as_samples.clone()),
-            (lagged.table(&Weights::Samples(as_samples.clone())), as_samples),
+            (
+                lagged.table(&Weights::Intervals(intervals.clone())),
+                as_samples.clone(),
+            ),
+            (
+                lagged.table(&Weights::Samples(as_samples.clone())),
+                as_samples,
+            ),
             (lagged.table(&Weights::Samples(graded.clone())), graded),
         ];
         for (table, w) in &tables {
-            for a in 0..lagged.size() {
-                for b in 0..lagged.size() {
+            for a in 0..lagged.size {
+                for b in 0..lagged.size {
                     let expected = direct(&y, |r, k| w[r][k], a, b);
                     assert!((table.at(a, b) - expected).abs() < 1e-11, "{a} {b}");
                 }

@@ -41,17 +41,22 @@ pub(crate) struct Layout {
 impl Layout {
     pub(crate) fn new(structure: &Structure) -> Self {
         let longest = i64::from(structure.longest_lag);
-        let mut variables: Vec<Variable> =
-            (1..=structure.state_lags).map(|i| Variable::integer(format!("state lag {i}"), 1, longest)).collect();
+        let mut variables: Vec<Variable> = (1..=structure.state_lags)
+            .map(|i| Variable::integer(format!("state lag {i}"), 1, longest))
+            .collect();
         variables.extend(
-            (1..=structure.product_lags).map(|j| Variable::integer(format!("product lag {j}"), 1, longest)),
+            (1..=structure.product_lags)
+                .map(|j| Variable::integer(format!("product lag {j}"), 1, longest)),
         );
         let given = structure.given_ticks();
         let input = match &structure.delay {
             InputDelay::Fixed { .. } => Variable::integer("", 0, longest),
-            InputDelay::StateDependent { law, .. } => {
-                Variable::granular("", 0.0, longest as f64 / law.longest().max(1.0), FACTOR_STEP)
-            }
+            InputDelay::StateDependent { law, .. } => Variable::granular(
+                "",
+                0.0,
+                longest as f64 / law.longest().max(1.0),
+                FACTOR_STEP,
+            ),
         };
         if given.is_none() {
             variables.extend((1..=structure.inputs).map(|l| Variable {
@@ -72,7 +77,11 @@ impl Layout {
 
     /// Bounds in ticks of the input delays that are searched.
     pub(crate) fn input_bounds(&self) -> Vec<(i64, i64)> {
-        self.variables.iter().skip(self.state_lags + self.product_lags).map(|v| (v.lower, v.upper)).collect()
+        self.variables
+            .iter()
+            .skip(self.state_lags + self.product_lags)
+            .map(|v| (v.lower, v.upper))
+            .collect()
     }
 
     /// The variables that are lags, and those that are input delays.
@@ -84,7 +93,12 @@ impl Layout {
     /// The delays a point stands for.
     pub(crate) fn delays(&self, point: &[i64]) -> Delays {
         let lags = |from: usize, count: usize| {
-            let mut lags: Vec<u16> = point.iter().skip(from).take(count).map(|x| *x as u16).collect();
+            let mut lags: Vec<u16> = point
+                .iter()
+                .skip(from)
+                .take(count)
+                .map(|x| *x as u16)
+                .collect();
             lags.sort_unstable();
             lags.dedup();
             lags
@@ -108,10 +122,21 @@ impl Layout {
     pub(crate) fn point(&self, delays: &Delays) -> Point {
         let fill = |list: Vec<i64>, count: usize, default: i64| {
             let last = list.last().copied().unwrap_or(default);
-            list.into_iter().chain(std::iter::repeat(last)).take(count).collect::<Vec<i64>>()
+            list.into_iter()
+                .chain(std::iter::repeat(last))
+                .take(count)
+                .collect::<Vec<i64>>()
         };
-        let mut point = fill(delays.state.iter().map(|x| i64::from(*x)).collect(), self.state_lags, 1);
-        point.extend(fill(delays.product.iter().map(|x| i64::from(*x)).collect(), self.product_lags, 1));
+        let mut point = fill(
+            delays.state.iter().map(|x| i64::from(*x)).collect(),
+            self.state_lags,
+            1,
+        );
+        point.extend(fill(
+            delays.product.iter().map(|x| i64::from(*x)).collect(),
+            self.product_lags,
+            1,
+        ));
         let inputs = self.variables.len() - point.len();
         point.extend(fill(delays.ticks.clone(), inputs, 0));
         point
@@ -135,14 +160,29 @@ impl Layout {
 
     /// The regressors of a candidate: a_1 …, then per input b_l, c_1l …, then the constant.
     pub(crate) fn columns(&self, delays: &Delays) -> Vec<Column> {
-        let mut columns: Vec<Column> =
-            delays.state.iter().map(|lag| Column { input: 0, element: self.element(*lag) }).collect();
+        let mut columns: Vec<Column> = delays
+            .state
+            .iter()
+            .map(|lag| Column {
+                input: 0,
+                element: self.element(*lag),
+            })
+            .collect();
         for input in 1..=delays.ticks.len() {
-            columns.push(Column { input, element: super::lagged_products::ONE });
-            columns.extend(delays.product.iter().map(|lag| Column { input, element: self.element(*lag) }));
+            columns.push(Column {
+                input,
+                element: super::lagged_products::ONE,
+            });
+            columns.extend(delays.product.iter().map(|lag| Column {
+                input,
+                element: self.element(*lag),
+            }));
         }
         if self.constant {
-            columns.push(Column { input: 0, element: super::lagged_products::ONE });
+            columns.push(Column {
+                input: 0,
+                element: super::lagged_products::ONE,
+            });
         }
         columns
     }

@@ -52,7 +52,6 @@ pub(crate) struct Linearised {
     incumbent: Vec<(usize, f64)>,
     lags: usize,
     first_element: usize,
-    inputs: usize,
 }
 
 impl Linearised {
@@ -73,20 +72,31 @@ impl Linearised {
             incumbent: Vec::new(),
             lags,
             first_element: layout.element(1),
-            inputs,
         };
         let columns = layout.columns(delays);
-        linearised.incumbent =
-            columns.iter().zip(solution).map(|(column, theta)| (linearised.index(column), *theta)).collect();
+        linearised.incumbent = columns
+            .iter()
+            .zip(solution)
+            .map(|(column, theta)| (linearised.index(column), *theta))
+            .collect();
         let coefficients = Coefficients::new(solution, delays);
         let behind = |lag: &u16| layout.element(*lag) - 2;
         // Single precision is enough to rank candidates and runs twice as fast.
-        let state: Vec<(usize, f32)> =
-            delays.state.iter().map(behind).zip(coefficients.a.iter().map(|a| *a as f32)).collect();
+        let state: Vec<(usize, f32)> = delays
+            .state
+            .iter()
+            .map(behind)
+            .zip(coefficients.a.iter().map(|a| *a as f32))
+            .collect();
         let product: Vec<Vec<(usize, f32)>> = (0..inputs)
             .map(|l| {
                 let c = coefficients.c.iter().skip(l * delays.product.len());
-                delays.product.iter().map(behind).zip(c.map(|c| *c as f32)).collect()
+                delays
+                    .product
+                    .iter()
+                    .map(behind)
+                    .zip(c.map(|c| *c as f32))
+                    .collect()
             })
             .collect();
         for (record, measured) in signals.y.iter().enumerate() {
@@ -101,7 +111,13 @@ impl Linearised {
             let mut padded = vec![0.0f32; lags + 1 + LANES];
             padded.extend(simulated.iter().map(|y| *y as f32));
             padded.push(0.0);
-            let run = Run { padded: &padded, arrived: &arrived, state: &state, product: &product, rows: &rows };
+            let run = Run {
+                padded: &padded,
+                arrived: &arrived,
+                state: &state,
+                product: &product,
+                rows: &rows,
+            };
             for block in 0..=inputs {
                 for first in (0..=lags).step_by(LANES) {
                     linearised.filter(&run, block, first, &mut sampled);
@@ -118,7 +134,11 @@ impl Linearised {
 
     /// Place of a regressor's sensitivity.
     fn index(&self, column: &Column) -> usize {
-        let within = if column.element == ONE { 0 } else { column.element + 1 - self.first_element };
+        let within = if column.element == ONE {
+            0
+        } else {
+            column.element + 1 - self.first_element
+        };
         column.input * (1 + self.lags) + within
     }
 
@@ -126,13 +146,22 @@ impl Linearised {
     /// a block on and samples the result. Block 0 are the outputs alone, block
     /// l the outputs times the command that arrives through input l.
     fn filter(&self, run: &Run<'_>, block: usize, first: usize, sampled: &mut [f64]) {
-        let Run { padded, arrived, state, product, rows } = run;
+        let Run {
+            padded,
+            arrived,
+            state,
+            product,
+            rows,
+        } = run;
         let reach = self.lags + 1;
         let samples = padded.len() - reach - LANES - 1;
         let mut s = vec![[0.0f32; LANES]; reach + 1];
         s.reserve(samples);
         let ones = vec![1.0f32; samples];
-        let gate = block.checked_sub(1).and_then(|l| arrived.get(l)).unwrap_or(&ones);
+        let gate = block
+            .checked_sub(1)
+            .and_then(|l| arrived.get(l))
+            .unwrap_or(&ones);
         // Lane 0 is the constant 1 if it starts the block, then lags ascend.
         let mut rows = rows.iter().enumerate().peekable();
         let count = rows.len();
@@ -148,7 +177,9 @@ impl Linearised {
                 // The newest output that a lane reads is the last of these.
                 let newest = LANES + reach + k + 4 - first - self.first_element;
                 let past = &padded[newest - LANES..newest];
-                next.iter_mut().zip(past.iter().rev()).for_each(|(n, y)| *n = gate * y);
+                next.iter_mut()
+                    .zip(past.iter().rev())
+                    .for_each(|(n, y)| *n = gate * y);
                 if first == 0 {
                     next[0] = gate;
                 }
@@ -204,10 +235,5 @@ impl Linearised {
             sum += 2.0 * x * part;
         }
         sum * STRIDE as f64
-    }
-
-    /// Number of inputs at the linearisation.
-    pub(crate) fn inputs(&self) -> usize {
-        self.inputs
     }
 }

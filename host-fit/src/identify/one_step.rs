@@ -1,5 +1,7 @@
 //! The delays as a search problem: the one-step objective and its search steps.
 
+use std::sync::atomic::Ordering;
+
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -10,26 +12,9 @@ use crate::search::{
     Around, Evaluation, Evaluator, Point, Problem, SearchStep, StopReason, Success, Variable,
 };
 
-/// A search problem over the delays of a regression.
-pub(crate) trait OverDelays: Problem {
-    /// The regression behind it.
-    fn regression(&self) -> &Regression;
-    /// The regression, to build tables in it.
-    fn regression_mut(&mut self) -> &mut Regression;
-}
-
 /// Norm of the one-step prediction errors as a function of the delays.
 pub(crate) struct OneStep {
     pub(crate) regression: Regression,
-}
-
-impl OverDelays for OneStep {
-    fn regression(&self) -> &Regression {
-        &self.regression
-    }
-    fn regression_mut(&mut self) -> &mut Regression {
-        &mut self.regression
-    }
 }
 
 impl Problem for OneStep {
@@ -69,7 +54,9 @@ pub(crate) fn settle(
     screened: &mut usize,
 ) -> f64 {
     loop {
-        let reach = reach.map_or(i64::MAX / 4, |r| (r * regression.signals.ticks_per_sample()) as i64);
+        let reach = reach.map_or(i64::MAX / 4, |r| {
+            (r * regression.signals.ticks_per_sample()) as i64
+        });
         let bounds = regression.layout.input_bounds();
         let inputs: Vec<(i64, i64)> = bounds
             .iter()
@@ -114,7 +101,7 @@ impl SearchStep<OneStep> for ExchangeStep {
         if self.settled_at.as_deref() == Some(around.point) {
             return Ok(None);
         }
-        let regression = evaluator.problem_mut().regression_mut();
+        let regression = &mut evaluator.problem_mut().regression;
         let mut delays = regression.layout.delays(around.point);
         settle(regression, &mut delays, None, &mut self.screened);
         let point = regression.layout.point(&delays);
@@ -143,11 +130,12 @@ impl SearchStep<OneStep> for PairStep {
         if self.settled_at.as_deref() == Some(around.point) {
             return Ok(None);
         }
-        let regression = evaluator.problem_mut().regression_mut();
+        let interrupt = evaluator.interrupt();
+        let regression = &mut evaluator.problem_mut().regression;
         let mut delays = regression.layout.delays(around.point);
         regression.tabulate(&delays.ticks);
         let mut exchange = Exchange::new(regression, &delays.ticks);
-        exchange.descend_in_pairs(&mut delays, || true);
+        exchange.descend_in_pairs(&mut delays, || !interrupt.load(Ordering::Relaxed));
         self.screened += exchange.screened();
         let point = regression.layout.point(&delays);
         self.settled_at = Some(point.clone());
@@ -172,7 +160,11 @@ pub(crate) struct KickStep {
 
 impl KickStep {
     pub(crate) fn new(patience: usize) -> Self {
-        Self { patience, fruitless: 0, screened: 0 }
+        Self {
+            patience,
+            fruitless: 0,
+            screened: 0,
+        }
     }
 }
 
@@ -189,11 +181,16 @@ impl SearchStep<OneStep> for KickStep {
         if evaluator.is_interrupted() {
             return Err(StopReason::Interrupted);
         }
-        let regression = evaluator.problem_mut().regression_mut();
+        let regression = &mut evaluator.problem_mut().regression;
         let mut delays = regression.layout.delays(around.point);
         let strength = 2 + self.fruitless % 5;
         kick(regression, &mut delays, strength, around.rng);
-        settle(regression, &mut delays, Some(KICK_REACH), &mut self.screened);
+        settle(
+            regression,
+            &mut delays,
+            Some(KICK_REACH),
+            &mut self.screened,
+        );
         let point = regression.layout.point(&delays);
         let success = evaluator.first_better(&[point], around.value)?;
         if success.is_some() {
@@ -221,10 +218,15 @@ pub(crate) fn kick(
     let slots = Exchange::new(regression, &delays.ticks).slots(delays);
     for _ in 0..strength.min(slots.len()) {
         let slot = slots[rng.random_range(0..slots.len())];
-        set(delays, slot, rng.random_range(1..=regression.layout.longest_lag));
+        set(
+            delays,
+            slot,
+            rng.random_range(1..=regression.layout.longest_lag),
+        );
     }
     for (input, (low, high)) in regression.layout.input_bounds().into_iter().enumerate() {
-        if rng.random_bool(0.3) {
+        // Without on/off edges every new input delay costs new tables.
+        if regression.is_binary() && rng.random_bool(0.3) {
             delays.ticks[input] = rng.random_range(low..=high);
         }
     }

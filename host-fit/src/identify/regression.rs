@@ -113,6 +113,11 @@ impl Regression {
         }
     }
 
+    /// Whether the arriving commands are 0 and 1 only.
+    pub(crate) fn is_binary(&self) -> bool {
+        self.binary
+    }
+
     /// Weights between a column of input `l` and one of input `m`.
     pub(crate) fn which(&self, l: usize, m: usize, ticks: &[i64]) -> Which {
         let tick = |l: usize| ticks.get(l - 1).copied().unwrap_or(0);
@@ -167,7 +172,10 @@ impl Regression {
             return;
         }
         for which in self.needed(ticks) {
-            if self.nearest(which).is_none_or(|(_, distance)| distance > self.reach) {
+            if self
+                .nearest(which)
+                .is_none_or(|(_, distance)| distance > self.reach)
+            {
                 self.keep(which);
             }
         }
@@ -180,12 +188,23 @@ impl Regression {
             return;
         }
         if self.kept.len() >= TABLES_KEPT {
-            let oldest = self.kept.iter().min_by_key(|(_, k)| k.last_used).map(|(key, _)| *key);
+            let oldest = self
+                .kept
+                .iter()
+                .min_by_key(|(_, k)| k.last_used)
+                .map(|(key, _)| *key);
             oldest.and_then(|key| self.kept.remove(&key));
         }
         let weights = self.weights(which);
         let table = self.lagged.table(&weights);
-        self.kept.insert(which, Kept { table, weights, last_used: self.clock });
+        self.kept.insert(
+            which,
+            Kept {
+                table,
+                weights,
+                last_used: self.clock,
+            },
+        );
     }
 
     /// The table for exactly these weights, if it was built.
@@ -201,16 +220,35 @@ impl Regression {
     pub(crate) fn normal(&self, delays: &Delays) -> Normal {
         let columns = self.layout.columns(delays);
         let n = columns.len();
-        let mut normal =
-            Normal { n, gram: vec![0.0; n * n], rhs: vec![0.0; n], target: self.plain.at(TARGET, TARGET) };
-        self.fill(&mut normal, &columns, &delays.ticks, Which::Plain, &self.plain);
+        let mut normal = Normal {
+            n,
+            gram: vec![0.0; n * n],
+            rhs: vec![0.0; n],
+            target: self.plain.at(TARGET, TARGET),
+        };
+        self.fill(
+            &mut normal,
+            &columns,
+            &delays.ticks,
+            Which::Plain,
+            &self.plain,
+        );
         for which in self.needed(&delays.ticks) {
             match self.nearest(which) {
-                Some((kept, 0)) => self.fill(&mut normal, &columns, &delays.ticks, which, &kept.table),
+                Some((kept, 0)) => {
+                    self.fill(&mut normal, &columns, &delays.ticks, which, &kept.table)
+                }
                 Some((kept, distance)) if distance <= self.reach && self.binary => {
                     self.fill(&mut normal, &columns, &delays.ticks, which, &kept.table);
                     let to = self.weights(which);
-                    self.correct(&mut normal, &columns, &delays.ticks, which, Some(&kept.weights), &to);
+                    self.correct(
+                        &mut normal,
+                        &columns,
+                        &delays.ticks,
+                        which,
+                        Some(&kept.weights),
+                        &to,
+                    );
                 }
                 _ => {
                     let to = self.weights(which);
@@ -221,7 +259,14 @@ impl Regression {
         normal
     }
 
-    fn fill(&self, normal: &mut Normal, columns: &[Column], ticks: &[i64], which: Which, table: &Table) {
+    fn fill(
+        &self,
+        normal: &mut Normal,
+        columns: &[Column],
+        ticks: &[i64],
+        which: Which,
+        table: &Table,
+    ) {
         for (p, a) in columns.iter().enumerate() {
             for (q, b) in columns.iter().enumerate().take(p + 1) {
                 if self.which(a.input, b.input, ticks) == which {
@@ -250,11 +295,14 @@ impl Regression {
         let mut pairs = Vec::new();
         for (p, a) in columns.iter().enumerate() {
             pairs.extend(
-                (0..=p).filter(|q| self.which(a.input, columns[*q].input, ticks) == which).map(|q| (p, q)),
+                (0..=p)
+                    .filter(|q| self.which(a.input, columns[*q].input, ticks) == which)
+                    .map(|q| (p, q)),
             );
         }
-        let targets: Vec<usize> =
-            (0..n).filter(|p| self.which(columns[*p].input, 0, ticks) == which).collect();
+        let targets: Vec<usize> = (0..n)
+            .filter(|p| self.which(columns[*p].input, 0, ticks) == which)
+            .collect();
         let mut values = vec![0.0; n];
         let mut add = |record: usize, k: usize, weight: f64| {
             for (value, column) in values.iter_mut().zip(columns) {
@@ -299,7 +347,7 @@ impl Regression {
     /// Squared residual norms with one input's delay at each of `ticks`, which
     /// should be neighbours: each is corrected from the one before.
     pub(crate) fn scan_input(&self, delays: &Delays, input: usize, ticks: &[i64]) -> Vec<f64> {
-        let mut current: Option<(Delays, Normal, BTreeMap<(usize, usize), Weights>)> = None;
+        let mut current: Option<(Normal, BTreeMap<(usize, usize), Weights>)> = None;
         let mut residuals = Vec::with_capacity(ticks.len());
         for &tick in ticks {
             let mut moved = delays.clone();
@@ -315,7 +363,7 @@ impl Regression {
                 .filter(|m| *m != input + 1)
                 .all(|m| moved.ticks[m - 1] != tick);
             let normal = match current.take() {
-                Some((before, mut normal, old)) if self.binary && distinct => {
+                Some((mut normal, old)) if self.binary && distinct => {
                     let mut done = Vec::new();
                     for m in 0..=moved.ticks.len() {
                         let which = self.which(input + 1, m, &moved.ticks);
@@ -325,16 +373,22 @@ impl Regression {
                         done.push(which);
                         let key = (input + 1, m);
                         if let (Some(from), Some(to)) = (old.get(&key), weights.get(&key)) {
-                            self.correct(&mut normal, &columns, &moved.ticks, which, Some(from), to);
+                            self.correct(
+                                &mut normal,
+                                &columns,
+                                &moved.ticks,
+                                which,
+                                Some(from),
+                                to,
+                            );
                         }
                     }
-                    drop(before);
                     normal
                 }
                 _ => self.normal(&moved),
             };
             residuals.push(normal.squared_residual());
-            current = distinct.then_some((moved, normal, weights));
+            current = distinct.then_some((normal, weights));
         }
         residuals
     }
@@ -346,14 +400,24 @@ impl Regression {
     /// [`linalg::NotConverged`] when the decomposition fails.
     pub(crate) fn exact(&self, delays: &Delays) -> Result<(Vec<f64>, f64), linalg::NotConverged> {
         let target = self.lagged.column(TARGET);
-        let columns: Vec<Vec<f64>> =
-            self.layout.columns(delays).iter().map(|c| self.column(c, &delays.ticks)).collect();
+        let columns: Vec<Vec<f64>> = self
+            .layout
+            .columns(delays)
+            .iter()
+            .map(|c| self.column(c, &delays.ticks))
+            .collect();
         let coefficients = linalg::least_squares(&columns, &target)?;
         let mut residual = target;
         for (coefficient, column) in coefficients.iter().zip(&columns) {
-            residual.iter_mut().zip(column).for_each(|(r, x)| *r -= coefficient * x);
+            residual
+                .iter_mut()
+                .zip(column)
+                .for_each(|(r, x)| *r -= coefficient * x);
         }
-        Ok((coefficients, residual.iter().map(|r| r * r).sum::<f64>().sqrt()))
+        Ok((
+            coefficients,
+            residual.iter().map(|r| r * r).sum::<f64>().sqrt(),
+        ))
     }
 
     fn column(&self, column: &Column, ticks: &[i64]) -> Vec<f64> {
@@ -387,7 +451,15 @@ mod tests {
         [(57, 1400), (91, 1100)]
             .map(|(period, n)| {
                 let u: Vec<f64> = (0..n)
-                    .map(|k| if (k / period) % 2 == 0 { 0.0 } else if graded { 0.3 + 0.001 * k as f64 } else { 1.0 })
+                    .map(|k| {
+                        if (k / period) % 2 == 0 {
+                            0.0
+                        } else if graded {
+                            0.3 + 0.001 * k as f64
+                        } else {
+                            1.0
+                        }
+                    })
                     .collect();
                 let mut y = vec![0.0f64; n];
                 let mut noise = 1u32;
@@ -418,20 +490,33 @@ mod tests {
 
     #[test]
     fn tables_corrections_and_direct_sums_agree_with_the_exact_fit() {
-        let law = DelayLaw { floor: 20.0, rise: 15.0, rate: 2.0 };
+        let law = DelayLaw {
+            floor: 20.0,
+            rise: 15.0,
+            rate: 2.0,
+        };
         let laws = [
             (InputDelay::Fixed { delays: None }, vec![28, 41]),
-            (InputDelay::StateDependent { law, factors: None }, vec![9_000, 12_345]),
+            (
+                InputDelay::StateDependent { law, factors: None },
+                vec![9_000, 12_345],
+            ),
         ];
         for graded in [false, true] {
             let data = records(graded);
             for (law, ticks) in &laws {
                 let mut regression = regression(&data, law.clone(), 2);
-                let delays =
-                    Delays { state: vec![1, 17], product: vec![1, 9, 33], ticks: ticks.clone() };
+                let delays = Delays {
+                    state: vec![1, 17],
+                    product: vec![1, 9, 33],
+                    ticks: ticks.clone(),
+                };
                 let (_, exact) = regression.exact(&delays).expect("converges");
                 let close = |squared: f64, how: &str| {
-                    assert!((squared.sqrt() - exact).abs() < 1e-9, "{how}: {squared} {exact}");
+                    assert!(
+                        (squared.sqrt() - exact).abs() < 1e-9,
+                        "{how}: {squared} {exact}"
+                    );
                 };
                 close(regression.normal(&delays).squared_residual(), "direct");
                 regression.tabulate(&[ticks[0] + 1, ticks[1] + 2]);
@@ -441,7 +526,10 @@ mod tests {
                 let around: Vec<i64> = (-3..=3).map(|i| ticks[1] + i).collect();
                 let scan = regression.scan_input(&delays, 1, &around);
                 close(scan[3], "scanned");
-                let first = Delays { ticks: vec![ticks[0], around[6]], ..delays.clone() };
+                let first = Delays {
+                    ticks: vec![ticks[0], around[6]],
+                    ..delays.clone()
+                };
                 let (_, expected) = regression.exact(&first).expect("converges");
                 assert!((scan[6].sqrt() - expected).abs() < 1e-9);
             }

@@ -21,7 +21,11 @@ pub struct DelayLaw {
 
 impl DelayLaw {
     /// The law published in the paper, for its rig.
-    pub const PAPER: Self = Self { floor: 47.35, rise: 12.69, rate: 20.18 };
+    pub const PAPER: Self = Self {
+        floor: 47.35,
+        rise: 12.69,
+        rate: 20.18,
+    };
 
     /// The longest delay of the law over ỹ ≥ 0, samples.
     pub fn longest(&self) -> f64 {
@@ -80,7 +84,10 @@ impl Default for Structure {
             inputs: 1,
             longest_lag: 500,
             convention: LagConvention::OneStep,
-            delay: InputDelay::StateDependent { law: DelayLaw::PAPER, factors: Some(vec![1.0]) },
+            delay: InputDelay::StateDependent {
+                law: DelayLaw::PAPER,
+                factors: Some(vec![1.0]),
+            },
             averaged: false,
             constant: false,
             start: Start::Rest,
@@ -93,7 +100,10 @@ impl Structure {
     pub(crate) fn skipped(&self) -> usize {
         let longest_delay = match &self.delay {
             InputDelay::Fixed { delays: Some(h) } => h.iter().copied().max().unwrap_or(0) as usize,
-            InputDelay::StateDependent { law, factors: Some(f) } => {
+            InputDelay::StateDependent {
+                law,
+                factors: Some(f),
+            } => {
                 let factor = f.iter().fold(0.0f64, |m, f| m.max(*f));
                 (factor * law.longest()).ceil() as usize
             }
@@ -108,21 +118,21 @@ impl Structure {
     /// Ticks for given input delays.
     pub(crate) fn given_ticks(&self) -> Option<Vec<i64>> {
         match &self.delay {
-            InputDelay::Fixed { delays } => {
-                delays.as_ref().map(|h| h.iter().map(|h| i64::from(*h)).collect())
-            }
-            InputDelay::StateDependent { factors, .. } => {
-                factors.as_ref().map(|f| f.iter().map(|f| (f / FACTOR_STEP).round() as i64).collect())
-            }
+            InputDelay::Fixed { delays } => delays
+                .as_ref()
+                .map(|h| h.iter().map(|h| i64::from(*h)).collect()),
+            InputDelay::StateDependent { factors, .. } => factors
+                .as_ref()
+                .map(|f| f.iter().map(|f| (f / FACTOR_STEP).round() as i64).collect()),
         }
     }
 }
 
-/// One recording: command and response, equally long, from rest.
+/// One recording: command and response, equally long.
 #[derive(Debug, Clone, Copy)]
-pub struct Series<'a> {
+pub(crate) struct Series<'a> {
     /// u_k: 0 or 1 for on/off, any real otherwise.
-    pub u: &'a [f64],
+    pub(crate) u: &'a [f64],
     /// y_k.
-    pub y: &'a [f64],
+    pub(crate) y: &'a [f64],
 }

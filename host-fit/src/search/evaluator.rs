@@ -128,7 +128,12 @@ impl<'a, P: Problem> Evaluator<'a, P> {
         &self.history
     }
 
-    /// Whether the interrupt flag is up; long steps should look at it.
+    /// The flag that asks the search to stop; long steps should look at it.
+    pub fn interrupt(&self) -> &'a AtomicBool {
+        self.interrupt
+    }
+
+    /// Whether the search was asked to stop.
     pub fn is_interrupted(&self) -> bool {
         self.interrupt.load(Ordering::Relaxed)
     }

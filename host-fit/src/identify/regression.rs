@@ -347,32 +347,26 @@ impl Regression {
     /// Squared residual norms with one input's delay at each of `ticks`, which
     /// should be neighbours: each is corrected from the one before.
     pub(crate) fn scan_input(&self, delays: &Delays, input: usize, ticks: &[i64]) -> Vec<f64> {
-        let mut current: Option<(Normal, BTreeMap<(usize, usize), Weights>)> = None;
+        let mut current: Option<(Normal, Vec<Weights>)> = None;
         let mut residuals = Vec::with_capacity(ticks.len());
         for &tick in ticks {
             let mut moved = delays.clone();
             // Kept unsorted here: the columns of the inputs are in order of `delays`.
             moved.ticks[input] = tick;
             let columns = self.layout.columns(&moved);
-            let mut weights = BTreeMap::new();
-            for m in 0..=moved.ticks.len() {
-                let which = self.which(input + 1, m, &moved.ticks);
-                weights.insert((input + 1, m), self.weights(which));
-            }
+            let weights: Vec<Weights> = (0..=moved.ticks.len())
+                .map(|m| self.weights(self.which(input + 1, m, &moved.ticks)))
+                .collect();
             let distinct = (1..moved.ticks.len() + 1)
                 .filter(|m| *m != input + 1)
                 .all(|m| moved.ticks[m - 1] != tick);
             let normal = match current.take() {
                 Some((mut normal, old)) if self.binary && distinct => {
                     let mut done = Vec::new();
-                    for m in 0..=moved.ticks.len() {
+                    for (m, (from, to)) in old.iter().zip(&weights).enumerate() {
                         let which = self.which(input + 1, m, &moved.ticks);
-                        if done.contains(&which) {
-                            continue;
-                        }
-                        done.push(which);
-                        let key = (input + 1, m);
-                        if let (Some(from), Some(to)) = (old.get(&key), weights.get(&key)) {
+                        if !done.contains(&which) {
+                            done.push(which);
                             self.correct(
                                 &mut normal,
                                 &columns,

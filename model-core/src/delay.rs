@@ -1,6 +1,7 @@
 //! The transport delay between jets and sensor: which past jet strength the
 //! flow receives now.
 
+use crate::history::Past;
 use crate::real::Real;
 
 /// Where the flow reads the jet history: `whole` samples back, or between that
@@ -34,6 +35,14 @@ impl<T: Real> Tap<T> {
             whole: whole as usize,
             fraction: delay - T::from_count(whole as u32),
         }
+    }
+
+    /// The signal that far back: between two samples, straight from one to the other.
+    #[inline]
+    pub fn read(&self, past: &impl Past<T>) -> T {
+        let newer = past.back(self.whole);
+        let older = past.back(self.whole.saturating_add(1));
+        newer + self.fraction * (older - newer)
     }
 }
 

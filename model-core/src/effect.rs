@@ -92,7 +92,10 @@ pub struct Setting<T> {
 pub struct Instant<'a, T> {
     /// The command u_k.
     pub command: T,
-    /// The jet strength that arrives at the flow at this sample.
+    /// The friction of the flow, s_k: the base model's y.
+    pub flow: T,
+    /// The jet strength that arrives at the flow at this sample; 0 while the
+    /// jets are being shaped.
     pub arrived: T,
     /// Measured channels, in the order of the model's settings.
     pub channels: &'a [T],

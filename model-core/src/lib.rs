@@ -16,6 +16,7 @@ extern crate std;
 
 pub mod average;
 pub mod checks;
+pub mod clock;
 pub mod control;
 pub mod delay;
 pub mod effect;

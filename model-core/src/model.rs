@@ -250,8 +250,10 @@ where
     J: Memory<T>,
 {
     let (law, effects, averaging) = (model.delay(), model.effects(), model.averaging());
+    let flow = state.outputs.back(0);
     let mut at = Instant {
         command: input.command,
+        flow,
         arrived: T::ZERO,
         channels: input.channels,
     };
@@ -259,7 +261,6 @@ where
     let jet = effects.jet(&mut state.effects, command, &at);
     state.jets.push(jet);
 
-    let flow = state.outputs.back(0);
     let follows = if averaging.averaged_model {
         flow
     } else {

@@ -3,7 +3,7 @@
 use crate::delay::Tap;
 use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
 use crate::real::Real;
-use crate::history::{DelayLine, Memory, Past};
+use crate::history::{DelayLine, Memory};
 
 
 /// j(t) = v(t) + g·v(t − d), with d of at most `LEN` − 2 samples.
@@ -21,9 +21,7 @@ impl<T: Real, const LEN: usize> Effect<T> for EchoPath<T, LEN> {
     #[inline]
     fn jet(&self, past: &mut Self::State, jet: T, _at: &Instant<'_, T>) -> T {
         past.push(jet);
-        let newer = past.back(self.delay.whole);
-        let older = past.back(self.delay.whole + 1);
-        jet + self.gain * (newer + self.delay.fraction * (older - newer))
+        jet + self.gain * self.delay.read(past)
     }
 }
 

@@ -15,5 +15,6 @@ pub mod picture;
 pub mod search;
 pub mod simulate;
 pub mod target;
+pub mod user_effect;
 
 mod linalg;

@@ -13,7 +13,6 @@ use crate::model::Model;
 use crate::simulate::SimulateError;
 use evidence::{HeldOut, decoys, p_above_noise, p_value};
 use model_core::effect::{Place, Spec};
-use model_core::effects::SPECS;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -264,8 +263,9 @@ impl<'a> Bench<'a> {
 
     /// Refits `current` with each candidate and judges it on the held-out records.
     fn round(&self, current: &Model, options: &FitOptions, interrupt: &AtomicBool) -> Round {
-        let tried: Vec<(&'static Spec, Result<Judged, String>)> = SPECS
-            .par_iter()
+        let candidates: Vec<&'static Spec> = current.candidates().collect();
+        let tried: Vec<(&'static Spec, Result<Judged, String>)> = candidates
+            .into_par_iter()
             .map(|spec| {
                 if let Some(reason) = self.pointless(current, spec) {
                     return (spec, Err(reason));

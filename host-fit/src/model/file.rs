@@ -2,7 +2,8 @@
 
 use super::{Added, Delay, Law, Model, Start, Training};
 use crate::output::{self, OutputError};
-use model_core::effects;
+use crate::user_effect::{Definition, DefinitionError, Source};
+use model_core::effect::Spec;
 use model_core::model::Averaging;
 use model_core::recursion::{Grading, LagConvention};
 use serde::{Deserialize, Serialize};
@@ -53,6 +54,9 @@ pub enum ModelError {
         /// What is wrong.
         problem: String,
     },
+    /// A user's own effect in it was refused.
+    #[error(transparent)]
+    Definition(#[from] DefinitionError),
     /// It could not be written.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -71,6 +75,9 @@ struct File {
     delay: Delay,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     effect: Vec<EffectTable>,
+    /// The user's own effects, whole: a model file stands alone.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    definition: Vec<Source>,
     #[serde(default)]
     training: Training,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -174,8 +181,15 @@ impl Model {
                 found,
             });
         }
-        let file: File = toml::from_str(text).map_err(syntax)?;
-        file.into_model()
+        let mut file: File = toml::from_str(text).map_err(syntax)?;
+        let definitions = std::mem::take(&mut file.definition)
+            .into_iter()
+            .map(|source| {
+                let prefix = format!("definition.{}.", source.name);
+                Definition::from_source(source, place, &prefix)
+            })
+            .collect::<Result<_, _>>()?;
+        file.into_model(definitions)
             .map_err(|(key, problem)| ModelError::Inconsistent {
                 place: place.to_owned(),
                 key,
@@ -233,14 +247,26 @@ impl File {
                     .collect(),
             },
             delay: model.delay.clone(),
-            effect: model.effects.iter().map(EffectTable::of).collect(),
+            effect: model
+                .effects
+                .iter()
+                .map(|added| EffectTable::of(added, model.spec(&added.name)))
+                .collect(),
+            definition: model
+                .definitions
+                .iter()
+                .map(|definition| definition.source().clone())
+                .collect(),
             training: model.training.clone(),
             law: model.law.clone(),
         }
     }
 
     /// The model, or the key and what is wrong with it.
-    fn into_model(self) -> Result<Model, (String, String)> {
+    fn into_model(
+        self,
+        definitions: Vec<&'static Definition>,
+    ) -> Result<Model, (String, String)> {
         fn wrong<T>(key: &str, problem: String) -> Result<T, (String, String)> {
             Err((key.to_owned(), problem))
         }
@@ -356,8 +382,7 @@ impl File {
         if let Some(fault) = self.law.as_ref().and_then(Law::fault) {
             return Err(fault);
         }
-        let added = self.effect.into_iter().map(EffectTable::into_added);
-        Ok(Model {
+        let mut model = Model {
             sample_period_s: self.sample_period_s,
             convention,
             averaging: Averaging {
@@ -377,16 +402,29 @@ impl File {
             b: self.coefficients.b,
             c,
             delay: self.delay,
-            effects: added.collect::<Result<_, _>>()?,
+            effects: Vec::new(),
+            definitions: Vec::new(),
             training: self.training,
             law: self.law,
-        })
+        };
+        for definition in definitions {
+            let name = definition.spec().name;
+            if model.definition(name).is_some() {
+                return wrong(&format!("definition.{name}"), "it is there twice".into());
+            }
+            model.definitions.push(definition);
+        }
+        for table in self.effect {
+            let added = table.into_added(&model)?;
+            model.effects.push(added);
+        }
+        Ok(model)
     }
 }
 
 impl EffectTable {
-    fn of(added: &Added) -> Self {
-        let names = effects::spec(&added.name).map_or(&[][..], |spec| spec.parameters);
+    fn of(added: &Added, spec: Option<&Spec>) -> Self {
+        let names = spec.map_or(&[][..], |spec| spec.parameters);
         let pairs = names.iter().zip(&added.parameters);
         Self {
             name: added.name.clone(),
@@ -398,10 +436,10 @@ impl EffectTable {
         }
     }
 
-    fn into_added(self) -> Result<Added, (String, String)> {
+    fn into_added(self, model: &Model) -> Result<Added, (String, String)> {
         let key = format!("effect.{}", self.name);
-        let Some(spec) = effects::spec(&self.name) else {
-            let problem = "no such effect in the catalogue; `host-fit effects` lists them";
+        let Some(spec) = model.spec(&self.name) else {
+            let problem = "no such effect in the catalogue (`host-fit effects` lists them), nor under `[[definition]]`";
             return Err((key, problem.to_owned()));
         };
         if spec.channel.is_some() && (self.channel.is_none() || self.reference.is_none()) {
@@ -460,11 +498,12 @@ mod tests {
                 delays: vec![49, 417],
             },
             effects: Vec::new(),
+            definitions: Vec::new(),
             training: Training::default(),
             law: None,
         };
         for name in ["hot-film-lag", "valve-lag"] {
-            let spec = effects::spec(name).expect("in the catalogue");
+            let spec = model.spec(name).expect("in the catalogue");
             let values: Vec<f64> = spec.parameters.iter().map(|p| p.starts[0]).collect();
             model.add(spec, &values, None);
         }

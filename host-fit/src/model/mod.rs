@@ -1,20 +1,25 @@
 //! An identified model with sizes known at run time.
 
 mod envelope;
+mod chain;
 mod file;
 mod law;
 mod parameters;
 mod prepared;
 
+pub use chain::{Chain, HostEffect, HostState};
 pub use file::{FORMAT_VERSION, ModelError};
 pub use law::{Hold, Law, Maximise, Track};
 pub use parameters::{Coordinate, Kind};
-pub use prepared::{AnyDelay, Chain, Prepared, Rounding};
+pub use prepared::{AnyDelay, Prepared, Rounding};
 
+use crate::user_effect::Definition;
 use model_core::effect::{Place, Spec};
+use model_core::effects::SPECS;
 use model_core::model::Averaging;
 use model_core::recursion::{Grading, LagConvention};
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 /// A bilinear model, eqs. (3), (4), (14) or (15), with its effects and with
 /// what is known of its origin.
@@ -46,10 +51,23 @@ pub struct Model {
     pub delay: Delay,
     /// Effects in the order of the physics, delay laws not among them.
     pub effects: Vec<Added>,
+    /// The user's own effects that the model knows, whether it has them or not.
+    pub definitions: Vec<&'static Definition>,
     /// What the model was trained on.
     pub training: Training,
     /// The control law designed for the model, if one was.
     pub law: Option<Law>,
+}
+
+/// A model has an effect of the same name, defined otherwise.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error(
+    "the model has an effect `{name}` that is defined otherwise. \
+     Give the new one another name, or start from a model without it."
+)]
+pub struct DefineError {
+    /// The name.
+    pub name: String,
 }
 
 /// How a free run begins.
@@ -162,7 +180,48 @@ impl Model {
     }
 
     fn place_of(&self, added: &Added) -> Option<Place> {
-        model_core::effects::spec(&added.name).map(|spec| spec.place)
+        self.spec(&added.name).map(|spec| spec.place)
+    }
+
+    /// Every effect that the model could have: the catalogue, then the user's own.
+    pub fn candidates(&self) -> impl Iterator<Item = &'static Spec> {
+        let own = self.definitions.iter().map(|definition| definition.spec());
+        SPECS.iter().chain(own)
+    }
+
+    /// The effect called `name`: of the catalogue, or the user's own.
+    #[must_use]
+    pub fn spec(&self, name: &str) -> Option<&'static Spec> {
+        self.candidates().find(|spec| spec.name == name)
+    }
+
+    /// The definition of the user's own effect called `name`.
+    #[must_use]
+    pub fn definition(&self, name: &str) -> Option<&'static Definition> {
+        let mut own = self.definitions.iter().copied();
+        own.find(|definition| definition.spec().name == name)
+    }
+
+    /// Makes a user's own effect known to the model, so that it can be added.
+    /// One of the same name takes the place of the other, unless the model has
+    /// that effect.
+    ///
+    /// # Errors
+    /// [`DefineError`] if the model has another effect of that name.
+    pub fn define(&mut self, definition: &'static Definition) -> Result<(), DefineError> {
+        let name = definition.spec().name;
+        match self.definition(name) {
+            Some(known) if known == definition => return Ok(()),
+            Some(_) if self.effects.iter().any(|added| added.name == name) => {
+                return Err(DefineError {
+                    name: name.to_owned(),
+                });
+            }
+            _ => {}
+        }
+        self.definitions.retain(|known| known.spec().name != name);
+        self.definitions.push(definition);
+        Ok(())
     }
 
     /// N3.
@@ -221,8 +280,8 @@ impl Model {
         names
     }
 
-    /// Adds an effect of the catalogue at its first starting values, where the
-    /// physics has its place. A delay law replaces the one there is.
+    /// Adds an effect with the values `parameters`, where the physics has its
+    /// place: of the catalogue, or a user's own that was [defined](Self::define). A delay law replaces the one there is.
     pub fn add(&mut self, spec: &'static Spec, parameters: &[f64], reference: Option<f64>) {
         match (spec.name, parameters) {
             ("state-dependent-delay", &[delay_floor, delay_rise, delay_rate]) => {
@@ -256,12 +315,16 @@ impl Model {
                     channel: spec.channel.map(str::to_owned),
                     reference,
                 });
-                let order = |added: &Added| {
-                    model_core::effects::SPECS
-                        .iter()
-                        .position(|spec| spec.name == added.name)
+                // By place, within a place as the catalogue has them, the user's last.
+                let order: Vec<(Place, &str)> = self
+                    .candidates()
+                    .map(|spec| (spec.place, spec.name))
+                    .collect();
+                let rank = |added: &Added| {
+                    let index = order.iter().position(|(_, name)| *name == added.name);
+                    (index.map(|index| order[index].0), index)
                 };
-                self.effects.sort_by_key(order);
+                self.effects.sort_by_key(rank);
             }
         }
     }

@@ -1,8 +1,7 @@
 //! A model's parameters as one vector, for whoever searches or differentiates.
 
 use super::{Added, Delay, Model};
-use model_core::effect::{Influence, Parameter, Spec};
-use model_core::effects;
+use model_core::effect::{Influence, Parameter};
 
 /// What a coordinate of the parameter vector is.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,11 +41,11 @@ impl Coordinate {
     }
 }
 
-fn parameters_of(name: &str) -> &'static [Parameter] {
-    effects::spec(name).map_or(&[], |spec: &Spec| spec.parameters)
-}
-
 impl Model {
+    fn parameters_of(&self, name: &str) -> &'static [Parameter] {
+        self.spec(name).map_or(&[], |spec| spec.parameters)
+    }
+
     /// What the coordinates of the parameter vector are: d, a, b, c (by
     /// columns), the delay law's, then each effect's.
     #[must_use]
@@ -61,13 +60,13 @@ impl Model {
         let lags = self.product_lags.len();
         all.extend((0..self.c.len()).map(|i| linear(format!("c{}{}", i % lags + 1, i / lags + 1))));
         if let Some(name) = self.delay.effect_name() {
-            all.extend(parameters_of(name).iter().map(|parameter| Coordinate {
+            all.extend(self.parameters_of(name).iter().map(|parameter| Coordinate {
                 name: format!("{name}.{}", parameter.name),
                 kind: Kind::Delay(*parameter),
             }));
         }
         for (index, added) in self.effects.iter().enumerate() {
-            let parameters = parameters_of(&added.name);
+            let parameters = self.parameters_of(&added.name);
             all.extend(parameters.iter().map(|parameter| Coordinate {
                 name: format!("{}.{}", added.name, parameter.name),
                 kind: Kind::Effect(index, *parameter),

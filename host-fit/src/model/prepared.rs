@@ -1,13 +1,13 @@
 //! A model in numbers of one type, ready to run.
 
-use super::{Delay, Model};
+use super::{Chain, Delay, HostEffect, Model};
 use model_core::delay::{DelayLaw, FixedDelay, Tap};
-use model_core::effect::{Effect, Flow, Instant, Physics, Setting};
+use model_core::effect::{Physics, Setting};
 use model_core::effects::edge_dependent_delay::Run;
-use model_core::effects::{AnyEffect, EdgeDependentDelay, StateDependentDelay};
+use model_core::effects::{EdgeDependentDelay, StateDependentDelay};
 use model_core::model::{Averaging, Parts};
 use model_core::recursion::{Bilinear, Grading, LagConvention};
-use model_core::{Real, effects};
+use model_core::Real;
 
 /// A model prepared to run in numbers of type `T`.
 #[derive(Clone, Debug)]
@@ -210,7 +210,7 @@ impl Model {
             }
         };
         let channels = self.channels();
-        let effects: Vec<AnyEffect<T>> = self
+        let effects: Vec<HostEffect<T>> = self
             .effects
             .iter()
             .filter_map(|added| {
@@ -221,7 +221,7 @@ impl Model {
                     reference: T::from_f64(added.reference.unwrap_or(1.0)),
                 };
                 let parameters = many(added.parameters.len());
-                AnyEffect::new(&added.name, &parameters, &setting)
+                HostEffect::new(self, added, &parameters, &setting)
             })
             .collect();
         Prepared {
@@ -235,10 +235,7 @@ impl Model {
             b,
             c,
             delay,
-            effects: Chain {
-                drives: effects.iter().any(Effect::drives),
-                effects,
-            },
+            effects: Chain::new(effects),
         }
     }
 }

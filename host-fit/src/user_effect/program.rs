@@ -1,0 +1,382 @@
+//! An expression as a list of operations: what the interpreter runs and what
+//! Rust is generated from, so that both do the same in the same order.
+
+use model_core::Real;
+use std::cmp::Ordering;
+
+/// Index of the operation whose result is meant.
+pub(super) type Register = usize;
+
+/// A signal an expression can read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Signal {
+    /// What the effect is there to change: jet strength or sensor reading.
+    Own,
+    /// u.
+    Command,
+    /// y, the friction of the flow.
+    Flow,
+    /// The jet strength that arrives at the flow.
+    Arrived,
+    /// 1 − Σa − Σc·j of the recursion.
+    Relaxation,
+    /// The measured channel.
+    Channel,
+    /// Time in the record, s.
+    Time,
+    /// Time since the last edge, s.
+    SinceEdge,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Unary {
+    Negative,
+    Abs,
+    Sqrt,
+    Exp,
+    Cbrt,
+    Sin,
+    Cos,
+    Not,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Binary {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Min,
+    Max,
+    Less,
+    LessOrEqual,
+    Greater,
+    GreaterOrEqual,
+    Equal,
+    Unequal,
+    And,
+    Or,
+}
+
+impl Binary {
+    pub(super) fn compares(self) -> bool {
+        matches!(
+            self,
+            Self::Less
+                | Self::LessOrEqual
+                | Self::Greater
+                | Self::GreaterOrEqual
+                | Self::Equal
+                | Self::Unequal
+        )
+    }
+}
+
+/// One operation; operands are results of earlier ones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Op {
+    Number(f64),
+    Parameter(usize),
+    Period,
+    Reference,
+    Signal(Signal),
+    /// A state as the last sample left it.
+    State(usize),
+    /// `signal` as it was `delay` seconds ago; `line` numbers the memories.
+    Delayed {
+        line: usize,
+        signal: Register,
+        delay: Register,
+    },
+    Unary(Unary, Register),
+    Binary(Binary, Register, Register),
+    Select {
+        condition: Register,
+        then: Register,
+        otherwise: Register,
+    },
+}
+
+impl Op {
+    pub(super) fn operands(&self) -> impl Iterator<Item = Register> + use<> {
+        let all = match *self {
+            Self::Number(_)
+            | Self::Parameter(_)
+            | Self::Period
+            | Self::Reference
+            | Self::Signal(_)
+            | Self::State(_) => [None; 3],
+            Self::Delayed { signal, delay, .. } => [Some(signal), Some(delay), None],
+            Self::Unary(_, x) => [Some(x), None, None],
+            Self::Binary(_, x, y) => [Some(x), Some(y), None],
+            Self::Select {
+                condition,
+                then,
+                otherwise,
+            } => [Some(condition), Some(then), Some(otherwise)],
+        };
+        all.into_iter().flatten()
+    }
+
+    fn with_operands(self, to: impl Fn(Register) -> Register) -> Self {
+        match self {
+            Self::Delayed {
+                line,
+                signal,
+                delay,
+            } => Self::Delayed {
+                line,
+                signal: to(signal),
+                delay: to(delay),
+            },
+            Self::Unary(f, x) => Self::Unary(f, to(x)),
+            Self::Binary(f, x, y) => Self::Binary(f, to(x), to(y)),
+            Self::Select {
+                condition,
+                then,
+                otherwise,
+            } => Self::Select {
+                condition: to(condition),
+                then: to(then),
+                otherwise: to(otherwise),
+            },
+            Self::Number(_)
+            | Self::Parameter(_)
+            | Self::Period
+            | Self::Reference
+            | Self::Signal(_)
+            | Self::State(_) => self,
+        }
+    }
+}
+
+/// A state that is carried from sample to sample.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Carried {
+    pub(super) name: String,
+    pub(super) start: f64,
+    /// Its next value.
+    pub(super) update: Register,
+}
+
+/// What an effect does at a sample.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Program {
+    pub(super) ops: Vec<Op>,
+    /// Whether an operation's result is the same at every sample.
+    pub(super) once: Vec<bool>,
+    pub(super) states: Vec<Carried>,
+    /// Memories for delayed signals.
+    pub(super) lines: usize,
+    pub(super) value: Register,
+}
+
+/// Appends operations, each one once.
+#[derive(Debug, Default)]
+pub(super) struct Builder {
+    ops: Vec<Op>,
+}
+
+impl Builder {
+    pub(super) fn push(&mut self, op: Op) -> Register {
+        if let Some(same) = self.ops.iter().position(|known| *known == op) {
+            return same;
+        }
+        self.ops.push(op);
+        self.ops.len() - 1
+    }
+
+    pub(super) fn delayed(&mut self, signal: Register, delay: Register) -> Register {
+        let lines = self.ops.iter().filter_map(|op| match op {
+            Op::Delayed {
+                line,
+                signal: s,
+                delay: d,
+            } if *s == signal && *d == delay => Some(*line),
+            _ => None,
+        });
+        let known = lines.last();
+        let count = self
+            .ops
+            .iter()
+            .filter(|op| matches!(op, Op::Delayed { .. }))
+            .count();
+        self.push(Op::Delayed {
+            line: known.unwrap_or(count),
+            signal,
+            delay,
+        })
+    }
+
+    pub(super) fn is_once(&self, register: Register) -> bool {
+        once(&self.ops).get(register).copied().unwrap_or(false)
+    }
+
+    pub(super) fn is_number(&self, register: Register) -> bool {
+        matches!(self.ops.get(register), Some(Op::Number(_)))
+    }
+
+    /// Leaves out what has no influence on `value`, and numbers the rest anew.
+    pub(super) fn finish(self, value: Register, states: Vec<Carried>) -> Program {
+        let mut alive = vec![false; self.ops.len()];
+        let mut pending = vec![value];
+        while let Some(register) = pending.pop() {
+            let (Some(seen), Some(op)) = (alive.get_mut(register), self.ops.get(register)) else {
+                continue;
+            };
+            if std::mem::replace(seen, true) {
+                continue;
+            }
+            pending.extend(op.operands());
+            if let Op::State(index) = op {
+                pending.extend(states.get(*index).map(|state| state.update));
+            }
+        }
+        let renumbered = |kept: &dyn Fn(usize) -> bool, count: usize| -> Vec<usize> {
+            let mut next = 0;
+            let number = |i| {
+                let own = next;
+                next += usize::from(kept(i));
+                own
+            };
+            (0..count).map(number).collect()
+        };
+        let registers = renumbered(&|r| alive[r], self.ops.len());
+        let carried = |index: usize| {
+            let read = Op::State(index);
+            self.ops.iter().zip(&alive).any(|(op, alive)| *alive && *op == read)
+        };
+        let state_numbers = renumbered(&carried, states.len());
+        let line_alive = |line: usize| {
+            self.ops.iter().zip(&alive).any(|(op, alive)| {
+                *alive && matches!(op, Op::Delayed { line: own, .. } if *own == line)
+            })
+        };
+        let line_numbers = renumbered(&line_alive, self.ops.len());
+        let ops: Vec<Op> = self
+            .ops
+            .iter()
+            .zip(&alive)
+            .filter(|(_, alive)| **alive)
+            .map(|(op, _)| match op.with_operands(|r| registers[r]) {
+                Op::State(index) => Op::State(state_numbers[index]),
+                Op::Delayed {
+                    line,
+                    signal,
+                    delay,
+                } => Op::Delayed {
+                    line: line_numbers[line],
+                    signal,
+                    delay,
+                },
+                op => op,
+            })
+            .collect();
+        let kept = states.into_iter().enumerate().filter(|(i, _)| carried(*i));
+        let states = kept
+            .map(|(_, state)| Carried {
+                update: registers[state.update],
+                ..state
+            })
+            .collect();
+        Program {
+            once: once(&ops),
+            lines: ops
+                .iter()
+                .filter(|op| matches!(op, Op::Delayed { .. }))
+                .count(),
+            value: registers[value],
+            ops,
+            states,
+        }
+    }
+}
+
+fn once(ops: &[Op]) -> Vec<bool> {
+    let mut once: Vec<bool> = Vec::with_capacity(ops.len());
+    for op in ops {
+        let varies = matches!(op, Op::Signal(_) | Op::State(_) | Op::Delayed { .. });
+        let steady = |r: Register| once.get(r).copied().unwrap_or(false);
+        let own = !varies && op.operands().all(steady);
+        once.push(own);
+    }
+    once
+}
+
+impl Program {
+    pub(super) fn reads(&self, op: Op) -> bool {
+        self.ops.contains(&op)
+    }
+
+    /// Whether parameter `index` enters a comparison other than through a
+    /// state: then the output changes in steps with it.
+    pub(super) fn is_compared(&self, index: usize) -> bool {
+        let mut depends = vec![false; self.ops.len()];
+        for (register, op) in self.ops.iter().enumerate() {
+            depends[register] =
+                *op == Op::Parameter(index) || op.operands().any(|operand| depends[operand]);
+            if let Op::Binary(f, _, _) = op
+                && f.compares()
+                && depends[register]
+            {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// Truth as a number.
+fn truth<T: Real>(truth: bool) -> T {
+    if truth { T::ONE } else { T::ZERO }
+}
+
+fn holds<T: Real>(x: T) -> bool {
+    x.value() > 0.5
+}
+
+impl Unary {
+    #[inline]
+    pub(super) fn of<T: Real>(self, x: T) -> T {
+        match self {
+            Self::Negative => -x,
+            Self::Abs => x.abs(),
+            Self::Sqrt => x.sqrt(),
+            Self::Exp => x.exp(),
+            Self::Cbrt => x.cbrt(),
+            Self::Sin => x.sin(),
+            Self::Cos => x.cos(),
+            Self::Not => truth(!holds(x)),
+        }
+    }
+}
+
+impl Binary {
+    #[inline]
+    pub(super) fn of<T: Real>(self, x: T, y: T) -> T {
+        // Derivatives have no part in comparisons, `==` of dual numbers does.
+        let equal = || x.partial_cmp(&y) == Some(Ordering::Equal);
+        match self {
+            Self::Add => x + y,
+            Self::Subtract => x - y,
+            Self::Multiply => x * y,
+            Self::Divide => x / y,
+            Self::Min => x.at_most(y),
+            Self::Max => x.at_least(y),
+            Self::Less => truth(x < y),
+            Self::LessOrEqual => truth(x <= y),
+            Self::Greater => truth(x > y),
+            Self::GreaterOrEqual => truth(x >= y),
+            Self::Equal => truth(equal()),
+            Self::Unequal => truth(!equal()),
+            Self::And => truth(holds(x) && holds(y)),
+            Self::Or => truth(holds(x) || holds(y)),
+        }
+    }
+}
+
+/// `then` where `condition` holds.
+#[inline]
+pub(super) fn select<T: Real>(condition: T, then: T, otherwise: T) -> T {
+    if holds(condition) { then } else { otherwise }
+}

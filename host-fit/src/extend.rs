@@ -13,7 +13,6 @@ use crate::fit::{CandidateError, Fit, FitOptions, fit, fit_with_effect, lean_bas
 use crate::model::{Model, Start};
 use crate::simulate::SimulateError;
 use model_core::effect::Spec;
-use model_core::effects::{SPECS, spec};
 use thiserror::Error;
 
 /// The lean model is kept when its error is within this factor of the other's.
@@ -23,9 +22,14 @@ const AS_GOOD: f64 = 1.02;
 #[derive(Clone, Debug, Error)]
 #[non_exhaustive]
 pub enum ExtendError {
-    /// The catalogue has no such effect.
-    #[error("{}", nearest_name(.0))]
-    Unknown(String),
+    /// Neither the catalogue nor the user's effect files have such an effect.
+    #[error("{}", nearest_name(.name, .known))]
+    Unknown {
+        /// The name.
+        name: String,
+        /// What is known: the catalogue, and the user's own effects.
+        known: Vec<&'static str>,
+    },
     /// The effect is in the model, or was named twice.
     #[error(
         "effect `{0}` is in the model already; each effect can be there once. Leave out this `--effect`."
@@ -67,12 +71,12 @@ pub struct Extended {
     pub identify_rmse: f64,
 }
 
-/// The message for a name that the catalogue does not have.
+/// The message for a name that is not among the `known` ones.
 #[must_use]
-pub fn nearest_name(name: &str) -> String {
-    let nearest = SPECS
+pub fn nearest_name(name: &str, known: &[&str]) -> String {
+    let nearest = known
         .iter()
-        .map(|spec| (distance(name, spec.name), spec.name))
+        .map(|known| (distance(name, known), *known))
         .min();
     let hint = match nearest {
         Some((edits, nearest)) if edits <= 1 + nearest.len() / 3 => {
@@ -80,11 +84,10 @@ pub fn nearest_name(name: &str) -> String {
         }
         _ => String::new(),
     };
-    let all: Vec<&str> = SPECS.iter().map(|spec| spec.name).collect();
     format!(
         "there is no effect `{}` in the catalogue.{hint} The effects are: {}; `host-fit effects` explains them.",
         name.escape_debug(),
-        all.join(", ")
+        known.join(", ")
     )
 }
 
@@ -108,7 +111,8 @@ fn distance(a: &str, b: &str) -> usize {
     row.last().copied().unwrap_or(0)
 }
 
-/// The catalogue's entries for `names`, which are new to `model`.
+/// The effects called `names`, which are new to `model`: of the catalogue, or
+/// the user's own that the model knows.
 ///
 /// # Errors
 /// [`ExtendError::Unknown`] and [`ExtendError::Doubled`].
@@ -116,7 +120,10 @@ pub fn effects_for(model: &Model, names: &[String]) -> Result<Vec<&'static Spec>
     let mut present = model.effect_names();
     let mut specs = Vec::new();
     for name in names {
-        let found = spec(name).ok_or_else(|| ExtendError::Unknown(name.clone()))?;
+        let found = model.spec(name).ok_or_else(|| ExtendError::Unknown {
+            name: name.clone(),
+            known: model.candidates().map(|spec| spec.name).collect(),
+        })?;
         if present.contains(name) {
             return Err(ExtendError::Doubled(name.clone()));
         }
@@ -236,9 +243,10 @@ mod tests {
         assert_eq!(distance("kitten", "sitting"), 3);
         assert_eq!(distance("", "abc"), 3);
         assert_eq!(distance("abc", ""), 3);
-        let text = nearest_name("plenum-drop");
+        let known = ["valve-lag", "plenum-droop"];
+        let text = nearest_name("plenum-drop", &known);
         assert!(text.contains("Did you mean `plenum-droop`?"), "{text}");
-        let text = nearest_name("x\n");
+        let text = nearest_name("x\n", &known);
         assert!(
             !text.contains("Did you mean") && !text.contains('\n'),
             "{text}"

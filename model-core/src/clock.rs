@@ -72,7 +72,14 @@ mod tests {
             seen.push((clock.time(1.0), clock.since_edge(1.0)));
         }
         let never = LONG_AGO as f32;
-        let expected = [(0.0, never), (1.0, 0.0), (2.0, 1.0), (3.0, 0.0), (4.0, 1.0), (5.0, 2.0)];
+        let expected = [
+            (0.0, never),
+            (1.0, 0.0),
+            (2.0, 1.0),
+            (3.0, 0.0),
+            (4.0, 1.0),
+            (5.0, 2.0),
+        ];
         assert_eq!(seen, expected);
     }
 

@@ -150,6 +150,7 @@ fn given(case: &Case) -> Model {
             interpolated: false,
         },
         effects: Vec::new(),
+        definitions: Vec::new(),
         law: None,
         training: Training::default(),
     };

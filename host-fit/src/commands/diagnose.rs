@@ -15,6 +15,7 @@ use host_fit::picture::{
 
 use super::Console;
 use super::compare::{load, provenance};
+use super::effect_files::EffectFiles;
 use super::interrupt::watch;
 use super::scores::{aligned, describe, overlays, report_table, short};
 
@@ -42,6 +43,8 @@ pub(crate) struct Args {
     /// Seed of the decoys.
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    effect_files: EffectFiles,
 }
 
 #[derive(serde::Serialize)]
@@ -56,7 +59,8 @@ struct Document<'a> {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
-    let (model, set) = load(&args.model, &args.dataset)?;
+    let (mut model, set) = load(&args.model, &args.dataset)?;
+    args.effect_files.define(&mut model)?;
     let records = model.targets(&set.records);
     let options = Options {
         most_effects: args.most_effects as usize,

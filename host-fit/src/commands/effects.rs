@@ -79,7 +79,8 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         return console.document(&SPECS.iter().map(entry).collect::<Vec<_>>());
     };
     let Some(spec) = spec(name) else {
-        bail!("{}", nearest_name(name));
+        let known: Vec<&str> = SPECS.iter().map(|spec| spec.name).collect();
+        bail!("{}", nearest_name(name, &known));
     };
     console.say(&words(spec))?;
     console.document(&entry(spec))

@@ -10,6 +10,7 @@ use host_fit::model::Training;
 
 use super::Console;
 use super::compare::load;
+use super::effect_files::EffectFiles;
 use super::scores::{aligned, describe, role_name, short};
 
 /// Add physical effects to a model, refit everything, and show the held-out error before and after.
@@ -21,12 +22,14 @@ pub(crate) struct Args {
     /// Folder with dataset.toml, or one CSV file.
     #[arg(value_name = "DATASET")]
     dataset: PathBuf,
-    /// Effect to add, by its name in `host-fit effects`; repeatable.
+    /// Effect to add, by its name in `host-fit effects` or in an effect file; repeatable.
     #[arg(long, value_name = "NAME", required = true)]
     effect: Vec<String>,
     /// File for the new model.
     #[arg(short, long, value_name = "new.toml")]
     output: PathBuf,
+    #[command(flatten)]
+    effect_files: EffectFiles,
 }
 
 #[derive(serde::Serialize)]
@@ -84,7 +87,8 @@ pub(crate) fn parameter_table(parameters: &BTreeMap<String, &ParameterEstimate>)
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
-    let (model, set) = load(&args.model, &args.dataset)?;
+    let (mut model, set) = load(&args.model, &args.dataset)?;
+    args.effect_files.define(&mut model)?;
     let records = model.targets(&set.records);
     let bar = console.spinner("refitting everything");
     // A model that diverges on these records can still be extended.

@@ -263,10 +263,7 @@ impl File {
     }
 
     /// The model, or the key and what is wrong with it.
-    fn into_model(
-        self,
-        definitions: Vec<&'static Definition>,
-    ) -> Result<Model, (String, String)> {
+    fn into_model(self, definitions: Vec<&'static Definition>) -> Result<Model, (String, String)> {
         fn wrong<T>(key: &str, problem: String) -> Result<T, (String, String)> {
             Err((key.to_owned(), problem))
         }

@@ -1,7 +1,7 @@
 //! An identified model with sizes known at run time.
 
-mod envelope;
 mod chain;
+mod envelope;
 mod file;
 mod law;
 mod parameters;

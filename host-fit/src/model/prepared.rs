@@ -1,13 +1,13 @@
 //! A model in numbers of one type, ready to run.
 
 use super::{Chain, Delay, HostEffect, Model};
+use model_core::Real;
 use model_core::delay::{DelayLaw, FixedDelay, Tap};
 use model_core::effect::{Physics, Setting};
 use model_core::effects::edge_dependent_delay::Run;
 use model_core::effects::{EdgeDependentDelay, StateDependentDelay};
 use model_core::model::{Averaging, Parts};
 use model_core::recursion::{Bilinear, Grading, LagConvention};
-use model_core::Real;
 
 /// A model prepared to run in numbers of type `T`.
 #[derive(Clone, Debug)]

@@ -83,7 +83,10 @@ impl Compiler {
     /// The register that holds the value of `text`, a number.
     pub(super) fn number(&mut self, text: &str) -> Result<Register, Fault> {
         let tokens = TokenStream::from_str(text).map_err(|error| {
-            Fault::at(error.span(), "this cannot be read as Rust; look for an unclosed bracket or quote")
+            Fault::at(
+                error.span(),
+                "this cannot be read as Rust; look for an unclosed bracket or quote",
+            )
         })?;
         check_tokens(&tokens)?;
         let statements = Block::parse_within
@@ -93,12 +96,19 @@ impl Compiler {
         let whole = Span::call_site();
         let result = self.statements(&statements, whole);
         self.names.truncate(known);
-        expect(result?, Kind::Number, statements.last().map_or(whole, Spanned::span))
+        expect(
+            result?,
+            Kind::Number,
+            statements.last().map_or(whole, Spanned::span),
+        )
     }
 
     fn statements(&mut self, statements: &[Stmt], place: Span) -> Result<Typed, Fault> {
         let Some((last, before)) = statements.split_last() else {
-            return Err(Fault::at(place, "there is no value here; write an expression"));
+            return Err(Fault::at(
+                place,
+                "there is no value here; write an expression",
+            ));
         };
         for statement in before {
             self.binding(statement)?;
@@ -341,7 +351,10 @@ fn expect(value: Typed, kind: Kind, place: Span) -> Result<Register, Fault> {
 }
 
 fn outside(what: &impl Spanned) -> Fault {
-    Fault::at(what.span(), format!("this is outside the language of effects: {SUBSET}"))
+    Fault::at(
+        what.span(),
+        format!("this is outside the language of effects: {SUBSET}"),
+    )
 }
 
 /// Refuses what no expression of the subset contains, before the parser of
@@ -357,7 +370,8 @@ fn check_tokens(tokens: &TokenStream) -> Result<(), Fault> {
         count += 1;
         let span = token.span();
         if count > MOST_TOKENS {
-            let problem = format!("the expression is too long: more than {MOST_TOKENS} words and signs");
+            let problem =
+                format!("the expression is too long: more than {MOST_TOKENS} words and signs");
             return Err(Fault::at(span, problem));
         }
         match token {
@@ -372,7 +386,10 @@ fn check_tokens(tokens: &TokenStream) -> Result<(), Fault> {
                 open.push(group.stream().into_iter());
             }
             TokenTree::Punct(sign) if !PUNCTUATION.contains(sign.as_char()) => {
-                let problem = format!("`{}` is outside the language of effects: {SUBSET}", sign.as_char());
+                let problem = format!(
+                    "`{}` is outside the language of effects: {SUBSET}",
+                    sign.as_char()
+                );
                 return Err(Fault::at(span, problem));
             }
             TokenTree::Ident(word) => {

@@ -150,7 +150,11 @@ impl<T: Real> Effect<T> for UserEffect<T> {
         UserState {
             results: self.results.clone(),
             states: starts.map(|state| T::from_f64(state.start)).collect(),
-            lines: self.line_lengths().into_iter().map(Ring::reaching).collect(),
+            lines: self
+                .line_lengths()
+                .into_iter()
+                .map(Ring::reaching)
+                .collect(),
             clock: Clock::new(),
         }
     }

@@ -234,7 +234,10 @@ fn is_identifier(name: &str) -> bool {
 /// A name of an effect: words of small letters and digits joined by hyphens.
 fn is_effect_name(name: &str) -> bool {
     let word = |word: &str| {
-        !word.is_empty() && word.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit())
+        !word.is_empty()
+            && word
+                .chars()
+                .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit())
     };
     name.len() <= 40
         && name.starts_with(|c: char| c.is_ascii_lowercase())
@@ -260,7 +263,10 @@ impl Source {
             return key("name", problem);
         }
         if model_core::effects::spec(&self.name).is_some() {
-            let problem = format!("`{}` is in the catalogue already; take another name", self.name);
+            let problem = format!(
+                "`{}` is in the catalogue already; take another name",
+                self.name
+            );
             return key("name", problem);
         }
         if self.summary.trim().is_empty() || self.summary.contains(['\n', '\r']) {
@@ -322,9 +328,9 @@ impl Source {
         }
         let mut states = Vec::with_capacity(self.state.len());
         for state in &self.state {
-            let update = compiler
-                .number(&state.update)
-                .map_err(|fault| Refusal::Expression(format!("state.{}.update", state.name), fault))?;
+            let update = compiler.number(&state.update).map_err(|fault| {
+                Refusal::Expression(format!("state.{}.update", state.name), fault)
+            })?;
             // From here on the name is the state's new value.
             let kind = expression::Kind::Number;
             let value = Meaning::Value(expression::Typed {
@@ -348,7 +354,8 @@ impl Source {
         let program = compiler.builder.finish(value, states);
         for (index, parameter) in self.parameter.iter().enumerate() {
             if !program.reads(Op::Parameter(index)) {
-                let problem = "it has no influence; use it in the expression or remove it".to_owned();
+                let problem =
+                    "it has no influence; use it in the expression or remove it".to_owned();
                 return key(&format!("parameter.{}", parameter.name), problem);
             }
         }
@@ -363,22 +370,30 @@ impl Source {
         fn keep(text: &str) -> &'static str {
             String::leak(text.to_owned())
         }
-        let parameters = self.parameter.iter().enumerate().map(|(index, parameter)| Parameter {
-            name: keep(&parameter.name),
-            unit: keep(&parameter.unit),
-            low: parameter.low,
-            high: parameter.high,
-            starts: Vec::leak(parameter.starts.clone()),
-            influence: if program.is_compared(index) {
-                Influence::Stepwise
-            } else {
-                Influence::Smooth
-            },
-        });
+        let parameters = self
+            .parameter
+            .iter()
+            .enumerate()
+            .map(|(index, parameter)| Parameter {
+                name: keep(&parameter.name),
+                unit: keep(&parameter.unit),
+                low: parameter.low,
+                high: parameter.high,
+                starts: Vec::leak(parameter.starts.clone()),
+                influence: if program.is_compared(index) {
+                    Influence::Stepwise
+                } else {
+                    Influence::Smooth
+                },
+            });
         let parameters: Vec<Parameter> = parameters.collect();
         Spec {
             name: keep(&self.name),
-            rust: keep(&format!("{}::{}", module_name(&self.name), type_name(&self.name))),
+            rust: keep(&format!(
+                "{}::{}",
+                module_name(&self.name),
+                type_name(&self.name)
+            )),
             place: self.place(),
             summary: keep(&self.summary),
             equation: keep(&self.equation()),
@@ -412,13 +427,429 @@ impl SourceParameter {
         if !(finite(&self.low) && finite(&self.high) && self.low < self.high) {
             return Err("`low` and `high` are finite, and `low` is below `high`".to_owned());
         }
-        if self.starts.is_empty() || !self.starts.iter().all(|s| (self.low..=self.high).contains(s))
+        if self.starts.is_empty()
+            || !self
+                .starts
+                .iter()
+                .all(|s| (self.low..=self.high).contains(s))
         {
-            return Err("`starts` needs at least one value, all of them from `low` to `high`".to_owned());
+            return Err(
+                "`starts` needs at least one value, all of them from `low` to `high`".to_owned(),
+            );
         }
         if self.unit.trim().is_empty() || self.unit.contains(['\n', '\r']) {
             return Err("`unit` is a unit in words, `-` for none".to_owned());
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dual::Dual;
+    use model_core::Real;
+    use model_core::effect::{Effect, Flow, Instant, Setting};
+    use model_core::effects::AnyEffect;
+    use proptest::prelude::*;
+
+    const PICKUP: &str = r#"
+name = "own-pickup"
+place = "sensor"
+summary = "the command shows in the reading at once"
+expression = "reading + gain * u"
+[[parameter]]
+name = "gain"
+unit = "y"
+low = -0.5
+high = 0.5
+starts = [0.05]
+"#;
+
+    const VALVE: &str = r#"
+name = "own-valve"
+place = "jet"
+summary = "the valve opens and closes gradually"
+expression = "opening"
+[[state]]
+name = "opening"
+update = """
+let time = if jet > opening { opening_time } else { closing_time };
+opening + (jet - opening) * (1.0 - exp(-period / time))"""
+[[parameter]]
+name = "opening_time"
+unit = "s"
+low = 0.001
+high = 0.05
+starts = [0.004, 0.015]
+[[parameter]]
+name = "closing_time"
+unit = "s"
+low = 0.001
+high = 0.1
+starts = [0.004, 0.025]
+"#;
+
+    const ECHO: &str = r#"
+name = "own-echo"
+place = "jet"
+summary = "the jet arrives a second time, later"
+expression = "jet + gain * delayed(jet, echo_delay)"
+[[parameter]]
+name = "gain"
+unit = "-"
+low = -1.0
+high = 1.0
+starts = [0.2]
+[[parameter]]
+name = "echo_delay"
+unit = "s"
+low = 0.02
+high = 0.5
+starts = [0.05]
+"#;
+
+    const CUBIC: &str = r#"
+name = "own-cubic"
+place = "flow"
+summary = "a restoring force with the cube of the friction"
+expression = "-(cubic * relaxation) * (y * y * y)"
+[[parameter]]
+name = "cubic"
+unit = "1/y²"
+low = 0.0
+high = 5.0
+starts = [0.1]
+"#;
+
+    fn definition(text: &str) -> &'static Definition {
+        match Definition::from_toml(text, "own.toml") {
+            Ok(definition) => definition,
+            Err(error) => panic!("{error}"),
+        }
+    }
+
+    fn setting<T: Real>() -> Setting<T> {
+        Setting {
+            period: T::from_f64(0.001),
+            channel: 0,
+            reference: T::from_f64(10.0),
+        }
+    }
+
+    /// What an effect makes of an on/off command and a friction that follows it.
+    fn response<T: Real, E: Effect<T>>(effect: &E) -> Vec<T> {
+        let mut state = effect.start();
+        let mut y = T::ZERO;
+        let mut before = T::ZERO;
+        (0..400)
+            .map(|k| {
+                let u = if k / 37 % 2 == 1 { T::ONE } else { T::ZERO };
+                let channel = [T::from_f64(10.0 + f64::from(k) * 0.01)];
+                let at = Instant {
+                    command: u,
+                    flow: y,
+                    arrived: u,
+                    channels: &channel,
+                };
+                let flow = Flow {
+                    now: y,
+                    before,
+                    relaxation: T::from_f64(0.05),
+                };
+                let jet = effect.jet(&mut state, u, &at);
+                let reading = effect.sense(&mut state, y, &at);
+                let drive = effect.drive(&mut state, &flow, &at);
+                before = y;
+                y = y + (jet - y) * T::from_f64(0.05) + drive * T::from_f64(0.01);
+                reading + y
+            })
+            .collect()
+    }
+
+    fn same_bits<T: Real>(name: &str, own: &str, parameters: &[f64], bits: impl Fn(T) -> u64) {
+        let values: Vec<T> = parameters.iter().map(|p| T::from_f64(*p)).collect();
+        let known = AnyEffect::new(name, &values, &setting()).expect("in the catalogue");
+        let own = UserEffect::new(definition(own), &values, &setting());
+        let pairs = response(&known).into_iter().zip(response(&own));
+        for (k, (known, own)) in pairs.enumerate() {
+            assert_eq!(bits(known), bits(own), "{name}, sample {k}");
+        }
+    }
+
+    #[test]
+    fn effects_of_the_catalogue_written_again_give_the_same_bits() {
+        let cases: [(&str, &str, &[f64]); 4] = [
+            ("electrical-pickup", PICKUP, &[0.07]),
+            ("valve-lag", VALVE, &[0.012, 0.033]),
+            ("echo-path", ECHO, &[-0.31, 0.0477]),
+            ("amplitude-saturation", CUBIC, &[0.8]),
+        ];
+        for (name, own, parameters) in cases {
+            same_bits::<f64>(name, own, parameters, f64::to_bits);
+            same_bits::<f32>(name, own, parameters, |x| x.to_bits().into());
+        }
+    }
+
+    #[test]
+    fn derivatives_are_those_of_finite_differences() {
+        for (own, parameters) in [
+            (PICKUP, &[0.07][..]),
+            (VALVE, &[0.012, 0.033]),
+            (ECHO, &[-0.31, 0.0477]),
+            (CUBIC, &[0.8]),
+        ] {
+            let own = definition(own);
+            let run = |values: &[f64]| response(&UserEffect::new(own, values, &setting()));
+            for index in 0..parameters.len() {
+                let duals: Vec<Dual<1>> = parameters
+                    .iter()
+                    .enumerate()
+                    .map(|(i, p)| {
+                        if i == index {
+                            Dual::parameter(*p, 0)
+                        } else {
+                            Dual::constant(*p)
+                        }
+                    })
+                    .collect();
+                let exact = response(&UserEffect::new(own, &duals, &setting()));
+                let step = 1e-7;
+                let moved = |by: f64| {
+                    let mut moved = parameters.to_vec();
+                    moved[index] += by;
+                    run(&moved)
+                };
+                let secants = moved(step).into_iter().zip(moved(-step));
+                for (k, (dual, (high, low))) in exact.iter().zip(secants).enumerate() {
+                    let secant = (high - low) / (2.0 * step);
+                    let error = (dual.partials[0] - secant).abs();
+                    assert!(
+                        error < 1e-6 * (1.0 + secant.abs()),
+                        "{} {index} {k}: {} {secant}",
+                        own.spec().name,
+                        dual.partials[0]
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn clocks_channels_and_conditions_mean_what_they_say() {
+        let text = r#"
+name = "clocks"
+place = "sensor"
+summary = "every signal a sensor has"
+channel = "temperature"
+expression = """
+let late = t >= 2.0 * period && !(since_edge > 1.5 * period);
+if late || u == 1.0 { t + since_edge } else { (temperature - reference).min(0.0) + last }"""
+[[state]]
+name = "last"
+start = 0.5
+update = "reading"
+"#;
+        let effect = UserEffect::new(definition(text), &[], &setting::<f64>());
+        let mut state = effect.start();
+        let seen: Vec<f64> = [0.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+            .iter()
+            .enumerate()
+            .map(|(k, u)| {
+                let at = Instant {
+                    command: *u,
+                    flow: 0.0,
+                    arrived: 0.0,
+                    channels: &[9.0],
+                };
+                effect.sense(&mut state, k as f64, &at)
+            })
+            .collect();
+        let ms = 0.001;
+        assert_eq!(
+            seen,
+            [-1.0, ms, 2.0 * ms + ms, 3.0 * ms, 4.0 * ms + ms, 4.0]
+        );
+    }
+
+    #[test]
+    fn parameters_that_act_in_steps_are_known_to() {
+        let text = VALVE.replace("jet > opening", "jet > 10.0 * closing_time");
+        let spec = definition(&text.replace("own-valve", "threshold")).spec();
+        assert_eq!(spec.parameters[0].influence, Influence::Smooth);
+        assert_eq!(spec.parameters[1].influence, Influence::Stepwise);
+        let spec = definition(VALVE).spec();
+        assert_eq!(spec.parameters[1].influence, Influence::Smooth);
+    }
+
+    #[test]
+    fn equal_definitions_share_their_memory() {
+        assert!(std::ptr::eq(definition(PICKUP), definition(PICKUP)));
+    }
+
+    fn refusal(expression: &str) -> String {
+        let text = PICKUP.replace("reading + gain * u", expression);
+        let error = Definition::from_toml(&text, "own.toml").expect_err(expression);
+        error.to_string()
+    }
+
+    #[test]
+    fn what_is_outside_the_language_is_refused_with_its_column() {
+        for (expression, column, why) in [
+            (
+                "reading + gian * u",
+                11,
+                "`gian` is not known here; known are u, y",
+            ),
+            ("reading + gain % u", 16, "`%`"),
+            ("reading + gain * u as f32", 20, "`as`"),
+            ("reading + gain * tan(u)", 18, "no function `tan`"),
+            ("gain + max(reading)", 8, "takes 2 argument(s), here are 1"),
+            ("gain + delayed(reading, y)", 25, "the same at every sample"),
+            ("gain + delayed(1, 0.1)", 8, "nothing to delay"),
+            ("gain * if u > 0.0 { 1.0 }", 8, "needs an `else`"),
+            (
+                "if u { gain } else { 0.0 }",
+                4,
+                "a condition is needed here, this is a number",
+            ),
+            (
+                "gain + (u > 0.5)",
+                8,
+                "a number is needed here, this is a condition",
+            ),
+            ("if u > 0.5 { gain } else { 0.0 } * y", 1, "in parentheses"),
+            ("let y = gain; y", 5, "has a meaning already"),
+            ("let a = gain;", 1, "there must be a value"),
+            ("gain * 2.0f32", 8, "without `f32`"),
+            ("gain * 1e300", 8, "single precision"),
+            ("gain * std::f32::consts::PI", 11, "`:`"),
+            ("gain * y[0]", 9, "brackets"),
+            ("gain * *y", 8, "outside the language"),
+            ("gain * y.0", 8, "outside the language"),
+            ("gain * y = 3", 1, "outside the language"),
+            ("gain += y", 6, "outside the language"),
+            ("unsafe { gain }", 1, "`unsafe`"),
+            ("gain * (y", 8, "cannot be read as Rust"),
+            ("gain * 'a'", 8, "outside the language"),
+            ("gain * !y", 9, "a condition is needed"),
+            ("gain < y < u", 1, "Rust's grammar says"),
+            ("gain +", 1, "Rust's grammar says"),
+            ("", 1, "there is no value here"),
+        ] {
+            let text = refusal(expression);
+            assert!(
+                text.starts_with("own.toml: key `expression`, line 1, column "),
+                "{text}"
+            );
+            assert!(text.contains(why), "{expression}: {text}");
+            let free = why == "Rust's grammar says" || expression.starts_with("gain * (y");
+            assert!(
+                free || text.contains(&format!("column {column} ")),
+                "{expression}: {text}"
+            );
+        }
+    }
+
+    #[test]
+    fn faults_of_keys_are_named() {
+        for (from, to, expected) in [
+            ("own-pickup", "Own Pickup", "key `name`"),
+            ("own-pickup", "valve-lag", "in the catalogue already"),
+            ("low = -0.5", "low = 0.5", "key `parameter.gain`"),
+            ("starts = [0.05]", "starts = [0.7]", "`starts`"),
+            ("starts = [0.05]", "starts = []", "`starts`"),
+            ("low = -0.5", "low = nan", "`low` and `high`"),
+            ("name = \"gain\"", "name = \"u\"", "has a meaning already"),
+            ("name = \"gain\"", "name = \"fn\"", "is no name"),
+            (
+                "place = \"sensor\"",
+                "place = \"delay\"",
+                "line 3, column 9",
+            ),
+            ("gain * u", "0.1 * u", "no influence"),
+            ("place", "channel = \"temperature\"\nplace", "no influence"),
+            ("unit = \"y\"", "units = \"y\"", "units"),
+        ] {
+            let text = PICKUP.replacen(from, to, 1);
+            assert_ne!(text, PICKUP);
+            let error = Definition::from_toml(&text, "own.toml")
+                .expect_err(to)
+                .to_string();
+            assert!(
+                error.starts_with("own.toml") && error.contains(expected),
+                "{to}: {error}"
+            );
+        }
+    }
+
+    /// Whatever nests in Rust's grammar, at the greatest length let through, on
+    /// a test's small stack.
+    #[test]
+    fn nothing_nests_deeper_than_the_stack() {
+        for opening in [
+            "(",
+            "{",
+            "-",
+            "!",
+            "&",
+            "*",
+            "|",
+            "||",
+            "&&",
+            "..",
+            "<",
+            "return ",
+            "if ",
+            "if u ",
+            "let ",
+            "u = ",
+            "else ",
+            "u . ",
+            "u < ",
+            "break ",
+            "move ",
+            "if u > 0.5 {1} else ",
+            "let a = ",
+            "if let ",
+            "u(",
+            "u{",
+            "- - ! ",
+            "&mut ",
+            "u <<",
+            "u..",
+        ] {
+            for times in [8, 30, 60, 100, 190, 399, 5000] {
+                refusal(&format!("{}1", opening.repeat(times)));
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_text_makes_the_reader_panic(text in "\\PC{0,80}") {
+            let source = PICKUP.replace("reading + gain * u", &text.replace(['"', '\\'], ""));
+            let _ = Definition::from_toml(&source, "own.toml");
+            let _ = Definition::from_toml(&text, "own.toml");
+        }
+
+        #[test]
+        fn no_sentence_of_the_language_makes_it_panic(
+            words in prop::collection::vec(
+                prop::sample::select(vec![
+                    "u", "y", "reading", "gain", "1.5", "0", "+", "-", "*", "/", "(", ")", "{", "}",
+                    "if", "else", "let", "a", "=", ";", "<", ">=", "==", "&&", "||", "!", ",", ".",
+                    "max", "abs", "delayed", "sqrt", "t", "since_edge", "period", "&", "|",
+                ]),
+                0..40,
+            )
+        ) {
+            let source = PICKUP.replace("reading + gain * u", &words.join(" "));
+            if let Ok(definition) = Definition::from_toml(&source, "own.toml") {
+                let effect = UserEffect::new(definition, &[0.1_f32], &setting());
+                prop_assert_eq!(response(&effect).len(), 400);
+                prop_assert!(!rust_source(definition, &[0.1], &setting()).is_empty());
+            }
+        }
     }
 }

@@ -244,7 +244,10 @@ impl Builder {
         let registers = renumbered(&|r| alive[r], self.ops.len());
         let carried = |index: usize| {
             let read = Op::State(index);
-            self.ops.iter().zip(&alive).any(|(op, alive)| *alive && *op == read)
+            self.ops
+                .iter()
+                .zip(&alive)
+                .any(|(op, alive)| *alive && *op == read)
         };
         let state_numbers = renumbered(&carried, states.len());
         let line_alive = |line: usize| {

@@ -267,7 +267,12 @@ impl Writer {
         let clocked = self.reads(Signal::Time) || self.reads(Signal::SinceEdge);
         let mut out = String::new();
         let (module, own) = (module_name(spec.name), type_name(spec.name));
-        let _ = writeln!(out, "/// {}: {}.", spec.name, spec.summary.trim_end_matches('.'));
+        let _ = writeln!(
+            out,
+            "/// {}: {}.",
+            spec.name,
+            spec.summary.trim_end_matches('.')
+        );
         let _ = writeln!(out, "///\n/// `{}`", spec.equation);
         let _ = writeln!(out, "pub mod {module} {{");
 
@@ -419,7 +424,13 @@ impl Writer {
         out.push_str("        }\n    }\n");
     }
 
-    fn effect(&self, out: &mut String, own: &str, memory: &[(String, String, String)], clocked: bool) {
+    fn effect(
+        &self,
+        out: &mut String,
+        own: &str,
+        memory: &[(String, String, String)],
+        clocked: bool,
+    ) {
         let spec = &self.definition.spec;
         let program = &self.definition.program;
         let _ = write!(

@@ -1,0 +1,23 @@
+//! The option `--effect-file`: a user's own effects.
+
+use host_fit::model::Model;
+use host_fit::user_effect::Definition;
+use std::path::PathBuf;
+
+/// Effect files that a command was given.
+#[derive(Debug, Default, clap::Args)]
+pub(crate) struct EffectFiles {
+    /// File that defines an effect of your own, which then is like those of the catalogue; repeatable.
+    #[arg(long, value_name = "FILE")]
+    effect_file: Vec<PathBuf>,
+}
+
+impl EffectFiles {
+    /// Makes the effects known to `model`.
+    pub(crate) fn define(&self, model: &mut Model) -> anyhow::Result<()> {
+        for path in &self.effect_file {
+            model.define(Definition::load(path)?)?;
+        }
+        Ok(())
+    }
+}

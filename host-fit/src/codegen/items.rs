@@ -3,7 +3,8 @@
 use super::layout::{array, documented, number, numbers};
 use super::{CodegenError, jets, outputs, spec_of};
 use crate::model::{Added, Delay, Model};
-use model_core::effect::Spec;
+use crate::user_effect::rust_source;
+use model_core::effect::{Setting, Spec};
 use model_core::effects;
 use std::fmt::Write as _;
 
@@ -13,25 +14,29 @@ pub(super) fn imports(out: &mut String, model: &Model, graded: bool) {
         lines.push("use model_core::delay::FixedDelay;".to_owned());
     }
     let mut named: Vec<&str> = Vec::new();
-    let mut setting = false;
+    // A user's own effects bring their `new` with them.
+    let (mut physics, mut setting) = (false, false);
     match model.delay {
         Delay::Fixed { .. } => {}
         Delay::StateDependent { .. } => named.push("StateDependentDelay"),
         Delay::EdgeDependent { .. } => {
             named.push("EdgeDependentDelay");
-            setting = true;
+            (physics, setting) = (true, true);
         }
     }
     for added in &model.effects {
         setting = true;
         if let Some(spec) = effects::spec(&added.name) {
+            physics = true;
             named.push(rust_name(spec));
         }
     }
     named.sort_unstable();
     named.dedup();
-    if setting {
+    if physics {
         lines.push("use model_core::effect::{Physics, Setting};".to_owned());
+    } else if setting {
+        lines.push("use model_core::effect::Setting;".to_owned());
     }
     lines.extend(
         named
@@ -105,7 +110,10 @@ pub const WORDS: usize = {};
 }
 
 pub(super) fn effect_type(model: &Model, added: &Added) -> Result<String, CodegenError> {
-    let spec = spec_of(added)?;
+    let spec = spec_of(model, added)?;
+    if model.definition(spec.name).is_some() {
+        return Ok(spec.rust.to_owned());
+    }
     let name = rust_name(spec);
     Ok(match spec.name {
         "echo-path" => format!("{name}<f32, {}>", echo_samples(model, added)),
@@ -249,7 +257,7 @@ pub const DELAY_RATE: f32 = {};
         ),
     }
     for (i, added) in model.effects.iter().enumerate() {
-        let Some(spec) = effects::spec(&added.name) else {
+        let Some(spec) = model.spec(&added.name) else {
             continue;
         };
         let units: Vec<String> = spec
@@ -477,6 +485,21 @@ pub fn state(model: &Identified) -> IdentifiedState {{
 }}
 "
     );
+}
+
+/// The user's own effects, written out: `model-core` does not have them.
+pub(super) fn own_effects(out: &mut String, model: &Model) {
+    for added in &model.effects {
+        if let Some(definition) = model.definition(&added.name) {
+            let setting = Setting {
+                period: model.sample_period_s as f32,
+                channel: 0,
+                reference: added.reference.unwrap_or(1.0) as f32,
+            };
+            out.push('\n');
+            out.push_str(&rust_source(definition, &added.parameters, &setting));
+        }
+    }
 }
 
 pub(super) fn rust_name(spec: &Spec) -> &'static str {

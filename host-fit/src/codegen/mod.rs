@@ -10,7 +10,7 @@ mod layout;
 use crate::model::{Added, Delay, Model};
 use crate::simulate::Ring;
 use model_core::effect::{Place, Spec};
-use model_core::{State, effects, self_test};
+use model_core::{State, self_test};
 use std::fmt::Write as _;
 use thiserror::Error;
 
@@ -32,10 +32,10 @@ pub enum CodegenError {
         /// Its value.
         value: f64,
     },
-    /// An effect is not in the catalogue of `model-core`.
+    /// An effect is neither in the catalogue nor defined by the model.
     #[error(
-        "effect `{name}` has no Rust form in model-core. Remove it from the model, \
-         or add it to the catalogue (`host-fit effects` lists it)."
+        "effect `{name}` has no Rust form: it is neither in the catalogue (`host-fit effects` lists it) \
+         nor defined by the model. Remove it from the model."
     )]
     UnknownEffect {
         /// Its name.
@@ -67,6 +67,7 @@ pub fn generate(model: &Model) -> Result<String, CodegenError> {
     items::coefficients(&mut out, model);
     items::compile_time_checks(&mut out, model, graded);
     items::constructors(&mut out, model, graded);
+    items::own_effects(&mut out, model);
     golden(&mut out, model)?;
     Ok(out)
 }
@@ -106,21 +107,26 @@ fn check(model: &Model) -> Result<(), CodegenError> {
     for added in &model.effects {
         fits("effect parameter", &added.parameters)?;
         fits("effect reference", added.reference.as_slice())?;
-        spec_of(added)?;
+        spec_of(model, added)?;
     }
     Ok(())
 }
 
-fn spec_of(added: &Added) -> Result<&'static Spec, CodegenError> {
-    effects::spec(&added.name).ok_or_else(|| CodegenError::UnknownEffect {
-        name: added.name.clone(),
-    })
+fn spec_of(model: &Model, added: &Added) -> Result<&'static Spec, CodegenError> {
+    model
+        .spec(&added.name)
+        .ok_or_else(|| CodegenError::UnknownEffect {
+            name: added.name.clone(),
+        })
 }
 
 /// One bit a sample serves unless jets take strengths between on and off.
 fn needs_graded_jets(model: &Model) -> bool {
-    let shapes_jet =
-        |added: &Added| effects::spec(&added.name).is_none_or(|spec| spec.place == Place::Jet);
+    let shapes_jet = |added: &Added| {
+        model
+            .spec(&added.name)
+            .is_none_or(|spec| spec.place == Place::Jet)
+    };
     matches!(model.delay, Delay::EdgeDependent { .. }) || model.effects.iter().any(shapes_jet)
 }
 
@@ -296,7 +302,7 @@ mod tests {
 
     #[test]
     fn every_effect_of_the_catalogue_has_its_constants() {
-        for spec in effects::SPECS {
+        for spec in model_core::effects::SPECS {
             if spec.place == Place::Delay {
                 continue;
             }

@@ -114,44 +114,6 @@ impl<T: Real> DelayLaw<T> for AnyDelay<T> {
     }
 }
 
-/// Effects one after the other, chosen at run time.
-#[derive(Clone, Debug)]
-pub struct Chain<T: Real> {
-    effects: Vec<AnyEffect<T>>,
-    drives: bool,
-}
-
-impl<T: Real> Effect<T> for Chain<T> {
-    type State = Vec<effects::AnyState<T>>;
-    fn start(&self) -> Self::State {
-        self.effects.iter().map(Effect::start).collect()
-    }
-    #[inline]
-    fn jet(&self, states: &mut Self::State, jet: T, at: &Instant<'_, T>) -> T {
-        let each = self.effects.iter().zip(states);
-        each.fold(jet, |jet, (effect, state)| effect.jet(state, jet, at))
-    }
-    #[inline]
-    fn drives(&self) -> bool {
-        self.drives
-    }
-    #[inline]
-    fn drive(&self, states: &mut Self::State, flow: &Flow<T>, at: &Instant<'_, T>) -> T {
-        // Added from the last to the first, as nested pairs of effects do.
-        let each = self.effects.iter().zip(states).rev();
-        each.fold(T::ZERO, |sum, (effect, state)| {
-            effect.drive(state, flow, at) + sum
-        })
-    }
-    #[inline]
-    fn sense(&self, states: &mut Self::State, signal: T, at: &Instant<'_, T>) -> T {
-        let each = self.effects.iter().zip(states);
-        each.fold(signal, |signal, (effect, state)| {
-            effect.sense(state, signal, at)
-        })
-    }
-}
-
 impl Model {
     /// The model in numbers of type `T`, as it is.
     #[must_use]

@@ -231,7 +231,8 @@ mod tests {
 
     #[test]
     fn each_fault_shuts_the_valve_and_stays_until_disarmed() {
-        let ill: [(Fault, fn(u32) -> Reading); 5] = [
+        type Ill = (Fault, fn(u32) -> Reading);
+        let ill: [Ill; 5] = [
             (Fault::Overrun, |_| Reading {
                 counts: 600.0,
                 periods: 2,

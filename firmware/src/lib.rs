@@ -10,6 +10,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod cases;
 pub mod console;
 pub mod controller;
 pub mod fault;
@@ -17,3 +18,4 @@ pub mod law;
 pub mod link;
 pub mod rig;
 pub mod sensor;
+pub mod tracking;

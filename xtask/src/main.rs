@@ -1,7 +1,9 @@
 //! The project's chores; `cargo xtask help` lists them.
 
 mod ci;
+mod firmware;
 mod identified;
+mod pil;
 mod setup;
 mod shell;
 
@@ -14,7 +16,13 @@ struct Task {
     run: fn(&[String]) -> anyhow::Result<()>,
 }
 
-const TASKS: &[Task] = &[ci::TASK, identified::TASK, setup::TASK];
+const TASKS: &[Task] = &[
+    ci::TASK,
+    firmware::TASK,
+    identified::TASK,
+    pil::TASK,
+    setup::TASK,
+];
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

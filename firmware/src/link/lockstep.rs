@@ -202,7 +202,7 @@ mod tests {
         fn step(&mut self, counts: u16) -> (f32, bool) {
             self.sum += f32::from(counts);
             self.steps += 1;
-            (self.sum, self.steps % 3 == 0)
+            (self.sum, self.steps.is_multiple_of(3))
         }
         fn report(&mut self) -> Report {
             Report {

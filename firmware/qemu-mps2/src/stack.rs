@@ -1,0 +1,37 @@
+//! How deep the stack has been: what is below it is painted at the start, and
+//! the paint that is gone was used.
+
+use core::ptr::addr_of;
+
+const PAINT: u32 = 0xA5A5_5A5A;
+/// Left unpainted below the caller's frame, bytes.
+const MARGIN: usize = 64;
+
+unsafe extern "C" {
+    static __ebss: u32;
+    static _stack_start: u32;
+}
+
+/// Paints the unused stack. Call it first in `main`.
+#[inline(never)]
+pub fn paint() {
+    let top = cortex_m::register::msp::read() as usize - MARGIN;
+    let mut at = addr_of!(__ebss) as usize;
+    while at < top {
+        // SAFETY: between the end of .bss and the stack in use nothing lives.
+        unsafe { (at as *mut u32).write_volatile(PAINT) };
+        at += 4;
+    }
+}
+
+/// The deepest the stack has been since it was painted, bytes.
+#[must_use]
+pub fn deepest() -> u32 {
+    let top = addr_of!(_stack_start) as usize;
+    let mut at = addr_of!(__ebss) as usize;
+    // SAFETY: reading RAM.
+    while at < top && unsafe { (at as *const u32).read_volatile() } == PAINT {
+        at += 4;
+    }
+    (top - at) as u32
+}

@@ -58,6 +58,8 @@ const STEPS: &[Step] = &[
     ("firmware tests", || {
         run(&mut firmware_cargo(&["test", "--release"]))
     }),
+    // Links only without panics; runs the constants; checks the budgets.
+    ("pil", crate::budgets::check),
 ];
 
 fn ci(arguments: &[String]) -> Result<()> {

@@ -1,5 +1,6 @@
 //! The project's chores; `cargo xtask help` lists them.
 
+mod budgets;
 mod ci;
 mod firmware;
 mod identified;

@@ -37,8 +37,6 @@ pub(crate) struct Measured {
     pub(crate) case: &'static str,
     /// Mean instructions per step.
     pub(crate) mean: f64,
-    /// Most in one step.
-    pub(crate) most: f64,
 }
 
 /// What the run gave.
@@ -84,12 +82,15 @@ pub(crate) fn pil(arguments: &[String]) -> Result<Outcome> {
         let measured = Measured {
             case,
             mean: report.ticks as f64 * per_tick / f64::from(report.steps.max(1)),
-            most: f64::from(report.most) * per_tick,
         };
         println!(
             "{case}: {} steps equal bit for bit, {} switches, mean y {:.3}; \
              {:.0} instructions a step, at most {:.0}",
-            report.steps, figures.switches, figures.mean, measured.mean, measured.most
+            report.steps,
+            figures.switches,
+            figures.mean,
+            measured.mean,
+            f64::from(report.most) * per_tick
         );
         outcome.stack = report.stack;
         outcome.cases.push(measured);

@@ -447,6 +447,7 @@ fn model(
             },
         },
         effects: Vec::new(),
+        definitions: Vec::new(),
         training: Training {
             y_range: [
                 ys().fold(f64::INFINITY, f64::min),

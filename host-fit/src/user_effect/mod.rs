@@ -555,6 +555,7 @@ starts = [0.1]
                 let flow = Flow {
                     now: y,
                     before,
+                    next: y,
                     relaxation: T::from_f64(0.05),
                 };
                 let jet = effect.jet(&mut state, u, &at);

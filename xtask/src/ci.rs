@@ -58,6 +58,15 @@ const STEPS: &[Step] = &[
     ("firmware tests", || {
         run(&mut firmware_cargo(&["test", "--release"]))
     }),
+    ("board lints", || {
+        let mut clippy = crate::setup::cross_cargo("clippy", TARGETS[0])?;
+        clippy
+            .args(["--package", "qemu-mps2", "--", "-Dwarnings"])
+            .current_dir(crate::shell::root().join("firmware"))
+            .env("CARGO_TARGET_DIR", crate::shell::firmware_target());
+        run(&mut clippy)
+    }),
+    ("faults", || crate::faults::faults(&[])),
     // Links only without panics; runs the constants; checks the budgets.
     ("pil", crate::budgets::check),
 ];

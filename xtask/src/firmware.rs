@@ -2,9 +2,10 @@
 
 use crate::Task;
 use crate::setup::{TARGETS, cross_cargo};
-use crate::shell::{firmware_target, root, run};
+use crate::shell::{command, firmware_target, root, run};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 pub(crate) const TASK: Task = Task {
     name: "firmware",
@@ -42,6 +43,20 @@ pub(crate) fn build(board: &str, bin: &str) -> Result<PathBuf> {
         .join(BOARD_TARGET)
         .join("release")
         .join(bin))
+}
+
+/// QEMU with the program, its serial line on standard input and output. Time
+/// goes by instructions, as fast as the host can.
+pub(crate) fn qemu(elf: &Path) -> Command {
+    let mut qemu = command(
+        "qemu-system-arm",
+        &["-machine", "mps2-an386", "-cpu", "cortex-m4"],
+    );
+    qemu.args(["-icount", "shift=5,sleep=off"])
+        .args(["-display", "none", "-monitor", "none", "-serial", "stdio"])
+        .arg("-kernel")
+        .arg(elf);
+    qemu
 }
 
 /// What a program takes.

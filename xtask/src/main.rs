@@ -2,6 +2,7 @@
 
 mod budgets;
 mod ci;
+mod faults;
 mod firmware;
 mod identified;
 mod pil;
@@ -19,6 +20,7 @@ struct Task {
 
 const TASKS: &[Task] = &[
     ci::TASK,
+    faults::TASK,
     firmware::TASK,
     identified::TASK,
     pil::TASK,

@@ -225,26 +225,7 @@ struct Link {
 
 impl Link {
     fn qemu(elf: &std::path::Path, lose: usize) -> Result<Self> {
-        let mut qemu = command(
-            "qemu-system-arm",
-            &[
-                "-machine",
-                "mps2-an386",
-                "-cpu",
-                "cortex-m4",
-                "-icount",
-                "shift=5,sleep=off",
-                "-display",
-                "none",
-                "-monitor",
-                "none",
-                "-serial",
-                "stdio",
-                "-kernel",
-            ],
-        );
-        let mut process = qemu
-            .arg(elf)
+        let mut process = crate::firmware::qemu(elf)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
@@ -338,10 +319,12 @@ impl Link {
         loop {
             let left = until.saturating_duration_since(Instant::now());
             match self.from.recv_timeout(left) {
-                Ok(byte) => match self.receiver.receive(byte) {
-                    Some(Ok(content)) => return Ok(Some(content.to_vec())),
-                    Some(Err(_)) | None => {}
-                },
+                // A damaged reply is no reply: the request is repeated.
+                Ok(byte) => {
+                    if let Some(Ok(content)) = self.receiver.receive(byte) {
+                        return Ok(Some(content.to_vec()));
+                    }
+                }
                 Err(RecvTimeoutError::Timeout) => return Ok(None),
                 Err(RecvTimeoutError::Disconnected) => bail!("the board hung up"),
             }

@@ -7,9 +7,10 @@ const FULL: u32 = 0x00FF_FFFF;
 
 /// Counts down 24 bits, again and again.
 pub struct Ticks {
-    syst: SYST,
     /// Ticks between two readings with nothing between them.
     overhead: u32,
+    /// Count at which the last wait ended.
+    due: u32,
 }
 
 impl Ticks {
@@ -20,7 +21,10 @@ impl Ticks {
         syst.set_reload(FULL);
         syst.clear_current();
         syst.enable_counter();
-        let mut ticks = Self { syst, overhead: 0 };
+        let mut ticks = Self {
+            overhead: 0,
+            due: SYST::get_current(),
+        };
         // The second measurement runs from warm code.
         ticks.measure(|| ());
         ticks.overhead = ticks.measure(|| ()).1;
@@ -37,9 +41,11 @@ impl Ticks {
         (result, ticks.saturating_sub(self.overhead))
     }
 
-    /// Whether the counter is running.
-    #[must_use]
-    pub fn runs(&mut self) -> bool {
-        self.syst.is_counter_enabled()
+    /// Waits until `period` ticks have gone by since the last wait ended.
+    pub fn wait(&mut self, period: u32) {
+        let due = self.due.wrapping_sub(period) & FULL;
+        // In the future while less than half the range behind the count.
+        while SYST::get_current().wrapping_sub(due) & FULL < FULL / 2 {}
+        self.due = due;
     }
 }

@@ -18,13 +18,15 @@ pub struct Figures {
     pub switches_per_s: f64,
     /// Share of time with the valve open: the air used, relative to steady blowing.
     pub air: f64,
-    /// From the start until the 100 ms mean of the friction stays within 5 % of
-    /// the last reference; `None` if it never does.
+    /// From the start until the 250 ms mean of the friction is within 5 % of the
+    /// last reference for a second; `None` if it never is.
     pub settling_s: Option<f64>,
 }
 
 /// Samples over which the friction is averaged before it is called settled.
-const SETTLED_MEAN: usize = 100;
+const SETTLED_MEAN: usize = 250;
+/// Samples for which it must stay.
+const SETTLED_FOR: usize = 1000;
 
 impl Figures {
     /// The figures of `trace` from sample `from` on; settling from the start.
@@ -58,16 +60,24 @@ impl Figures {
 
 fn settling(trace: &Trace) -> Option<f64> {
     let reference = trace.samples.last()?.reference;
-    let unsettled = trace.samples.windows(SETTLED_MEAN).rposition(|window| {
-        let mean = window.iter().map(|s| s.friction).sum::<f64>() / SETTLED_MEAN as f64;
-        (mean - reference).abs() > 0.05 * reference.abs()
-    });
-    let last_window = trace.samples.len().checked_sub(SETTLED_MEAN)?;
-    match unsettled {
-        None => Some(0.0),
-        Some(at) if at == last_window => None,
-        Some(at) => Some((at + SETTLED_MEAN) as f64 * SAMPLE_PERIOD_S),
+    let mut sum = 0.0;
+    let mut inside = 0;
+    for (k, sample) in trace.samples.iter().enumerate() {
+        sum += sample.friction;
+        if let Some(leaving) = k.checked_sub(SETTLED_MEAN) {
+            sum -= trace.samples[leaving].friction;
+        }
+        let off = sum / SETTLED_MEAN as f64 - reference;
+        inside = if off.abs() <= 0.05 * reference.abs() && k + 1 >= SETTLED_MEAN {
+            inside + 1
+        } else {
+            0
+        };
+        if inside == SETTLED_FOR {
+            return Some((k + 1 - SETTLED_FOR) as f64 * SAMPLE_PERIOD_S);
+        }
     }
+    None
 }
 
 #[cfg(test)]
@@ -95,7 +105,7 @@ mod tests {
         assert!((figures.peak_to_peak - 0.2).abs() < 1e-12);
         assert!((figures.air - 0.25).abs() < 1e-12);
         assert!((figures.switches_per_s - 100.0).abs() < 0.5);
-        assert!((figures.settling_s.unwrap() - 1.1).abs() < 0.02);
+        assert!((figures.settling_s.unwrap() - 1.24).abs() < 0.02);
     }
 
     #[test]
@@ -107,7 +117,7 @@ mod tests {
             on: true,
         };
         let trace = Trace {
-            samples: vec![sample; 500],
+            samples: vec![sample; 5000],
         };
         assert_eq!(Figures::of(&trace, 0).settling_s, None);
     }

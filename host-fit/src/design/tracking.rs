@@ -1,0 +1,394 @@
+//! The constants of the tracking law, from the model and the valve's limits.
+
+use super::DesignError;
+use super::bench::Bench;
+use super::steady::{Steady, steady};
+use crate::model::{Delay, Hold, Model, Start, Track};
+use model_core::control::tracking::Unusable;
+use model_core::control::{Reachable, Tracking};
+
+/// What is wanted of a tracking law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackRequest {
+    /// The friction to hold, y of the flow.
+    pub target: f64,
+    /// Shortest on time of the valve, s.
+    pub min_on_s: f64,
+    /// Shortest off time of the valve, s.
+    pub min_off_s: f64,
+    /// Switches per second that the valve can give in the long run.
+    pub switches_per_s: Option<f64>,
+    /// Share of the air of steady blowing that may be used in the long run, 0–1.
+    pub air: Option<f64>,
+    /// Fastest change of the reference, y/s; `None` follows steps.
+    pub ramp_per_s: Option<f64>,
+}
+
+/// A tracking law and what the design rests on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrackDesign {
+    /// The law.
+    pub law: Track,
+    /// The flow with the valve closed.
+    pub natural: Steady,
+    /// The flow under steady blowing.
+    pub blown: Steady,
+    /// The duty u_eq that holds the reference when switching is fast:
+    /// (α·y* − d)/(Σb + y*·Σc).
+    pub equivalent_duty: f64,
+    /// The duty that the law takes on the model.
+    pub duty: f64,
+    /// What deserves to be said.
+    pub remarks: Vec<String>,
+}
+
+/// Samples by which a pulse can be cut at its arrival when the delay changes
+/// with the flow (theory A.3: k − h advances by 0 to 2 a sample).
+const SHORTEST_SURE_PULSE: u32 = 3;
+
+/// Designs the law that holds `request.target` on `model`.
+///
+/// # Errors
+/// [`DesignError`]: a reference out of reach (with the interval), a model that
+/// does not settle, is averaged or starts in mid-run, an air budget that is too small.
+pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, DesignError> {
+    if (model.sample_period_s - 0.001).abs() > 1e-9 {
+        return Err(DesignError::SamplePeriod(model.sample_period_s));
+    }
+    if model.start == Start::Measured {
+        return Err(DesignError::NotFromRest);
+    }
+    if model.averaging.averaged_model {
+        return Err(Unusable::AveragedModel.into());
+    }
+    let (natural, blown) = (steady(model, false)?, steady(model, true)?);
+    if blown.friction <= natural.friction {
+        return Err(DesignError::NoEffect {
+            low: natural.friction,
+            high: blown.friction,
+        });
+    }
+    let reachable = Reachable {
+        low: natural.friction,
+        high: blown.friction,
+    };
+    reachable.check(request.target)?;
+    let mut remarks = Vec::new();
+    for (modulus, valve) in [(natural.modulus, "closed"), (blown.modulus, "open")] {
+        if modulus > 1.0 + 3e-5 {
+            remarks.push(format!(
+                "with the valve {valve} the model grows slowly (largest pole modulus {modulus:.5}); \
+                 the loop holds it, but a long free run of it means nothing"
+            ));
+        }
+    }
+
+    let bench = Bench::<f64>::of(model);
+    let (shortest, longest) = bench.first_arrival(1.2 * blown.friction);
+    let (opening, closing) = bench.valve();
+    let equivalent_duty = equivalent_duty(model, request.target);
+    let mut hold = Hold {
+        on: samples(request.min_on_s),
+        off: samples(request.min_off_s),
+    };
+    if matches!(model.delay, Delay::StateDependent { .. }) {
+        hold.on = hold.on.max(SHORTEST_SURE_PULSE);
+        hold.off = hold.off.max(SHORTEST_SURE_PULSE);
+    }
+    if let Delay::EdgeDependent {
+        rise_delay,
+        fall_delay,
+    } = model.delay
+    {
+        // A pulse (or gap) shorter than the difference of the delays never arrives.
+        let difference = (rise_delay - fall_delay) / model.sample_period_s;
+        hold.on = hold
+            .on
+            .max(difference.ceil().max(0.0) as u32 + SHORTEST_SURE_PULSE);
+        hold.off = hold
+            .off
+            .max((-difference).ceil().max(0.0) as u32 + SHORTEST_SURE_PULSE);
+    }
+    if hold.on > samples(request.min_on_s) || hold.off > samples(request.min_off_s) {
+        remarks.push(format!(
+            "shortest times are {} ms on and {} ms off: what is shorter need not arrive whole",
+            hold.on, hold.off
+        ));
+    }
+    let mut switches = None;
+    if let Some(rate) = request.switches_per_s {
+        // The cycle is as long as two switches may take; the shorter of its two
+        // parts is held for what belongs to it.
+        let cycle = 2000.0 / rate;
+        let duty = equivalent_duty.clamp(0.02, 0.98);
+        if duty > 0.5 {
+            hold.off = hold.off.max(((1.0 - duty) * cycle).ceil() as u32);
+        } else {
+            hold.on = hold.on.max((duty * cycle).ceil() as u32);
+        }
+        switches = Some([(1000.0 / rate).ceil() as u32, 10]);
+    }
+    let air = request
+        .air
+        .map(|share| [(share * 1000.0).round().clamp(0.0, 1000.0) as u32, 1000]);
+    if let Some(allowed) = request.air
+        && equivalent_duty > allowed
+    {
+        return Err(DesignError::Air {
+            reference: request.target,
+            needed: equivalent_duty,
+            allowed,
+        });
+    }
+
+    let lead = shortest.max(1);
+    let half_hold = hold.on.max(hold.off).div_ceil(2).min(10_000) as u16;
+    let law = Track {
+        reference: request.target,
+        reachable: [reachable.low, reachable.high],
+        slope: request
+            .ramp_per_s
+            .map_or(0.0, |slope| slope * model.sample_period_s),
+        hold,
+        switches,
+        air,
+        lead,
+        opening,
+        closing,
+        look_ahead: longest
+            .saturating_add(opening.max(closing))
+            .saturating_add(half_hold)
+            .saturating_add(3),
+        // Slow against the delay, so that neither noise nor a wrong delay turns
+        // the corrections into an oscillation.
+        observer: 0.03,
+        bias_rate: 0.1 / f64::from(lead.max(10)),
+        integral_rate: 0.04 / f64::from(lead.max(20)),
+        correction_limit: 0.3 * (reachable.high - reachable.low),
+        residual_limit: 0.25 * (reachable.high - reachable.low),
+    };
+    let tracking: Tracking<f64> = law.tracking();
+    tracking.validate::<_, { firmware_sim::closed_loop::AHEAD }>(&bench.prepared, longest)?;
+    let duty = duty_on_model(&bench, tracking);
+    if let Some(allowed) = request.air
+        && duty > allowed + 0.02
+    {
+        return Err(DesignError::Air {
+            reference: request.target,
+            needed: duty,
+            allowed,
+        });
+    }
+    Ok(TrackDesign {
+        law,
+        natural,
+        blown,
+        equivalent_duty,
+        duty,
+        remarks,
+    })
+}
+
+/// u_eq = (α·y* − d)/(Σb + y*·Σc), theory A.2; effects are not in it.
+fn equivalent_duty(model: &Model, reference: f64) -> f64 {
+    let alpha = 1.0 - model.a.iter().sum::<f64>();
+    let gain = model.b.iter().sum::<f64>() + reference * model.c.iter().sum::<f64>();
+    (alpha * reference - model.constant) / gain
+}
+
+/// The duty on the model itself, 5 s after the start and over 10 s, without budgets.
+fn duty_on_model(bench: &Bench<f64>, tracking: Tracking<f64>) -> f64 {
+    use firmware_sim::closed_loop::{Figures, Law, ModelFlow, run};
+    let free = Tracking {
+        budget: Default::default(),
+        ..tracking
+    };
+    let mut law = Law::new(
+        &bench.prepared,
+        free,
+        bench.at_rest(),
+        bench.channels.clone(),
+    );
+    let mut flow = ModelFlow::new(&bench.prepared, bench.at_rest(), bench.channels.clone());
+    let trace = run(
+        &mut law,
+        &mut flow,
+        std::iter::repeat_n(tracking.reference, 15_000),
+    );
+    Figures::of(&trace, 5000).air
+}
+
+/// Seconds to samples at 1 kHz, rounded up, at least 1.
+fn samples(seconds: f64) -> u32 {
+    (seconds * 1000.0 - 1e-6).ceil().clamp(1.0, 1e9) as u32
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::model::Training;
+    use model_core::model::Averaging;
+    use model_core::recursion::{Grading, LagConvention};
+
+    fn paper(convention: LagConvention) -> Model {
+        Model {
+            sample_period_s: 0.001,
+            convention,
+            averaging: Averaging {
+                window: 250,
+                averaged_model: false,
+            },
+            grading: Grading::default(),
+            start: Start::Rest,
+            constant: 0.0,
+            state_lags: Vec::new(),
+            a: Vec::new(),
+            product_lags: Vec::new(),
+            b: Vec::new(),
+            c: Vec::new(),
+            delay: Delay::Fixed { delays: vec![49] },
+            effects: Vec::new(),
+            training: Training::default(),
+            law: None,
+        }
+    }
+
+    /// Table II, state-dependent delay.
+    pub(in super::super) fn paper_state_dependent(convention: LagConvention) -> Model {
+        Model {
+            state_lags: vec![1, 44, 123, 479, 496],
+            a: vec![0.9759, 0.0141, 0.0025, -0.0042, 0.0055],
+            product_lags: vec![1, 73, 242, 264, 299, 335, 414, 477, 494, 500],
+            b: vec![0.0080],
+            c: vec![
+                -0.0228, 0.0138, 0.0621, -0.0286, -0.0186, -0.0121, -0.0035, -0.0056, 0.0189,
+                -0.0049,
+            ],
+            delay: Delay::StateDependent {
+                delay_floor: 47.35,
+                delay_rise: 12.69,
+                delay_rate: 20.18,
+                factors: vec![1.0],
+            },
+            ..paper(convention)
+        }
+    }
+
+    /// Table II, fixed delay.
+    pub(in super::super) fn paper_fixed(convention: LagConvention) -> Model {
+        Model {
+            state_lags: vec![1, 48, 352, 371, 496],
+            a: vec![0.9744, 0.0171, -0.0028, 0.0040, 0.0009],
+            product_lags: vec![1, 66, 242, 249, 260, 276, 300, 409, 475, 491],
+            b: vec![0.0063],
+            c: vec![
+                -0.0116, 0.0070, 0.0483, 0.0253, -0.0455, -0.0243, -0.0038, -0.0014, -0.0074,
+                0.0138,
+            ],
+            ..paper(convention)
+        }
+    }
+
+    /// Table IV, averaged model, fixed delays, columns read as theory 0.2 (ii).
+    pub(in super::super) fn paper_averaged() -> Model {
+        Model {
+            averaging: Averaging {
+                window: 250,
+                averaged_model: true,
+            },
+            state_lags: vec![1, 269],
+            a: vec![1.0027, -0.0027],
+            product_lags: vec![1, 307],
+            b: vec![0.0009, 0.0030],
+            c: vec![-0.0008, 0.0045, -0.0085, 0.0010],
+            delay: Delay::Fixed {
+                delays: vec![49, 417],
+            },
+            ..paper(LagConvention::Literal)
+        }
+    }
+
+    pub(in super::super) fn request(target: f64) -> TrackRequest {
+        TrackRequest {
+            target,
+            min_on_s: 0.010,
+            min_off_s: 0.010,
+            switches_per_s: None,
+            air: None,
+            ramp_per_s: None,
+        }
+    }
+
+    #[test]
+    fn the_papers_model_gets_the_law_of_the_theory() {
+        let design = track(
+            &paper_state_dependent(LagConvention::OneStep),
+            &request(0.8),
+        )
+        .unwrap();
+        assert!((design.equivalent_duty - 0.713).abs() < 0.001);
+        assert!((design.duty - 0.713).abs() < 0.04, "{}", design.duty);
+        assert_eq!(design.law.lead, 47);
+        assert_eq!((design.law.opening, design.law.closing), (0, 0));
+        assert!(design.law.look_ahead >= 60 + 5);
+    }
+
+    #[test]
+    fn what_cannot_be_held_is_refused_with_the_interval() {
+        let model = paper_state_dependent(LagConvention::OneStep);
+        for target in [-0.1, 0.0, 1.2, f64::NAN] {
+            let error = track(&model, &request(target)).unwrap_err();
+            assert!(error.to_string().contains("(0"), "{error}");
+            assert!(matches!(error, DesignError::Unreachable(_)));
+        }
+        let thirsty = TrackRequest {
+            air: Some(0.5),
+            ..request(0.8)
+        };
+        assert!(matches!(
+            track(&model, &thirsty),
+            Err(DesignError::Air { .. })
+        ));
+        assert_eq!(
+            track(&paper_averaged(), &request(0.8)),
+            Err(DesignError::Unusable(Unusable::AveragedModel))
+        );
+    }
+
+    #[test]
+    fn a_switching_budget_lengthens_the_binding_hold_time() {
+        let model = paper_state_dependent(LagConvention::OneStep);
+        let calm = TrackRequest {
+            switches_per_s: Some(20.0),
+            ..request(0.8)
+        };
+        let design = track(&model, &calm).unwrap();
+        // A cycle of 100 ms, 28.7 % of it closed.
+        assert_eq!(design.law.hold, Hold { on: 10, off: 29 });
+    }
+
+    #[test]
+    fn valves_and_edges_are_looked_through() {
+        let mut model = paper_state_dependent(LagConvention::OneStep);
+        let spec = model_core::effects::spec("valve-lag").unwrap();
+        model.add(spec, &[0.010, 0.020], None);
+        let design = track(&model, &request(0.8)).unwrap();
+        assert!(
+            (5..=7).contains(&design.law.opening),
+            "{}",
+            design.law.opening
+        );
+        assert!(
+            (12..=14).contains(&design.law.closing),
+            "{}",
+            design.law.closing
+        );
+        let spec = model_core::effects::spec("edge-dependent-delay").unwrap();
+        let mut model = paper_state_dependent(LagConvention::OneStep);
+        model.add(spec, &[0.060, 0.045], None);
+        let design = track(&model, &request(0.8)).unwrap();
+        assert_eq!(design.law.hold, Hold { on: 18, off: 10 });
+        assert!((14..=16).contains(&design.law.opening));
+        assert_eq!(design.law.lead, 45);
+    }
+}

@@ -3,6 +3,7 @@
 pub mod codegen;
 pub mod data;
 pub mod delay;
+pub mod design;
 pub mod diagnose;
 pub mod dual;
 pub mod extend;

@@ -25,6 +25,7 @@ struct Cli {
 enum Command {
     Average(commands::average::Args),
     Delay(commands::delay::Args),
+    Design(commands::design::Args),
     Compare(commands::compare::Args),
     Diagnose(commands::diagnose::Args),
     Extend(commands::extend::Args),
@@ -39,6 +40,7 @@ fn main() -> ExitCode {
     let result = match &cli.command {
         Command::Average(args) => commands::average::run(args, console),
         Command::Delay(args) => commands::delay::run(args, console),
+        Command::Design(args) => commands::design::run(args, console),
         Command::Compare(args) => commands::compare::run(args, console),
         Command::Diagnose(args) => commands::diagnose::run(args, console),
         Command::Extend(args) => commands::extend::run(args, console),

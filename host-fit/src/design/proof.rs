@@ -62,8 +62,11 @@ pub struct Proof {
     pub cases: Vec<Case>,
     /// The run on the plant.
     pub trace: Trace,
-    /// A plain relay with the same hold times on the same plant.
-    pub relay: Trace,
+    /// Something simpler on the same plant: a relay with the same hold times, or
+    /// steady blowing.
+    pub compared: Trace,
+    /// What it is.
+    pub compared_name: &'static str,
 }
 
 /// A plant in its circumstances.
@@ -153,7 +156,8 @@ pub fn prove(model: &Model, law: &Track, seed: u64) -> Result<Proof, DesignError
         plant,
         cases,
         trace,
-        relay,
+        compared: relay,
+        compared_name: "plain relay, same hold times",
     })
 }
 
@@ -172,12 +176,13 @@ pub fn prove_pulses(model: &Model, law: &Maximise, seed: u64) -> Result<Proof, D
         .map(|trial| trial.run(&mut pulses(), reference).map(|(case, _)| case));
     let cases = cases.collect::<Result<Vec<_>, _>>()?;
     let (_, trace) = trials[0].run(&mut pulses(), reference)?;
-    let (_, relay) = trials[0].run(&mut OpenLoop::steady(), reference)?;
+    let (_, steady) = trials[0].run(&mut OpenLoop::steady(), reference)?;
     Ok(Proof {
         plant,
         cases,
         trace,
-        relay,
+        compared: steady,
+        compared_name: "steady blowing",
     })
 }
 
@@ -342,7 +347,7 @@ mod tests {
             "{on_model:?}"
         );
         let on_plant = proof.cases[1].figures;
-        let relay = Figures::of(&proof.relay, JUDGED);
+        let relay = Figures::of(&proof.compared, JUDGED);
         assert!(on_plant.rms < 0.5 * relay.rms, "{on_plant:?} {relay:?}");
         assert!(on_plant.offset.abs() < 0.01);
         for case in &proof.cases {

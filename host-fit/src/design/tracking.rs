@@ -69,7 +69,12 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         });
     }
     let reachable = Reachable {
-        low: natural.friction,
+        // What is left of the start after some seconds is no natural friction.
+        low: if natural.friction.abs() < 1e-4 * blown.friction {
+            0.0
+        } else {
+            natural.friction
+        },
         high: blown.friction,
     };
     reachable.check(request.target)?;

@@ -27,7 +27,7 @@ impl fmt::Display for Unreachable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the reference {} cannot be held: on/off blowing reaches the open interval ({}, {}); choose a reference inside it",
+            "the reference {} cannot be held: on/off blowing reaches the open interval ({:.4}, {:.4}); choose a reference inside it",
             self.reference, self.reachable.low, self.reachable.high
         )
     }

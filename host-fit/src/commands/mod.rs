@@ -9,7 +9,7 @@ pub(crate) mod average;
 pub(crate) mod codegen;
 pub(crate) mod compare;
 pub(crate) mod delay;
-<<<<<<< HEAD
+pub(crate) mod design;
 pub(crate) mod diagnose;
 mod effect_files;
 pub(crate) mod effects;
@@ -17,9 +17,6 @@ pub(crate) mod extend;
 mod interrupt;
 mod scores;
 pub(crate) mod simulate;
-=======
-pub(crate) mod design;
->>>>>>> dd280d6 (host-fit design: the command)
 
 /// How a command talks to the user.
 #[derive(Debug, Clone, Copy)]

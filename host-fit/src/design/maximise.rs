@@ -126,30 +126,23 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
     best_first(&mut refined);
 
     // The best are judged again where slow models have settled, and must last.
-    let tried: Vec<(f64, Option<(Judged, f64)>)> = refined
+    let tried: Vec<(f64, Option<Lasting>)> = refined
         .par_iter()
         .filter(|judged| judged.value.is_finite())
-        .map(|judged| (judged.mean, search.long_run(&judged.train)))
+        .map(|judged| (judged.mean, search.lasting(&judged.train)))
         .collect();
     let steady_mean = search.long_run(&steady).map(|(judged, _)| judged.mean);
     let best = tried
         .iter()
         .filter_map(|(_, lasting)| lasting.as_ref())
-        .max_by(|a, b| a.0.value.total_cmp(&b.0.value));
-    if let Some((best, after)) = best {
+        .max_by(|a, b| a.robust_value.total_cmp(&b.robust_value));
+    if let Some(lasting) = best {
+        let best = &lasting.judged;
         let better = || {
             tried
                 .iter()
                 .filter(|(mean, lasting)| lasting.is_none() && *mean > best.mean)
         };
-        let detuned = [0.98, 1.02].map(|factor| {
-            let mut train = best.train.clone();
-            train.period = (f64::from(train.period) * factor).round() as u32;
-            search
-                .long_run(&train)
-                .map_or(f64::NEG_INFINITY, |(judged, _)| judged.mean)
-        });
-        let is_steady = best.train == steady;
         return Ok(Optimum {
             law: Maximise {
                 period: best.train.period,
@@ -158,15 +151,11 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
                 air_price: request.air_price,
             },
             mean: best.mean,
-            mean_after_minutes: *after,
+            mean_after_minutes: lasting.after,
             range: best.range,
             duty: best.duty,
             steady_mean,
-            mean_detuned: if is_steady {
-                best.mean
-            } else {
-                detuned[0].min(detuned[1])
-            },
+            mean_detuned: lasting.detuned,
             refused: better().count(),
             refused_mean: better().map(|(mean, _)| *mean).reduce(f64::max),
             moduli,
@@ -564,7 +553,6 @@ mod tests {
     #[test]
     fn the_averaged_fixed_delay_model_gives_the_papers_gain() {
         let optimum = maximise(&paper_averaged(), &request(0.0)).unwrap();
-        std::println!("{optimum:?}");
         assert!((1.24..1.35).contains(&optimum.mean), "{optimum:?}");
         assert!((500..600).contains(&optimum.law.period), "{optimum:?}");
         assert!((0.35..0.6).contains(&optimum.duty), "{optimum:?}");

@@ -67,6 +67,7 @@ pub fn nearest_plant(model: &Model) -> Result<PlantSpec, DesignError> {
             delay_rise,
             delay_rate,
             factors,
+            ..
         } => {
             let factor = factors.iter().copied().fold(f64::INFINITY, f64::min);
             DelayLaw::StateDependent {

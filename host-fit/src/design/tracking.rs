@@ -274,6 +274,7 @@ pub(super) mod tests {
                 delay_rise: 12.69,
                 delay_rate: 20.18,
                 factors: vec![1.0],
+                interpolated: false,
             },
             ..paper(convention)
         }

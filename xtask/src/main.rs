@@ -1,5 +1,6 @@
 //! The project's chores; `cargo xtask help` lists them.
 
+mod bench_law;
 mod budgets;
 mod ci;
 mod faults;
@@ -19,6 +20,7 @@ struct Task {
 }
 
 const TASKS: &[Task] = &[
+    bench_law::TASK,
     ci::TASK,
     faults::TASK,
     firmware::TASK,

@@ -90,6 +90,7 @@ impl<T: Real> Bench<T> {
             let at = Instant {
                 command,
                 arrived: T::ZERO,
+                flow: T::ZERO,
                 channels: &self.channels,
             };
             let command = law.command(&mut run, command);

@@ -253,6 +253,7 @@ pub(super) mod tests {
             c: Vec::new(),
             delay: Delay::Fixed { delays: vec![49] },
             effects: Vec::new(),
+            definitions: Vec::new(),
             training: Training::default(),
             law: None,
         }

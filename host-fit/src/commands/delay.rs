@@ -3,8 +3,7 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use anyhow::Context;
-use host_fit::data::DataSet;
+use host_fit::data::{DataSet, Excitation};
 use host_fit::delay::{
     DelayLawFit, DelayOptions, DelayStatistics, DelayStudy, DelayVerdict, EdgeDelay, Spread,
     draw_delays, study_delays,
@@ -47,6 +46,7 @@ struct Document<'a> {
     statistics: Option<&'a DelayStatistics>,
     verdict: DelayVerdict,
     words: &'a str,
+    remarks: &'a [String],
     p_law: Option<f64>,
     p_law_within_direction: Option<f64>,
     p_direction: Option<f64>,
@@ -111,9 +111,13 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         let title = set.title.as_deref().unwrap_or_default();
         let picture = draw_delays(&study, title, set.sample_period_s);
         staging.write("delays.svg", |w| w.write_all(picture.as_bytes()))?;
-        staging.commit().context("writing the delays")?;
+        staging.commit()?;
     }
+    let excitation = Excitation::of(&set, args.max_delay as usize);
     console.say(&words(&set, &study))?;
+    for remark in &excitation.remarks {
+        console.say(&format!("Remark on the commands: {remark}"))?;
+    }
     console.document(&Document {
         sample_period_s: set.sample_period_s,
         window_samples: args.window,
@@ -121,6 +125,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         statistics: study.statistics.as_ref(),
         verdict: study.verdict,
         words: &study.words,
+        remarks: &excitation.remarks,
         p_law: study.p_law,
         p_law_within_direction: study.p_law_within_direction,
         p_direction: study.p_direction,

@@ -300,7 +300,4 @@ pub enum Problem {
     /// Not a regular file.
     #[error("`{0}` is not a file; name a CSV file")]
     NotAFile(String),
-    /// The data set could not be written.
-    #[error("{0}")]
-    Unwritable(#[from] crate::output::OutputError),
 }

@@ -168,7 +168,7 @@ impl Excitation {
                 "All on-times are equal and all off-times are equal: a slow effect (droop, drift, hysteresis) cannot be told from the response itself. Add a record with other times.".into(),
             );
         }
-        if 2 * self.lags_separated < self.lags_tried {
+        if 4 * self.lags_separated < self.lags_tried {
             remarks.push(format!(
                 "Of {} input delays spread over the lags asked for, the commands separate about {}: least squares over many input delays will be decided by noise.",
                 self.lags_tried, self.lags_separated

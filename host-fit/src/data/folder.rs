@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use super::error::{DataError, Place, Problem, printable};
 use super::record::{DataSet, Origin, Record, Use};
 use super::table::Table;
-use crate::output::Staging;
+use crate::output::{OutputError, Staging};
 
 const MANIFEST: &str = "dataset.toml";
 
@@ -132,9 +132,8 @@ fn manifest_error(path: &Path, text: &str, error: &toml::de::Error) -> DataError
 }
 
 /// See [`DataSet::save`].
-pub(crate) fn save(set: &DataSet, dir: &Path) -> Result<(), DataError> {
-    let failed = |e: crate::output::OutputError| Place::default().error(Problem::Unwritable(e));
-    let mut staging = Staging::new(dir).map_err(failed)?;
+pub(crate) fn save(set: &DataSet, dir: &Path) -> Result<(), OutputError> {
+    let mut staging = Staging::new(dir)?;
     let mut entries: Vec<Entry> = Vec::with_capacity(set.records.len());
     for record in &set.records {
         let stem = file_stem(&record.name);
@@ -145,9 +144,7 @@ pub(crate) fn save(set: &DataSet, dir: &Path) -> Result<(), DataError> {
             })
             .find(|name| entries.iter().all(|e| !e.file.eq_ignore_ascii_case(name)))
             .unwrap_or_default();
-        staging
-            .write(&file, |w| write_record(record, w))
-            .map_err(failed)?;
+        staging.write(&file, |w| write_record(record, w))?;
         entries.push(Entry {
             name: record.name.clone(),
             file,
@@ -159,12 +156,12 @@ pub(crate) fn save(set: &DataSet, dir: &Path) -> Result<(), DataError> {
         sample_period_s: set.sample_period_s,
         record: entries,
     };
-    let text = toml::to_string(&manifest)
-        .map_err(|e| Place::file(dir).error(Problem::Manifest(e.to_string())))?;
-    staging
-        .write(MANIFEST, |w| w.write_all(text.as_bytes()))
-        .map_err(failed)?;
-    staging.commit().map_err(failed)
+    let text = toml::to_string(&manifest).map_err(|e| OutputError::Io {
+        path: dir.join(MANIFEST),
+        cause: io::Error::other(e),
+    })?;
+    staging.write(MANIFEST, |w| w.write_all(text.as_bytes()))?;
+    staging.commit()
 }
 
 /// The record's name as a file name: letters, digits, `-`, `_` and `.` stay, the rest becomes `-`.

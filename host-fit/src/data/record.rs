@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::error::{DataError, Place, Problem};
 use super::hash;
+use crate::output::OutputError;
 
 /// Names of columns with a meaning of their own; every other column is a measured channel.
 pub(crate) const RESERVED: [&str; 6] = ["t", "u", "y", "y_sd", "y_min", "y_max"];
@@ -325,8 +326,8 @@ impl DataSet {
     /// Numbers are written in the shortest form that reads back to the same bits.
     ///
     /// # Errors
-    /// [`DataError`] when the folder cannot be written.
-    pub fn save(&self, dir: &Path) -> Result<(), DataError> {
+    /// [`OutputError`] when the folder cannot be written; nothing is left behind then.
+    pub fn save(&self, dir: &Path) -> Result<(), OutputError> {
         super::folder::save(self, dir)
     }
 }

@@ -10,6 +10,8 @@ use super::onset::mean;
 
 /// Of the peaks at least this high against the highest, the soonest is the front.
 const HIGH: f64 = 0.8;
+/// By this factor the first edges must prefer a later peak.
+const CLEARLY: f64 = 2.0;
 
 /// When a response is expected after an edge of one direction, samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,26 +85,31 @@ pub(crate) fn expect(
     let gain_sign = gain_sign(series);
     let arrival = |rising: bool| -> Option<Arrival> {
         let direction = if rising { gain_sign } else { -gain_sign };
-        let mine = || {
-            series.iter().zip(levels).flat_map(|((_, edges), levels)| {
-                let mine = edges.iter().filter(|e| e.rising == rising);
-                mine.map(move |e| (e.sample, levels))
-            })
-        };
-        mine().next()?;
-        // The front lies up to `reach` after its start.
-        let votes: Vec<f64> = (0..=max_delay + reach)
-            .map(|delay| {
-                let mut sum = 0.0;
-                let mut count = 0usize;
-                for level in mine().filter_map(|(sample, levels)| levels.get(sample + delay)) {
-                    sum += (direction * level).clamp(-bound, bound);
-                    count += 1;
-                }
+        let votes = |most: usize| -> Option<Vec<f64>> {
+            let mine: Vec<(usize, &[f64])> = series
+                .iter()
+                .zip(levels)
+                .flat_map(|((_, edges), levels)| {
+                    let mine = edges.iter().filter(|e| e.rising == rising).take(most);
+                    mine.map(|e| (e.sample, levels.as_slice()))
+                })
+                .collect();
+            if mine.is_empty() {
+                return None;
+            }
+            // The front lies up to `reach` after its start.
+            let vote = |delay: usize| {
+                let seen = mine
+                    .iter()
+                    .filter_map(|(sample, levels)| levels.get(sample + delay));
+                let (sum, count) = seen.fold((0.0, 0usize), |(sum, count), level| {
+                    (sum + (direction * level).clamp(-bound, bound), count + 1)
+                });
                 sum / count.max(1) as f64
-            })
-            .collect();
-        let front = first_high_peak(&votes, reach / 2)?;
+            };
+            Some((0..=max_delay + reach).map(vote).collect())
+        };
+        let front = soonest_peak(&votes(usize::MAX)?, &votes(1)?, reach / 2)?;
         Some(Arrival {
             front,
             onset: front.saturating_sub(reach / 2),
@@ -134,18 +141,29 @@ pub(crate) fn own_front(levels: &[f64], edge: Edge, expected: &Expectation) -> u
 
 /// The first peak (within `half_width` to either side) that is nearly as high as the highest.
 ///
-/// In periodic records a peak returns with the period, and fast responses cast echoes: the soonest is meant.
-fn first_high_peak(votes: &[f64], half_width: usize) -> Option<usize> {
+/// In periodic records a peak returns with the period: the soonest is meant. Only where a ringing flow swings back as
+/// fast as it responds is the soonest peak the wrong one; the first edge of each record, which starts from rest, then
+/// votes clearly (`at_rest`) for a later one.
+fn soonest_peak(votes: &[f64], at_rest: &[f64], half_width: usize) -> Option<usize> {
     let highest = votes.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    (0..votes.len()).find(|&d| {
-        let mut around = votes
-            .iter()
-            .take(d + half_width + 1)
-            .skip(d.saturating_sub(half_width));
-        votes
-            .get(d)
-            .is_some_and(|&v| v >= HIGH * highest && around.all(|&a| a <= v))
-    })
+    let peaks: Vec<usize> = (0..votes.len())
+        .filter(|&d| {
+            let mut around = votes
+                .iter()
+                .take(d + half_width + 1)
+                .skip(d.saturating_sub(half_width));
+            votes
+                .get(d)
+                .is_some_and(|&v| v >= HIGH * highest && around.all(|&a| a <= v))
+        })
+        .collect();
+    let from_rest = |d: usize| at_rest.get(d).copied().unwrap_or(0.0);
+    let soonest = *peaks.first()?;
+    peaks
+        .iter()
+        .copied()
+        .find(|&d| from_rest(d) > CLEARLY * from_rest(soonest).max(0.0))
+        .or(Some(soonest))
 }
 
 /// +1 if y lies above its level at rest on the whole, −1 if below. y at rest is y before the first edge, or 0.
@@ -202,7 +220,9 @@ mod tests {
         let votes: Vec<f64> = (0..300)
             .map(|d| (f64::from(d) * std::f64::consts::TAU / 125.0).sin())
             .collect();
-        assert_eq!(first_high_peak(&votes, 15), Some(31));
+        assert_eq!(soonest_peak(&votes, &votes, 15), Some(31));
+        let later: Vec<f64> = (0..300).map(|d| if d < 100 { 0.1 } else { 0.5 }).collect();
+        assert_eq!(soonest_peak(&votes, &later, 15), Some(156));
         let edges = vec![Edge {
             sample: 30,
             rising: true,

@@ -135,6 +135,27 @@ impl Bench {
         Some(self.run(law, goal, goal))
     }
 
+    /// No controller at all: the square wave of that many switches per second whose
+    /// duty gives the goal on average. Nothing at this rate ripples less.
+    fn floor(&self, goal: f64, switches_per_s: f64) -> Figures {
+        let frequency = 0.5 * switches_per_s;
+        let (mut low, mut high) = (0.0, 1.0);
+        let mut best = self.run(OpenLoop::square(frequency, 0.5, TIMES), goal, goal);
+        for _ in 0..8 {
+            let duty = 0.5 * (low + high);
+            let figures = self.run(OpenLoop::square(frequency, duty, TIMES), goal, goal);
+            if figures.offset.abs() < best.offset.abs() {
+                best = figures;
+            }
+            if figures.offset < 0.0 {
+                low = duty;
+            } else {
+                high = duty;
+            }
+        }
+        best
+    }
+
     /// The gains of a grid that hold the goal most closely on this very plant.
     fn tuned(&self, goal: f64, smith: bool) -> Figures {
         let mut best: Option<Figures> = None;
@@ -224,7 +245,7 @@ fn main() {
         heading(&format!(
             "Held at {level} of steady blowing; gains of PI chosen best for each plant"
         ));
-        let rows: [(&str, fn(&Bench, f64) -> Option<Figures>); 8] = [
+        let rows: [(&str, fn(&Bench, f64) -> Option<Figures>); 9] = [
             ("steady blowing", |b, g| {
                 Some(b.run(OpenLoop::steady(), g, g))
             }),
@@ -246,6 +267,10 @@ fn main() {
                 let relay = b.at_mean(g, || Relay::new(TIMES, 0.02));
                 b.law(g, Some(relay.switches_per_s))
             }),
+            ("  the least ripple at the relay's switches/s", |b, g| {
+                let relay = b.at_mean(g, || Relay::new(TIMES, 0.02));
+                Some(b.floor(g, relay.switches_per_s))
+            }),
         ];
         for (name, figures) in rows {
             let mut row = Row::default();
@@ -259,16 +284,25 @@ fn main() {
     }
     heading("At the mean friction that each open-loop command happens to give");
     for duty in [0.5, 0.8] {
-        let (mut open, mut law) = (Row::default(), Row::default());
-        for bench in &benches {
-            let square = bench.run(OpenLoop::square(4.0, duty, TIMES), 0.0, 0.0);
-            let judged = bench.run(OpenLoop::square(4.0, duty, TIMES), 0.0, square.mean);
-            if let Some(figures) = bench.law(square.mean, None) {
-                open.add(&judged, bench.base.gain);
-                law.add(&figures, bench.base.gain);
+        for slow_to_separate in [true, false] {
+            let (mut open, mut law) = (Row::default(), Row::default());
+            let group = |b: &&Bench| (b.base.separate_s > b.base.attach_s) == slow_to_separate;
+            for bench in benches.iter().filter(group) {
+                let square = || OpenLoop::square(4.0, duty, TIMES);
+                let goal = bench.run(square(), 0.0, 0.0).mean;
+                if let Some(figures) = bench.law(goal, None) {
+                    open.add(&bench.run(square(), 0.0, goal), bench.base.gain);
+                    law.add(&figures, bench.base.gain);
+                }
             }
+            let slower = if slow_to_separate {
+                "separation"
+            } else {
+                "attachment"
+            };
+            let percent = 100.0 * duty;
+            open.print(&format!("{slower} slower: open loop 4 Hz {percent:.0} %"));
+            law.print(&format!("{slower} slower: the designed law at that mean"));
         }
-        open.print(&format!("open loop 4 Hz {:.0} %", 100.0 * duty));
-        law.print("the designed law at that mean");
     }
 }

@@ -29,7 +29,7 @@ impl<T: Real> Clock<T> {
     #[inline]
     pub fn tick(&mut self, command: T) {
         self.lived = self.lived.saturating_add(1);
-        let changed = command < self.command || command > self.command;
+        let changed = command.partial_cmp(&self.command) != Some(core::cmp::Ordering::Equal);
         self.since_edge = if changed {
             0
         } else {

@@ -9,7 +9,7 @@ mod evidence;
 use crate::data::{Record, Use};
 use crate::fit::{CandidateError, Fit, FitOptions, fit, fit_with_effect, lean_base};
 use crate::indicators::{Indicators, score};
-use crate::model::Model;
+use crate::model::{Model, Start};
 use crate::simulate::SimulateError;
 use evidence::{HeldOut, decoys, p_above_noise, p_value};
 use model_core::effect::{Place, Spec};
@@ -183,15 +183,19 @@ impl<'a> Bench<'a> {
         use rand::{RngExt, SeedableRng};
         let of =
             |role: Use| -> Vec<&Record> { records.iter().filter(|r| r.role == role).collect() };
-        let learning = of(Use::Identify);
+        let mut learning = of(Use::Identify);
         let Some(first) = learning.first() else {
             return Err(DiagnoseError::NothingToLearnFrom);
         };
         let period_s = first.sample_period_s;
-        let judging = match of(Use::Validate) {
-            held_out if held_out.is_empty() => learning.clone(),
-            held_out => held_out,
-        };
+        let mut judging = of(Use::Validate);
+        if judging.is_empty() && learning.len() > 1 {
+            // Nothing was held out: the last record is, from all fits.
+            judging.extend(learning.pop());
+        }
+        if judging.is_empty() {
+            judging.clone_from(&learning);
+        }
         let (mut sum, mut count) = (0.0, 0.0);
         let mut noise = true;
         for record in &judging {
@@ -395,6 +399,16 @@ impl<'a> Bench<'a> {
     }
 }
 
+/// From a base model, effect by effect.
+struct Climb {
+    base: Judged,
+    current: Judged,
+    added: Vec<&'static Spec>,
+    ladder: Vec<Rung>,
+    ranking: Vec<Ranked>,
+    not_tried: Vec<NotTried>,
+}
+
 #[derive(Default)]
 struct Round {
     candidates: Vec<(&'static Spec, Judged)>,
@@ -457,7 +471,10 @@ pub fn diagnose(
     interrupt: &AtomicBool,
 ) -> Result<Diagnosis, DiagnoseError> {
     let bench = Bench::new(records, options.seed)?;
-    let fit_options = FitOptions::default();
+    let fit_options = FitOptions {
+        constant: given.start == Start::Measured || given.constant != 0.0,
+        ..FitOptions::default()
+    };
     let mut ladder = vec![
         bench
             .rung(given, &given.effect_names(), "the model as given")
@@ -469,50 +486,36 @@ pub fn diagnose(
                 step: "the model as given diverges on these records".to_owned(),
             }),
     ];
-    let base = bench.base(given, &fit_options)?;
-    let base_model = base.fit.model.clone();
-    let already = base_model.effect_names();
-    ladder.push(bench.rung(&base_model, &already, "refitted with the fewest lags")?);
-
-    let mut current = base.clone();
-    let mut added: Vec<&'static Spec> = Vec::new();
-    let mut ranking = Vec::new();
-    let mut not_tried = Vec::new();
-    while added.len() < options.most_effects && !bench.at_the_floor(&current.held_out) {
-        let round = bench.round(&current.fit.model, &fit_options, interrupt);
-        if interrupt.load(Ordering::Relaxed) {
-            break;
-        }
-        let ranked = bench.rank(&current, &round);
-        let winner = ranked
-            .iter()
-            .find(|candidate| candidate.significant)
-            .cloned();
-        if added.is_empty() {
-            ranking = ranked;
-            not_tried.clone_from(&round.not_tried);
-        }
-        let Some(winner) = winner else { break };
-        let Some((spec, judged)) = round
-            .candidates
-            .into_iter()
-            .find(|(spec, _)| spec.name == winner.effect)
-        else {
-            break;
-        };
-        current = judged;
-        added.push(spec);
-        current = bench.prune(current, &base_model, &mut added, &fit_options);
-        let names: Vec<String> = added.iter().map(|spec| spec.name.to_owned()).collect();
-        ladder.push(bench.rung(
-            &current.fit.model,
-            &names,
-            &format!("with {}", winner.effect),
-        )?);
-    }
-    if interrupt.load(Ordering::Relaxed) && ranking.is_empty() {
+    let mut climb = if given.start == Start::Measured {
+        // Records that begin in mid-run come from rigs that are no blown ramp:
+        // their dynamics is the user's choice of lags.
+        let base = bench.refitted(given, &fit_options)?;
+        bench.climb(
+            base,
+            "refitted in free run",
+            options,
+            &fit_options,
+            interrupt,
+        )?
+    } else {
+        let lean = bench.lean(given, &fit_options)?;
+        let step = "refitted with the fewest lags";
+        let climb = bench.climb(lean, step, options, &fit_options, interrupt)?;
+        bench.or_from_given(climb, given, options, &fit_options, interrupt)?
+    };
+    if interrupt.load(Ordering::Relaxed) && climb.ranking.is_empty() {
         return Err(DiagnoseError::Interrupted);
     }
+    ladder.append(&mut climb.ladder);
+    let Climb {
+        base,
+        current,
+        added,
+        mut ranking,
+        not_tried,
+        ..
+    } = climb;
+    let base_model = base.fit.model.clone();
 
     let parameters: BTreeMap<_, _> = added
         .iter()
@@ -538,17 +541,107 @@ pub fn diagnose(
 }
 
 impl Bench<'_> {
-    /// The base model: the leanest structure, or the given one refitted where
-    /// that is needed.
-    fn base(&self, given: &Model, options: &FitOptions) -> Result<Judged, DiagnoseError> {
+    /// The leanest base, with the effects that the given model has already.
+    fn lean(&self, given: &Model, options: &FitOptions) -> Result<Judged, DiagnoseError> {
         let mut bare = given.clone();
         // What was added before stays: the question is what is missing still.
         let kept = std::mem::take(&mut bare.effects);
-        let lean = lean_base(&bare, &self.learning)?;
-        let mut model = lean.model;
+        let mut model = lean_base(&bare, &self.learning)?.model;
         model.effects = kept;
-        let lean = fit(&model, &self.learning, options)?;
-        Ok(self.judge(lean)?)
+        Ok(self.judge(fit(&model, &self.learning, options)?)?)
+    }
+
+    /// The given model refitted in free run, its structure and delays kept.
+    fn refitted(&self, given: &Model, options: &FitOptions) -> Result<Judged, DiagnoseError> {
+        Ok(self.judge(fit(given, &self.learning, options)?)?)
+    }
+
+    /// Climbs again from the given structure where its free lags hold more than
+    /// the lean model and all its effects: then its dynamics is not lean.
+    fn or_from_given(
+        &self,
+        climb: Climb,
+        given: &Model,
+        options: &Options,
+        fit_options: &FitOptions,
+        interrupt: &AtomicBool,
+    ) -> Result<Climb, DiagnoseError> {
+        let richer = given.a.len() + given.c.len()
+            > climb.base.fit.model.a.len() + climb.base.fit.model.c.len();
+        let reached = self
+            .noise
+            .is_some_and(|noise| climb.current.held_out.rmse() <= FLOOR_MARGIN * noise);
+        if !richer || reached || interrupt.load(Ordering::Relaxed) {
+            return Ok(climb);
+        }
+        let Ok(base) = self.refitted(given, fit_options) else {
+            return Ok(climb);
+        };
+        if base.held_out.rmse() > (1.0 - WORTHWHILE) * climb.current.held_out.rmse() {
+            return Ok(climb);
+        }
+        self.climb(
+            base,
+            "refitted in free run",
+            options,
+            fit_options,
+            interrupt,
+        )
+    }
+
+    /// Adds one effect after the other as long as one is significant and worth it.
+    fn climb(
+        &self,
+        base: Judged,
+        step: &str,
+        options: &Options,
+        fit_options: &FitOptions,
+        interrupt: &AtomicBool,
+    ) -> Result<Climb, DiagnoseError> {
+        let base_model = base.fit.model.clone();
+        let mut climb = Climb {
+            ladder: vec![self.rung(&base_model, &base_model.effect_names(), step)?],
+            current: base.clone(),
+            base,
+            added: Vec::new(),
+            ranking: Vec::new(),
+            not_tried: Vec::new(),
+        };
+        while climb.added.len() < options.most_effects
+            && !self.at_the_floor(&climb.current.held_out)
+        {
+            let round = self.round(&climb.current.fit.model, fit_options, interrupt);
+            if interrupt.load(Ordering::Relaxed) {
+                break;
+            }
+            let ranked = self.rank(&climb.current, &round);
+            let winner = ranked
+                .iter()
+                .find(|candidate| candidate.significant)
+                .cloned();
+            if climb.added.is_empty() {
+                climb.ranking = ranked;
+                climb.not_tried.clone_from(&round.not_tried);
+            }
+            let Some(winner) = winner else { break };
+            let mut candidates = round.candidates.into_iter();
+            let Some((spec, judged)) = candidates.find(|(spec, _)| spec.name == winner.effect)
+            else {
+                break;
+            };
+            climb.added.push(spec);
+            climb.current = self.prune(judged, &base_model, &mut climb.added, fit_options);
+            let names: Vec<String> = climb
+                .added
+                .iter()
+                .map(|spec| spec.name.to_owned())
+                .collect();
+            let step = format!("with {}", winner.effect);
+            climb
+                .ladder
+                .push(self.rung(&climb.current.fit.model, &names, &step)?);
+        }
+        Ok(climb)
     }
 
     /// Drops effects that the last one has made needless.

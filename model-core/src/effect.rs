@@ -41,7 +41,8 @@ pub struct Parameter {
     pub low: f64,
     /// Highest value that makes sense.
     pub high: f64,
-    /// Values from which a search should set out; between the bounds.
+    /// Values from which a search should set out, for signals of order 1; those
+    /// in "y per sample" are relative to the usual change of y over a sample.
     pub starts: &'static [f64],
     /// How it enters.
     pub influence: Influence,

@@ -134,6 +134,8 @@ fn channel_reference(spec: &Spec, records: &[&Record]) -> Result<Option<f64>, Ca
 struct Scale {
     y: f64,
     u: f64,
+    /// Root mean square change of y over a sample.
+    y_per_sample: f64,
 }
 
 impl Scale {
@@ -147,15 +149,22 @@ impl Scale {
             }
         };
         let size = |series: &[f64]| series.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let changes = records
+            .iter()
+            .flat_map(|r| r.y.windows(2).map(|pair| pair[1] - pair[0]));
+        let (sum, count) =
+            changes.fold((0.0, 0.0), |(s, n), change| (s + change * change, n + 1.0));
         Self {
             y: largest(&|record| size(&record.y)),
             u: largest(&|record| size(&record.u)),
+            y_per_sample: (sum / f64::max(count, 1.0)).sqrt(),
         }
     }
 
     fn of_unit(&self, unit: &str) -> f64 {
         match unit {
-            "y" | "y per sample" => self.y,
+            "y" => self.y,
+            "y per sample" => self.y_per_sample,
             "1/y" => 1.0 / self.y,
             "1/y²" => 1.0 / (self.y * self.y),
             "1/u" => 1.0 / self.u,

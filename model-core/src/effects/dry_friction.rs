@@ -33,7 +33,7 @@ impl<T: Real> Physics<T> for DryFriction<T> {
         summary: "Coulomb friction acts against the motion",
         equation: "adds −F·sign(s_k − s_{k−1})",
         parameters: &[
-            Parameter { name: "level", unit: "y per sample", low: 0.0, high: 1.0, starts: &[0.0001, 0.001], influence: Influence::Smooth },
+            Parameter { name: "level", unit: "y per sample", low: 0.0, high: 1.0, starts: &[0.001, 0.03, 0.3], influence: Influence::Smooth },
         ],
         channel: None,
         source: "Coulomb friction; Armstrong-Hélouvry et al., Automatica 30 (1994)",

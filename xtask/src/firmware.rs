@@ -14,7 +14,7 @@ pub(crate) const TASK: Task = Task {
 };
 
 /// Cortex-M4F: both boards.
-const BOARD_TARGET: &str = TARGETS[0];
+pub(crate) const BOARD_TARGET: &str = TARGETS[0];
 
 fn firmware(arguments: &[String]) -> Result<()> {
     let board = match arguments {

@@ -1,6 +1,7 @@
 //! The project's chores; `cargo xtask help` lists them.
 
 mod bench_law;
+mod bench_step;
 mod budgets;
 mod ci;
 mod faults;
@@ -21,6 +22,7 @@ struct Task {
 
 const TASKS: &[Task] = &[
     bench_law::TASK,
+    bench_step::TASK,
     ci::TASK,
     faults::TASK,
     firmware::TASK,

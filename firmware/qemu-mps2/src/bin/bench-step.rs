@@ -1,0 +1,56 @@
+//! Instructions of one step of Table II's model: this crate's and the C peer's,
+//! in one run. Sends a line over the serial line and stops.
+#![no_std]
+#![no_main]
+
+use cortex_m_rt::entry;
+use identified::full;
+use model_core::self_test::command;
+use model_core::{Input, step};
+use qemu_mps2::clock::Ticks;
+use qemu_mps2::uart::Uart;
+
+const STEPS: u32 = 20_000;
+
+unsafe extern "C" {
+    fn peer_step(command: i32) -> f32;
+}
+
+#[inline(never)]
+fn own_step(state: &mut full::IdentifiedState, on: bool) -> f32 {
+    let input = Input {
+        command: if on { 1.0 } else { 0.0 },
+        channels: &[],
+    };
+    step(&full::MODEL, state, &input).measured
+}
+
+#[entry]
+fn main() -> ! {
+    if let Some(core) = cortex_m::Peripherals::take() {
+        let mut uart = Uart::new(core.ITM);
+        let mut ticks = Ticks::new(core.SYST);
+        let mut state = full::state(&full::MODEL);
+        let (mut own, mut peer, mut apart) = (0_u32, 0_u32, 0.0_f32);
+        for k in 0..STEPS {
+            let on = command(k);
+            let (ours, taken) = ticks.measure(|| own_step(&mut state, on));
+            own += taken;
+            // SAFETY: the peer keeps its state to itself and is called from here only.
+            let (theirs, taken) = ticks.measure(|| unsafe { peer_step(on.into()) });
+            peer += taken;
+            let distance = if ours > theirs {
+                ours - theirs
+            } else {
+                theirs - ours
+            };
+            apart = if distance > apart { distance } else { apart };
+        }
+        for word in [STEPS, own, peer, (apart * 1e9) as u32] {
+            uart.send(&word.to_le_bytes());
+        }
+    }
+    loop {
+        cortex_m::asm::wfi();
+    }
+}

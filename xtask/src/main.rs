@@ -2,6 +2,7 @@
 
 mod bench_law;
 mod bench_step;
+mod bench_search;
 mod budgets;
 mod ci;
 mod faults;
@@ -23,6 +24,7 @@ struct Task {
 const TASKS: &[Task] = &[
     bench_law::TASK,
     bench_step::TASK,
+    bench_search::TASK,
     ci::TASK,
     faults::TASK,
     firmware::TASK,

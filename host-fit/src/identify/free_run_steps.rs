@@ -79,7 +79,7 @@ fn descend(
 }
 
 /// A sweep that gains less than this share ends a descent.
-const SMALL_GAIN: f64 = 2e-4;
+const SMALL_GAIN: f64 = 1e-3;
 
 /// Evaluates all points and keeps the best; gives the place of a better one.
 fn best_of(

@@ -17,7 +17,7 @@ use crate::linalg;
 
 /// One sample in so many enters the products. Odd, so that patterns of two
 /// samples are seen.
-const STRIDE: usize = 23;
+const STRIDE: usize = 41;
 
 /// Sensitivities run side by side.
 const LANES: usize = 8;

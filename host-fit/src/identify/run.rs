@@ -66,7 +66,7 @@ impl Default for IdentifyOptions {
             structure: Structure::default(),
             objective: Objective::default(),
             search: Settings::default(),
-            patience: 4,
+            patience: 3,
             refine: true,
         }
     }
@@ -190,8 +190,8 @@ pub enum IdentifyError {
     NotConverged(#[from] linalg::NotConverged),
 }
 
-/// Restarts in all are at most this many times the patience.
-const MOST_KICKS: usize = 2;
+/// Restarts of a free-run search are at most this many more than the patience.
+const MORE_KICKS: usize = 2;
 
 /// Identifies a model from the identify records of `data`; validate records only
 /// judge the refinement.
@@ -353,7 +353,7 @@ fn search(
     let starts: Vec<Point> = vec![draw()];
     let mut one_step = OneStep { regression };
     let kicks = match options.objective {
-        Objective::OneStep => 5 * options.patience,
+        Objective::OneStep => 6 * options.patience,
         // Only a starting point is needed.
         Objective::FreeRun => options.patience,
     };
@@ -389,7 +389,7 @@ fn search(
         Box::new(Speculative::default()),
         Box::new(FreeKickStep::new(
             options.patience,
-            MOST_KICKS * options.patience,
+            MORE_KICKS + options.patience,
         )),
     ];
     let mut free = minimise(

@@ -1,8 +1,8 @@
 //! The project's chores; `cargo xtask help` lists them.
 
 mod bench_law;
-mod bench_step;
 mod bench_search;
+mod bench_step;
 mod budgets;
 mod ci;
 mod faults;

@@ -13,6 +13,7 @@ pub mod indicators;
 pub mod model;
 pub mod output;
 pub mod picture;
+pub mod residual;
 pub mod search;
 pub mod simulate;
 pub mod target;

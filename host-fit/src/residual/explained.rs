@@ -1,0 +1,319 @@
+//! How much of an error is a function of a coordinate: learned on some samples,
+//! tested on others.
+
+use super::coordinate::{Coordinate, Folds};
+use crate::fit::dot;
+use std::collections::BTreeMap;
+
+/// Length of the blocks that folds and standard errors are made of, s: longer
+/// than the flow remembers.
+const BLOCK_S: f64 = 0.25;
+/// Folds when blocks take turns.
+const TURNS: usize = 5;
+/// A share must stand this many standard errors above 0, or it counts as none:
+/// some ten coordinates are tried in three ways each.
+const STANDARD_ERRORS: f64 = 2.5;
+/// Fewest samples of a bin to learn from.
+const FEWEST: f64 = 20.0;
+
+/// The error of a free run, record by record, with the variance of the noise.
+pub(super) struct Errors {
+    /// y − y_sim.
+    pub(super) residual: Vec<Vec<f64>>,
+    /// y_sim.
+    pub(super) simulated: Vec<Vec<f64>>,
+    /// σ² of the noise.
+    pub(super) noise: Vec<Vec<f64>>,
+    pub(super) warm_up: usize,
+    pub(super) period_s: f64,
+}
+
+/// In which way an error depends on a coordinate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dependence {
+    /// Its mean does: the model reads too high here and too low there.
+    Mean,
+    /// Its proportion to y does.
+    Proportion,
+    /// Its mean does, and how that changes with the dwell before the edge.
+    Dwell,
+    /// Its size does; the sign is not a function of the coordinate.
+    Size,
+}
+
+/// A cross-validated share of the excess error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Share {
+    pub(super) fraction: f64,
+    pub(super) dependence: Dependence,
+}
+
+/// A sample that is judged.
+struct Sample {
+    fold: usize,
+    block: usize,
+    bin: Option<usize>,
+    residual: f64,
+    /// What the error may be proportional to: y_sim, and ln(dwell before the edge).
+    covariates: [f64; 2],
+    excess: f64,
+}
+
+impl Errors {
+    pub(super) fn block(&self, record: usize) -> usize {
+        let length = self.residual.get(record).map_or(0, Vec::len);
+        let block = (BLOCK_S / self.period_s).round() as usize;
+        block.clamp(1, (length / 10).max(1))
+    }
+
+    /// Σ (e² − σ²).
+    pub(super) fn excess(&self) -> f64 {
+        let each = self.residual.iter().zip(&self.noise);
+        each.map(|(e, noise)| {
+            let (e, noise) = (
+                e.get(self.warm_up..).unwrap_or(&[]),
+                noise.get(self.warm_up..).unwrap_or(&[]),
+            );
+            dot(e, e) - noise.iter().sum::<f64>()
+        })
+        .sum()
+    }
+
+    fn samples(&self, coordinate: &Coordinate) -> Vec<Sample> {
+        let mut samples = Vec::new();
+        let mut blocks = 0;
+        for record in 0..self.residual.len() {
+            let block = self.block(record);
+            let length = self.residual[record].len();
+            for k in self.warm_up..length {
+                let of_record = k / block;
+                let residual = self.residual[record][k];
+                samples.push(Sample {
+                    fold: match coordinate.folds {
+                        Folds::Blocks => (of_record + record) % TURNS,
+                        Folds::Records => record,
+                    },
+                    block: blocks + of_record,
+                    bin: coordinate.bin[record][k].map(usize::from),
+                    residual,
+                    covariates: [
+                        self.simulated[record][k],
+                        coordinate.dwell.as_ref().map_or(0.0, |d| d[record][k]),
+                    ],
+                    excess: residual * residual - self.noise[record][k],
+                });
+            }
+            blocks += length / block + 1;
+        }
+        samples
+    }
+}
+
+/// Moments of the samples that something is learned from.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moments {
+    count: f64,
+    e: f64,
+    y: f64,
+    e_y: f64,
+    y_y: f64,
+    excess: f64,
+}
+
+impl Moments {
+    fn add(&mut self, sample: &Sample, covariate: usize) {
+        let y = sample.covariates[covariate];
+        self.count += 1.0;
+        self.e += sample.residual;
+        self.y += y;
+        self.e_y += sample.residual * y;
+        self.y_y += y * y;
+        self.excess += sample.excess;
+    }
+
+    fn with(&self, other: &Self, sign: f64) -> Self {
+        Self {
+            count: self.count + sign * other.count,
+            e: self.e + sign * other.e,
+            y: self.y + sign * other.y,
+            e_y: self.e_y + sign * other.e_y,
+            y_y: self.y_y + sign * other.y_y,
+            excess: self.excess + sign * other.excess,
+        }
+    }
+
+    fn mean(&self) -> f64 {
+        if self.count < FEWEST {
+            return 0.0;
+        }
+        self.e / self.count
+    }
+
+    /// Offset and slope of e over the covariate.
+    fn line(&self) -> (f64, f64) {
+        if self.count < FEWEST {
+            return (0.0, 0.0);
+        }
+        let spread = self.y_y - self.y * self.y / self.count;
+        if spread <= 1e-6 * self.y_y {
+            return (self.mean(), 0.0);
+        }
+        let slope = (self.e_y - self.e * self.y / self.count) / spread;
+        ((self.e - slope * self.y) / self.count, slope)
+    }
+}
+
+/// The share of the excess error that is a function of the coordinate; none
+/// when it is not beyond chance.
+pub(super) fn explained(errors: &Errors, coordinate: &Coordinate, excess: f64) -> Option<Share> {
+    let samples = errors.samples(coordinate);
+    let by_y = gains(&samples, coordinate, excess, 0)?;
+    let mut ways = vec![(Dependence::Mean, by_y[0]), (Dependence::Size, by_y[2])];
+    if coordinate.slow {
+        ways.push((Dependence::Proportion, by_y[1]));
+    }
+    if coordinate.dwell.is_some() {
+        ways.push((
+            Dependence::Dwell,
+            gains(&samples, coordinate, excess, 1)?[1],
+        ));
+    }
+    let mut best: Option<Share> = None;
+    for (dependence, gain) in ways {
+        let fraction = gain / excess;
+        if fraction > best.map_or(0.0, |b| b.fraction) {
+            best = Some(Share {
+                fraction: fraction.min(1.0),
+                dependence,
+            });
+        }
+    }
+    best
+}
+
+/// Energy that knowing the coordinate takes off the error: by mean, by line in
+/// the covariate, by size.
+fn gains(
+    samples: &[Sample],
+    coordinate: &Coordinate,
+    excess: f64,
+    covariate: usize,
+) -> Option<[f64; 3]> {
+    let folds = samples.iter().map(|s| s.fold + 1).max()?;
+    let bins = coordinate.ranges.len();
+    let mut by_bin = vec![vec![Moments::default(); bins]; folds];
+    let mut overall = vec![Moments::default(); folds];
+    for sample in samples {
+        overall[sample.fold].add(sample, covariate);
+        if let Some(bin) = sample.bin {
+            by_bin[sample.fold][bin].add(sample, covariate);
+        }
+    }
+    let sum = |of: &dyn Fn(usize) -> Moments| {
+        (0..folds).fold(Moments::default(), |sum, fold| sum.with(&of(fold), 1.0))
+    };
+    let every = sum(&|fold| overall[fold]);
+    let every_bin: Vec<Moments> = (0..bins).map(|b| sum(&|fold| by_bin[fold][b])).collect();
+    let learned: Vec<Learned> = (0..folds)
+        .map(|fold| Learned::new(&every, &overall[fold], &every_bin, &by_bin[fold]))
+        .collect();
+    let blocks = samples.iter().map(|s| s.block + 1).max()?;
+    let mut gains = [vec![0.0; blocks], vec![0.0; blocks], vec![0.0; blocks]];
+    let density = excess / every.count.max(1.0);
+    for sample in samples {
+        let each = learned[sample.fold].gains(sample, covariate, density);
+        for (gains, gain) in gains.iter_mut().zip(each) {
+            gains[sample.block] += gain;
+        }
+    }
+    Some(match coordinate.folds {
+        Folds::Blocks => gains.map(|gains| beyond_chance(&gains, STANDARD_ERRORS)),
+        // A single event per record has no steady mean; that it comes at the
+        // same place in most records is the evidence.
+        Folds::Records => {
+            let mut of_record = vec![[0.0; 3]; folds];
+            let fold_of_block: BTreeMap<usize, usize> =
+                samples.iter().map(|s| (s.block, s.fold)).collect();
+            for (block, fold) in fold_of_block {
+                for (sum, gains) in of_record[fold].iter_mut().zip(&gains) {
+                    *sum += gains[block];
+                }
+            }
+            [0, 1, 2].map(|way| {
+                let agreeing = of_record.iter().filter(|record| record[way] > 0.0).count();
+                if 3 * agreeing >= 2 * folds {
+                    beyond_chance(&gains[way], 1.0)
+                } else {
+                    0.0
+                }
+            })
+        }
+    })
+}
+
+/// The sum of blocks that are as good as independent; 0 within chance.
+pub(super) fn beyond_chance(gains: &[f64], standard_errors: f64) -> f64 {
+    let n = gains.len() as f64;
+    let sum: f64 = gains.iter().sum();
+    let mean = sum / n.max(1.0);
+    let variance: f64 = gains.iter().map(|g| (g - mean) * (g - mean)).sum();
+    let standard_error = (variance * n / (n - 1.0).max(1.0)).sqrt();
+    if sum > standard_errors * standard_error {
+        sum
+    } else {
+        0.0
+    }
+}
+
+/// What the other folds say.
+struct Learned {
+    mean: f64,
+    line: (f64, f64),
+    means: Vec<f64>,
+    lines: Vec<(f64, f64)>,
+    /// Bins with more than their share.
+    rich: Vec<bool>,
+}
+
+impl Learned {
+    fn new(every: &Moments, own: &Moments, bins: &[Moments], own_bins: &[Moments]) -> Self {
+        let rest = every.with(own, -1.0);
+        let each: Vec<Moments> = bins
+            .iter()
+            .zip(own_bins)
+            .map(|(all, own)| all.with(own, -1.0))
+            .collect();
+        let density = rest.excess / rest.count.max(1.0);
+        Self {
+            mean: rest.mean(),
+            line: rest.line(),
+            means: each.iter().map(Moments::mean).collect(),
+            lines: each.iter().map(Moments::line).collect(),
+            rich: each
+                .iter()
+                .map(|m| m.count >= FEWEST && m.excess > density * m.count)
+                .collect(),
+        }
+    }
+
+    /// What knowing the bin of a sample takes off its error, against knowing
+    /// nothing of the coordinate: by mean, by line in the covariate, by size.
+    fn gains(&self, sample: &Sample, covariate: usize, density: f64) -> [f64; 3] {
+        let Some(bin) = sample.bin else {
+            return [0.0; 3];
+        };
+        let e = sample.residual;
+        let y = sample.covariates[covariate];
+        let square = |x: f64| x * x;
+        let line = |(offset, slope): (f64, f64)| square(e - offset - slope * y);
+        [
+            square(e - self.mean) - square(e - self.means[bin]),
+            line(self.line) - line(self.lines[bin]),
+            if self.rich[bin] {
+                sample.excess - density
+            } else {
+                0.0
+            },
+        ]
+    }
+}

@@ -1,0 +1,384 @@
+//! Where a model fails: its free-run error on held-out records, split along one
+//! coordinate after another and judged against the noise.
+
+mod coordinate;
+mod explained;
+mod noise;
+#[cfg(test)]
+pub(crate) mod plants;
+mod spectrum;
+mod trend;
+mod words;
+
+pub use explained::Dependence;
+pub use noise::NoiseSource;
+pub use trend::Trend;
+
+use crate::data::{Record, Use};
+use crate::model::Model;
+use crate::picture::{FailureBin, FailureView};
+use crate::simulate::SimulateError;
+use coordinate::{CYCLES, Coordinate, Source, coordinates};
+use explained::{Errors, beyond_chance, explained};
+use serde::Serialize;
+
+/// An excess counts when it stands this many standard errors above 0 …
+const STANDARD_ERRORS: f64 = 3.0;
+/// … and is at least this fraction of the noise: y_sd is not known better.
+const LEAST_EXCESS: f64 = 0.05;
+/// The share of the excess that the smallest interval is sought for.
+const CONCENTRATION: f64 = 0.75;
+/// A bin must hold this share of the samples to be called the worst.
+const WORST_HOLDS: f64 = 0.004;
+/// A longer cycle of pulses must explain this much more than a shorter one.
+const LONGER_CYCLE: f64 = 1.05;
+
+/// Pulses count time as well: their number must explain this much more than time.
+const PULSES_ARE_A_CLOCK: f64 = 1.3;
+
+/// The error along one coordinate. Serialises to the keys of `compare --json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Where {
+    /// What the coordinate is, for example `time since rising edge`.
+    pub coordinate: String,
+    /// Unit of `worst_from` and `worst_to`; empty for none.
+    pub unit: &'static str,
+    /// Share of the excess error energy Σ(e² − σ²) that is a function of the
+    /// coordinate, cross-validated, 0–1; 0 unless beyond chance.
+    pub explained_fraction: f64,
+    /// Where the error is worst: lower end, in the coordinate's unit.
+    pub worst_from: f64,
+    /// Upper end; equal to the lower one for a single pulse of a cycle.
+    pub worst_to: f64,
+    /// Root mean square of the error there, in y.
+    pub worst_rmse: f64,
+    /// Mean error y − y_sim there, in y.
+    #[serde(skip)]
+    pub bias: f64,
+    /// In which way the error depends on the coordinate; none if it does not.
+    #[serde(skip)]
+    pub dependence: Option<Dependence>,
+    /// The smallest interval with three quarters of the excess error.
+    #[serde(skip)]
+    pub concentration: Option<Interval>,
+    /// How the worst error changes from edge to edge.
+    #[serde(skip)]
+    pub trend: Option<Trend>,
+    /// The table that the picture draws.
+    #[serde(skip)]
+    pub bins: Vec<FailureBin>,
+}
+
+/// A stretch of a coordinate and what it holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// Lower end.
+    pub from: f64,
+    /// Upper end.
+    pub to: f64,
+    /// Share of the excess error in it, 0–1.
+    pub share: f64,
+    /// Share of the samples in it, 0–1; for a frequency band, of y's energy.
+    pub of_samples: f64,
+}
+
+/// Where a model fails.
+#[derive(Clone, Debug)]
+pub struct Failures {
+    /// Root mean square error of the free run, in y.
+    pub rmse: f64,
+    /// Root mean square of the noise, in y.
+    pub noise_rmse: f64,
+    /// Where the noise floor comes from.
+    pub noise_source: NoiseSource,
+    /// Mean error y − y_sim, in y.
+    pub bias: f64,
+    /// Whether the error is above the noise at all.
+    pub above_noise: bool,
+    /// The coordinates, the one that explains most first.
+    pub by: Vec<Where>,
+}
+
+impl Failures {
+    /// One panel per coordinate for
+    /// [`picture::where_it_fails`](crate::picture::where_it_fails).
+    #[must_use]
+    pub fn views(&self) -> Vec<FailureView<'_>> {
+        let view = |found| {
+            let found: &Where = found;
+            FailureView {
+                coordinate: &found.coordinate,
+                unit: found.unit,
+                explained_fraction: Some(found.explained_fraction),
+                bins: &found.bins,
+            }
+        };
+        self.by.iter().map(view).collect()
+    }
+}
+
+/// Splits the free-run error of `model` on the held-out records (on all records
+/// if none is held out).
+///
+/// # Errors
+/// A missing channel, or a free run that diverges.
+pub fn where_it_fails(model: &Model, records: &[Record]) -> Result<Failures, SimulateError> {
+    let held_out: Vec<&Record> = records.iter().filter(|r| r.role == Use::Validate).collect();
+    let judged = if held_out.is_empty() {
+        records.iter().collect()
+    } else {
+        held_out
+    };
+    let runs: Result<Vec<Vec<f64>>, SimulateError> =
+        judged.iter().map(|r| model.free_run(r)).collect();
+    Ok(examine(
+        &judged,
+        runs?,
+        model.warm_up(),
+        model.longest_delay(),
+    ))
+}
+
+/// As [`where_it_fails`], for free runs that were made already: y_sim per
+/// record, the samples at the start that are not judged, and the samples from
+/// the command to the flow.
+#[must_use]
+pub fn examine(
+    records: &[&Record],
+    simulated: Vec<Vec<f64>>,
+    warm_up: usize,
+    delay: usize,
+) -> Failures {
+    let residual: Vec<Vec<f64>> = records
+        .iter()
+        .zip(&simulated)
+        .map(|(record, run)| record.y.iter().zip(run).map(|(y, sim)| y - sim).collect())
+        .collect();
+    let (noise, noise_source) = noise::floor(records, &residual, warm_up);
+    let errors = Errors {
+        residual,
+        simulated,
+        noise,
+        warm_up,
+        period_s: records.first().map_or(1.0, |r| r.sample_period_s),
+    };
+    let source = Source {
+        records,
+        simulated: &errors.simulated,
+        warm_up,
+        delay,
+    };
+    let above_noise = is_above(&errors);
+    let excess = errors.excess().max(f64::MIN_POSITIVE);
+    let mut by: Vec<Where> = Vec::new();
+    let mut cycles: Vec<Where> = Vec::new();
+    for coordinate in coordinates(&source) {
+        let found = along(&errors, &coordinate, excess, above_noise);
+        if coordinate.cycle.is_some() {
+            cycles.push(found);
+        } else {
+            by.push(found);
+        }
+    }
+    debug_assert!(cycles.is_empty() || cycles.len() == CYCLES.count());
+    by.extend(shortest_cycle(cycles));
+    let share = |name: &str| {
+        by.iter()
+            .find(|w| w.coordinate == name)
+            .map_or(0.0, |w| w.explained_fraction)
+    };
+    if share("pulse number") <= PULSES_ARE_A_CLOCK * share("time in the record") {
+        by.retain(|w| w.coordinate != "pulse number");
+    }
+    if above_noise {
+        by.extend(spectrum::by_frequency(&errors, excess));
+    }
+    for found in &mut by {
+        found.trend = trend::from_edge_to_edge(&errors, records, found);
+    }
+    by.sort_by(|a, b| b.explained_fraction.total_cmp(&a.explained_fraction));
+    let judged = errors.residual.iter().flat_map(|e| e.iter().skip(warm_up));
+    let (n, sum, squares) =
+        judged.fold((0.0, 0.0, 0.0), |(n, s, q), e| (n + 1.0, s + e, q + e * e));
+    let n = f64::max(n, 1.0);
+    Failures {
+        rmse: f64::sqrt(squares / n),
+        noise_rmse: errors.noise_rmse(),
+        noise_source,
+        bias: sum / n,
+        above_noise,
+        by,
+    }
+}
+
+/// Whether Σ e² is above Σ σ² by more than chance and more than σ is known.
+fn is_above(errors: &Errors) -> bool {
+    let mut blocks = Vec::new();
+    let mut noise = 0.0;
+    for record in 0..errors.residual.len() {
+        let block = errors.block(record);
+        let judged = errors.residual[record]
+            .iter()
+            .zip(&errors.noise[record])
+            .skip(errors.warm_up);
+        let excess: Vec<f64> = judged.map(|(e, v)| e * e - v).collect();
+        blocks.extend(excess.chunks(block).map(|c| c.iter().sum::<f64>()));
+        noise += errors.noise[record]
+            .iter()
+            .skip(errors.warm_up)
+            .sum::<f64>();
+    }
+    let excess: f64 = blocks.iter().sum();
+    // A single large event has no steady mean, but noise alone does not reach
+    // it: Σ e² of as many independent samples as blocks varies by √(2/n).
+    let varies = (2.0 / blocks.len().max(1) as f64).sqrt();
+    let steady = beyond_chance(&blocks, STANDARD_ERRORS) > LEAST_EXCESS * noise;
+    steady || excess > (LEAST_EXCESS + 4.0 * varies) * noise
+}
+
+/// The cycle that explains most; a multiple of it explains as much and is not
+/// preferred.
+fn shortest_cycle(cycles: Vec<Where>) -> Option<Where> {
+    cycles.into_iter().reduce(|best, next| {
+        if next.explained_fraction > LONGER_CYCLE * best.explained_fraction {
+            next
+        } else {
+            best
+        }
+    })
+}
+
+/// Sums over the samples of a bin.
+#[derive(Clone, Copy, Default)]
+struct Tally {
+    count: f64,
+    error: f64,
+    square: f64,
+    noise: f64,
+}
+
+impl Tally {
+    fn excess(&self) -> f64 {
+        self.square - self.noise
+    }
+    fn density(&self) -> f64 {
+        self.excess() / self.count.max(1.0)
+    }
+    fn plus(&self, other: &Self) -> Self {
+        Self {
+            count: self.count + other.count,
+            error: self.error + other.error,
+            square: self.square + other.square,
+            noise: self.noise + other.noise,
+        }
+    }
+    fn rms(&self, sum: f64) -> f64 {
+        if self.count > 0.0 {
+            (sum / self.count).max(0.0).sqrt()
+        } else {
+            f64::NAN
+        }
+    }
+}
+
+fn along(errors: &Errors, coordinate: &Coordinate, excess: f64, above_noise: bool) -> Where {
+    let mut tallies = vec![Tally::default(); coordinate.ranges.len()];
+    let mut samples = 0.0;
+    for (record, bins) in coordinate.bin.iter().enumerate() {
+        for (k, bin) in bins.iter().enumerate().skip(errors.warm_up) {
+            samples += 1.0;
+            if let Some(bin) = bin {
+                let e = errors.residual[record][k];
+                let tally = &mut tallies[usize::from(*bin)];
+                tally.count += 1.0;
+                tally.error += e;
+                tally.square += e * e;
+                tally.noise += errors.noise[record][k];
+            }
+        }
+    }
+    let share = if above_noise {
+        explained(errors, coordinate, excess)
+    } else {
+        None
+    };
+    let bins = coordinate
+        .ranges
+        .iter()
+        .zip(&tallies)
+        .map(|((from, to), tally)| FailureBin {
+            from: *from,
+            to: *to,
+            rmse: tally.rms(tally.square),
+            noise_rmse: tally.rms(tally.noise),
+        })
+        .collect();
+    let (first, last, worst) = worst(&tallies, samples, coordinate.cycle.is_some());
+    Where {
+        coordinate: coordinate.name.clone(),
+        unit: coordinate.unit,
+        explained_fraction: share.map_or(0.0, |s| s.fraction),
+        worst_from: coordinate.ranges[first].0,
+        worst_to: coordinate.ranges[last].1,
+        worst_rmse: worst.rms(worst.square),
+        bias: worst.error / worst.count.max(1.0),
+        dependence: share.map(|s| s.dependence),
+        concentration: above_noise
+            .then(|| concentration(&tallies, coordinate, excess, samples))
+            .flatten(),
+        trend: None,
+        bins,
+    }
+}
+
+/// The bin with the most excess per sample and its neighbours of at least half that.
+fn worst(tallies: &[Tally], samples: f64, single: bool) -> (usize, usize, Tally) {
+    let large = |i: &usize| tallies[*i].count >= WORST_HOLDS * samples;
+    let peak = (0..tallies.len())
+        .filter(large)
+        .max_by(|a, b| tallies[*a].density().total_cmp(&tallies[*b].density()))
+        .unwrap_or(0);
+    let (mut first, mut last, mut sum) = (peak, peak, tallies[peak]);
+    if single || sum.density() <= 0.0 {
+        return (first, last, sum);
+    }
+    let half = 0.5 * sum.density();
+    while first > 0 && tallies[first - 1].density() >= half {
+        first -= 1;
+        sum = sum.plus(&tallies[first]);
+    }
+    while last + 1 < tallies.len() && tallies[last + 1].density() >= half {
+        last += 1;
+        sum = sum.plus(&tallies[last]);
+    }
+    (first, last, sum)
+}
+
+/// The run of bins with the fewest samples that holds three quarters of the excess.
+fn concentration(
+    tallies: &[Tally],
+    coordinate: &Coordinate,
+    excess: f64,
+    samples: f64,
+) -> Option<Interval> {
+    let mut best: Option<(f64, Interval)> = None;
+    for first in 0..tallies.len() {
+        let mut sum = Tally::default();
+        for last in first..tallies.len() {
+            sum = sum.plus(&tallies[last]);
+            if sum.excess() >= CONCENTRATION * excess {
+                if best.as_ref().is_none_or(|(count, _)| sum.count < *count) {
+                    let interval = Interval {
+                        from: coordinate.ranges[first].0,
+                        to: coordinate.ranges[last].1,
+                        share: (sum.excess() / excess).min(1.0),
+                        of_samples: sum.count / samples.max(1.0),
+                    };
+                    best = Some((sum.count, interval));
+                }
+                break;
+            }
+        }
+    }
+    best.map(|(_, interval)| interval)
+}

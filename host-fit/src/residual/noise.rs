@@ -1,0 +1,170 @@
+//! The noise floor that a residual is judged against.
+
+use super::explained::Errors;
+use crate::data::Record;
+
+/// Command history that must agree before two samples count as repeats, s.
+const HISTORY_S: f64 = 1.0;
+/// Periods back that are compared: a fault of every n-th pulse agrees with
+/// itself only n periods earlier.
+const PERIODS_BACK: usize = 8;
+/// Fewest pairs of repeats, in histories, that give an estimate.
+const FEWEST_HISTORIES: f64 = 2.0;
+
+/// Where the noise floor comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NoiseSource {
+    /// The standard error `y_sd` of the recordings.
+    Measured,
+    /// Estimated: how y differs between periods of the same command.
+    Repeats,
+    /// Estimated from sample to sample: slow noise is not in it.
+    Scatter,
+}
+
+/// σ² of the noise, per record and sample, and where it comes from. Records
+/// without `y_sd` decide for all.
+pub(super) fn floor(
+    records: &[&Record],
+    residual: &[Vec<f64>],
+    warm_up: usize,
+) -> (Vec<Vec<f64>>, NoiseSource) {
+    let measured: Option<Vec<Vec<f64>>> = records
+        .iter()
+        .map(|r| Some(r.y_sd.as_ref()?.iter().map(|sd| sd * sd).collect()))
+        .collect();
+    if let Some(measured) = measured {
+        return (measured, NoiseSource::Measured);
+    }
+    let repeats: Vec<f64> = records.iter().filter_map(|r| by_repeats(r)).collect();
+    let (variance, source) = if repeats.is_empty() {
+        let each = residual
+            .iter()
+            .map(|e| by_scatter(e.get(warm_up..).unwrap_or(&[])));
+        (
+            each.sum::<f64>() / residual.len().max(1) as f64,
+            NoiseSource::Scatter,
+        )
+    } else {
+        let mean = repeats.iter().sum::<f64>() / repeats.len() as f64;
+        (mean, NoiseSource::Repeats)
+    };
+    let constant = residual.iter().map(|e| vec![variance; e.len()]).collect();
+    (constant, source)
+}
+
+/// Half the mean square difference between samples a few periods of the command
+/// apart; the least over the number of periods.
+fn by_repeats(record: &Record) -> Option<f64> {
+    let period = command_period(&record.u)?;
+    let history = (HISTORY_S / record.sample_period_s).round().max(1.0) as usize;
+    let mut least: Option<f64> = None;
+    for periods in 1..=PERIODS_BACK {
+        let shift = periods * period;
+        let (mut same, mut pairs, mut sum) = (0, 0.0, 0.0);
+        for k in shift..record.len() {
+            // How long the command has been what it was `shift` earlier.
+            same = if record.u[k] == record.u[k - shift] {
+                same + 1
+            } else {
+                0
+            };
+            // A second of rest is a repeat as well, but it says nothing of the flow.
+            if same > history + period {
+                let difference = record.y[k] - record.y[k - shift];
+                sum += difference * difference;
+                pairs += 1.0;
+            }
+        }
+        if pairs >= FEWEST_HISTORIES * history as f64 {
+            let variance = 0.5 * sum / pairs;
+            least = Some(least.map_or(variance, |l: f64| l.min(variance)));
+        }
+    }
+    least
+}
+
+/// The most frequent time between rising edges, if most are within a sample of it.
+fn command_period(u: &[f64]) -> Option<usize> {
+    let rises: Vec<usize> = u
+        .windows(2)
+        .enumerate()
+        .filter(|(_, pair)| pair[1] > pair[0])
+        .map(|(k, _)| k)
+        .collect();
+    let mut between: Vec<usize> = rises.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    between.sort_unstable();
+    let middle = *between.get(between.len() / 2)?;
+    let alike = between.iter().filter(|b| b.abs_diff(middle) <= 1).count();
+    (between.len() >= 4 && 4 * alike >= 3 * between.len()).then_some(middle)
+}
+
+/// σ² of white noise from third differences, which smooth motion leaves small;
+/// their median, which edges do not move.
+fn by_scatter(e: &[f64]) -> f64 {
+    let mut squares: Vec<f64> = e
+        .windows(4)
+        .map(|w| w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0])
+        .map(|d| d * d / 20.0)
+        .collect();
+    squares.sort_by(f64::total_cmp);
+    // The median of χ² with one degree of freedom is 0.4549.
+    squares.get(squares.len() / 2).map_or(0.0, |m| m / 0.4549)
+}
+
+impl Errors {
+    /// σ of the noise, root mean square over what is judged.
+    pub(super) fn noise_rmse(&self) -> f64 {
+        let judged = self.noise.iter().flat_map(|n| n.iter().skip(self.warm_up));
+        let (sum, count) = judged.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+        f64::sqrt(sum / f64::max(count, 1.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Use;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Uniform noise of standard deviation 0.1 on a periodic response, every
+    /// third pulse of which is missing.
+    fn record(periodic: bool) -> Record {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let u: Vec<f64> = (0..10_000)
+            .map(|k| {
+                let period = if periodic { 200 } else { 90 + (k / 700) * 17 };
+                f64::from(k % period < period / 2)
+            })
+            .collect();
+        let mut state = 0.0;
+        let y = u
+            .iter()
+            .enumerate()
+            .map(|(k, u)| {
+                let missing = periodic && (k / 200) % 3 == 0;
+                let jet = if missing { 0.0 } else { *u };
+                state += 0.02 * (jet - state);
+                let half: f64 = 0.1 * f64::sqrt(3.0);
+                state + rng.random_range(-half..half)
+            })
+            .collect();
+        Record::new("r", Use::Validate, 0.001, u, y)
+    }
+
+    #[test]
+    fn repeats_give_the_noise_even_when_every_third_pulse_is_missing() {
+        let variance = by_repeats(&record(true)).unwrap();
+        assert!((variance.sqrt() / 0.1 - 1.0).abs() < 0.05, "{variance}");
+        assert_eq!(by_repeats(&record(false)), None);
+    }
+
+    #[test]
+    fn sample_to_sample_scatter_gives_white_noise() {
+        let sd = by_scatter(&record(false).y).sqrt();
+        assert!((sd / 0.1 - 1.0).abs() < 0.06, "{sd}");
+        assert_eq!(by_scatter(&[]), 0.0);
+    }
+}

@@ -1,0 +1,177 @@
+//! The split of an error, read out in plain language.
+
+use super::{Dependence, Failures, NoiseSource, Where};
+
+/// Coordinates that explain less are left out of the sentences.
+const WORTH_SAYING: f64 = 0.1;
+/// Most coordinates that are read out.
+const MOST: usize = 3;
+
+impl Failures {
+    /// Sentences for a person, the most important first.
+    #[must_use]
+    pub fn describe(&self) -> Vec<String> {
+        let floor = match self.noise_source {
+            NoiseSource::Measured => "the noise floor (y_sd)",
+            NoiseSource::Repeats => {
+                "a noise floor estimated from how y differs between periods of the same command (no y_sd)"
+            }
+            NoiseSource::Scatter => {
+                "a noise floor estimated from sample-to-sample scatter (no y_sd), which leaves out slow noise"
+            }
+        };
+        let (rmse, noise) = (number(self.rmse), number(self.noise_rmse));
+        if !self.above_noise {
+            return vec![format!(
+                "The held-out error, {rmse} in y rms, is at {floor}, {noise}: there is no excess to explain."
+            )];
+        }
+        let excess = 1.0 - (self.noise_rmse / self.rmse).powi(2);
+        let mut sentences = vec![format!(
+            "The held-out error is {rmse} in y rms against {floor} of {noise}: {} of its energy is excess.",
+            percent(excess)
+        )];
+        let said: Vec<&Where> = self
+            .by
+            .iter()
+            .filter(|w| w.explained_fraction >= WORTH_SAYING)
+            .take(MOST)
+            .collect();
+        if said.is_empty() {
+            sentences.push(
+                "The excess is not concentrated along any coordinate that was tried.".to_owned(),
+            );
+        }
+        sentences.extend(said.into_iter().map(sentence));
+        if self.bias.abs() > 0.3 * self.rmse {
+            let direction = if self.bias > 0.0 { "low" } else { "high" };
+            sentences.push(format!(
+                "On the whole the model reads {} too {direction}.",
+                number(self.bias.abs())
+            ));
+        }
+        sentences
+    }
+}
+
+/// What one coordinate says.
+fn sentence(found: &Where) -> String {
+    let explained = percent(found.explained_fraction);
+    let mut text = match found.concentration {
+        Some(held) if held.share > 1.3 * held.of_samples && !is_cycle(found) => {
+            let place = place(found, held.from, held.to);
+            let more = if found.unit == "Hz" {
+                format!("{} of y's own energy", percent(held.of_samples))
+            } else {
+                format!("{} of the time", percent(held.of_samples))
+            };
+            format!(
+                "{} of the excess error lies {place} ({more})",
+                quarters(held.share)
+            )
+        }
+        _ => format!(
+            "The error is worst {}, {} in y rms",
+            place(found, found.worst_from, found.worst_to),
+            number(found.worst_rmse)
+        ),
+    };
+    if let Some(trend) = found.trend {
+        let verb = if trend.correlation > 0.0 {
+            "grows"
+        } else {
+            "shrinks"
+        };
+        let dwell = if trend.rest {
+            "the rest before them"
+        } else {
+            "the length of the pulse before them"
+        };
+        text.push_str(&format!(" and {verb} with {dwell}"));
+    }
+    if found.bias.abs() > 0.5 * found.worst_rmse {
+        let direction = if found.bias > 0.0 { "low" } else { "high" };
+        text.push_str(&format!(
+            "; at its worst the model reads {} too {direction}",
+            number(found.bias.abs())
+        ));
+    }
+    let how = match found.dependence {
+        Some(Dependence::Proportion) => ", in proportion to y",
+        Some(Dependence::Size) => ", by its size, not its sign",
+        Some(Dependence::Dwell) => ", together with the dwell before the edge",
+        Some(Dependence::Mean) | None => "",
+    };
+    format!(
+        "{text}. The {} explains {explained} of the excess{how}.",
+        found.coordinate
+    )
+}
+
+fn is_cycle(found: &Where) -> bool {
+    found.coordinate.starts_with("pulse number modulo")
+}
+
+/// A stretch of a coordinate in words.
+fn place(found: &Where, from: f64, to: f64) -> String {
+    let name = found.coordinate.as_str();
+    let milliseconds = |s: f64| number(1000.0 * s);
+    let within = |what: &str| {
+        if from <= 0.0 {
+            format!("within {} ms after {what} edges", milliseconds(to))
+        } else {
+            format!(
+                "{} to {} ms after {what} edges",
+                milliseconds(from),
+                milliseconds(to)
+            )
+        }
+    };
+    match name {
+        "time since rising edge" => within("rising"),
+        "time since falling edge" => within("falling"),
+        "level of y" => format!("at y between {} and {}", number(from), number(to)),
+        "time in the record" => format!(
+            "between {} and {} s into the records",
+            number(from),
+            number(to)
+        ),
+        "frequency band" => format!("between {} and {} Hz", number(from), number(to)),
+        "pulse number" => format!(
+            "between pulses {} and {} of the records",
+            number(from),
+            number(to)
+        ),
+        _ => match name.strip_prefix("pulse number modulo ") {
+            Some(cycle) => {
+                // Remainder 0 stands for the last pulse of a cycle.
+                let n = cycle.parse().unwrap_or(0.0);
+                let first = if from == 0.0 { n } else { from };
+                format!(
+                    "at one pulse in {cycle} (numbers {first}, {}, {} …)",
+                    first + n,
+                    first + 2.0 * n
+                )
+            }
+            None => format!("at {name} between {} and {}", number(from), number(to)),
+        },
+    }
+}
+
+fn percent(fraction: f64) -> String {
+    format!("{:.0} %", 100.0 * fraction.clamp(0.0, 1.0))
+}
+
+/// A share in words where it has a name.
+fn quarters(share: f64) -> String {
+    if (0.72..0.80).contains(&share) {
+        "Three quarters".to_owned()
+    } else {
+        percent(share)
+    }
+}
+
+/// Three significant digits.
+fn number(value: f64) -> String {
+    crate::picture::significant(value, 3)
+}

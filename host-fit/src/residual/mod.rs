@@ -364,8 +364,8 @@ fn concentration(
     let mut best: Option<(f64, Interval)> = None;
     for first in 0..tallies.len() {
         let mut sum = Tally::default();
-        for last in first..tallies.len() {
-            sum = sum.plus(&tallies[last]);
+        for (last, tally) in tallies.iter().enumerate().skip(first) {
+            sum = sum.plus(tally);
             if sum.excess() >= CONCENTRATION * excess {
                 if best.as_ref().is_none_or(|(count, _)| sum.count < *count) {
                     let interval = Interval {

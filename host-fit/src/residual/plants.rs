@@ -54,8 +54,10 @@ pub(crate) fn base(records: &[Record]) -> Model {
             delay_rise: 10.0,
             delay_rate: 5.0,
             factors: vec![1.0],
+            interpolated: false,
         },
         effects: Vec::new(),
+        definitions: Vec::new(),
         training: Training::default(),
         law: None,
     };

@@ -1,0 +1,146 @@
+//! Commands that a valve can play.
+
+use super::Limits;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+/// Random sequences that are tried.
+const RANDOM: usize = 24;
+/// Rest at the end of a run as a share of it, so that runs can follow one another.
+const TAIL: f64 = 0.15;
+
+/// A command as openings in time.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Plan {
+    pub(super) description: String,
+    /// Dwells in turn, closed first, s.
+    dwells: Vec<f64>,
+}
+
+impl Plan {
+    /// The command per sample.
+    pub(super) fn command(&self, period: f64, samples: usize) -> Vec<f64> {
+        let mut u = Vec::with_capacity(samples);
+        let mut level = 0.0;
+        for dwell in &self.dwells {
+            // Rounded up: never shorter than the valve's limit.
+            let length = (dwell / period - 1e-6).ceil().max(0.0) as usize;
+            u.extend(std::iter::repeat_n(level, length.min(samples - u.len())));
+            level = 1.0 - level;
+        }
+        u.resize(samples, 0.0);
+        u
+    }
+
+    /// Repeats `dwells` (open first) until the tail begins.
+    fn repeating(description: String, limits: &Limits, dwells: &[f64]) -> Self {
+        let mut all = vec![limits.min_off_s];
+        let mut at = limits.min_off_s;
+        let end = (1.0 - TAIL) * limits.duration_s;
+        for pair in dwells.chunks(2).cycle() {
+            let [on, off] = pair else { break };
+            if at + on > end {
+                break;
+            }
+            all.extend([on, off]);
+            at += on + off;
+        }
+        // The last closure lasts to the end.
+        all.pop();
+        Self {
+            description,
+            dwells: all,
+        }
+    }
+}
+
+/// `n` values from `low` to `high` in equal ratios.
+fn geometric(low: f64, high: f64, n: u32) -> impl Iterator<Item = f64> {
+    (0..n).map(move |i| low * (high / low).powf(f64::from(i) / f64::from(n - 1)))
+}
+
+/// Square waves, single pulses, pairs with growing pauses, random sequences.
+pub(super) fn families(limits: &Limits, rng: &mut ChaCha8Rng) -> Vec<Plan> {
+    let Limits {
+        min_on_s: on,
+        min_off_s: off,
+        duration_s: duration,
+    } = *limits;
+    let mut plans = Vec::new();
+    for period in geometric(on + off, 0.4 * duration, 14) {
+        for duty in [0.15, 0.3, 0.5, 0.7, 0.85] {
+            let (open, closed) = (duty * period, (1.0 - duty) * period);
+            if open >= on && closed >= off {
+                let name = format!(
+                    "a square wave of {:.3} Hz with {:.0} % duty",
+                    1.0 / period,
+                    100.0 * duty
+                );
+                plans.push(Plan::repeating(name, limits, &[open, closed]));
+            }
+        }
+    }
+    for open in geometric(on, 0.5 * duration, 10) {
+        let name = format!("a single pulse of {open:.3} s");
+        plans.push(Plan {
+            description: name,
+            dwells: vec![off.max(0.05 * duration), open],
+        });
+    }
+    let rest = (0.1 * duration).max(off);
+    for first in geometric(on, (0.1 * duration).max(1.01 * on), 4) {
+        for second in geometric(on, (0.1 * duration).max(1.01 * on), 3) {
+            let dwells: Vec<f64> = geometric(off, rest.max(1.01 * off), 6)
+                .flat_map(|pause| [first, pause, second, rest])
+                .collect();
+            let name = format!(
+                "pairs of pulses of {first:.3} and {second:.3} s with pauses growing from {off:.3} to {rest:.3} s"
+            );
+            plans.push(Plan::repeating(name, limits, &dwells));
+        }
+    }
+    for i in 0..RANDOM {
+        let longest = on.max(off) * 2.0_f64.powi(1 + (i % 5) as i32);
+        let dwells: Vec<f64> = (0..2 * (duration / (on + off)) as usize + 2)
+            .map(|k| {
+                let shortest = if k % 2 == 0 { on } else { off };
+                rng.random_range(shortest..=shortest.max(longest))
+            })
+            .collect();
+        let name = format!("a random on/off sequence with dwells up to {longest:.3} s");
+        plans.push(Plan::repeating(name, limits, &dwells));
+    }
+    plans
+}
+
+/// The plan with some dwells changed.
+pub(super) fn mutate(plan: &Plan, limits: &Limits, rng: &mut ChaCha8Rng) -> Plan {
+    let mut changed = plan.clone();
+    let share = rng.random_range(0.05..0.6);
+    let size = rng.random_range(0.05..0.8);
+    for (k, dwell) in changed.dwells.iter_mut().enumerate() {
+        if rng.random_bool(share) {
+            let shortest = if k % 2 == 1 {
+                limits.min_on_s
+            } else {
+                limits.min_off_s
+            };
+            *dwell = (*dwell * f64::exp(rng.random_range(-size..size))).max(shortest);
+        }
+    }
+    // What would run into the tail is left out; a plan ends with an opening.
+    let end = (1.0 - TAIL) * limits.duration_s;
+    let mut at = 0.0;
+    let kept = changed.dwells.iter().take_while(|dwell| {
+        at += **dwell;
+        at <= end
+    });
+    let kept = kept.count() / 2 * 2;
+    if kept >= 2 {
+        changed.dwells.truncate(kept);
+    }
+    if !changed.description.ends_with("varied") {
+        changed.description.push_str(", varied");
+    }
+    changed
+}

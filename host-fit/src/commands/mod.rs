@@ -14,6 +14,7 @@ pub(crate) mod diagnose;
 mod effect_files;
 pub(crate) mod effects;
 pub(crate) mod extend;
+pub(crate) mod identify;
 mod interrupt;
 mod scores;
 pub(crate) mod simulate;

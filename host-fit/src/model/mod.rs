@@ -158,6 +158,32 @@ pub struct Training {
     pub validate_fit_percent: Option<f64>,
 }
 
+impl Default for Model {
+    /// One lag each, no delay, coefficients of 0, at 1 kHz: a frame to fill in.
+    fn default() -> Self {
+        Self {
+            sample_period_s: 0.001,
+            convention: LagConvention::OneStep,
+            averaging: Averaging {
+                window: 250,
+                averaged_model: false,
+            },
+            start: Start::Rest,
+            grading: Grading::Proportional,
+            constant: 0.0,
+            state_lags: vec![1],
+            a: vec![0.0],
+            product_lags: vec![1],
+            b: vec![0.0],
+            c: vec![0.0],
+            delay: Delay::Fixed { delays: vec![0] },
+            effects: Vec::new(),
+            training: Training::default(),
+            law: None,
+        }
+    }
+}
+
 impl Model {
     /// Names of the effects, the delay law among them, in the order of the physics.
     #[must_use]

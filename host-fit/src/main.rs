@@ -23,6 +23,7 @@ struct Cli {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
+    Demo(commands::demo::Args),
     Average(commands::average::Args),
     Delay(commands::delay::Args),
     Design(commands::design::Args),
@@ -39,6 +40,7 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let console = Console { json: cli.json };
     let result = match &cli.command {
+        Command::Demo(args) => commands::demo::run(args, console),
         Command::Average(args) => commands::average::run(args, console),
         Command::Delay(args) => commands::delay::run(args, console),
         Command::Design(args) => commands::design::run(args, console),

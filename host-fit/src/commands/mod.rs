@@ -10,6 +10,7 @@ pub(crate) mod codegen;
 pub(crate) mod compare;
 pub(crate) mod delay;
 pub(crate) mod design;
+pub(crate) mod demo;
 pub(crate) mod diagnose;
 mod effect_files;
 pub(crate) mod effects;

@@ -178,8 +178,10 @@ impl Default for Model {
             c: vec![0.0],
             delay: Delay::Fixed { delays: vec![0] },
             effects: Vec::new(),
+            definitions: Vec::new(),
             training: Training::default(),
             law: None,
+            definitions: Vec::new(),
         }
     }
 }

@@ -187,7 +187,7 @@ impl Builder {
     }
 
     pub(super) fn delayed(&mut self, signal: Register, delay: Register) -> Register {
-        let lines = self.ops.iter().filter_map(|op| match op {
+        let mut lines = self.ops.iter().filter_map(|op| match op {
             Op::Delayed {
                 line,
                 signal: s,
@@ -195,7 +195,7 @@ impl Builder {
             } if *s == signal && *d == delay => Some(*line),
             _ => None,
         });
-        let known = lines.last();
+        let known = lines.next_back();
         let count = self
             .ops
             .iter()

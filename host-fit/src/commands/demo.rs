@@ -1,0 +1,292 @@
+//! `host-fit demo`: the whole way on bundled data, from recordings to constants and a loop.
+
+use std::path::{Path, PathBuf};
+
+use firmware_sim::closed_loop::{Figures, OpenLoop, Relay, run as close_the_loop};
+use firmware_sim::hidden_set::HiddenSetPlan;
+use firmware_sim::plant::Rig;
+use host_fit::codegen::generate;
+use host_fit::data::DataSet;
+use host_fit::diagnose::{Options, diagnose};
+use host_fit::indicators::score;
+use host_fit::model::Model;
+use host_fit::output::{Staging, write_atomic};
+use host_fit::picture::{ClosedLoop, Column, LoopRun, Report, closed_loop};
+use model_core::control::HoldTimes;
+
+use super::Console;
+use super::compare::provenance;
+use super::diagnose::{ladder_picture, ladder_table, report_diagnosis, verdict_words};
+use super::identify::{DelayKind, Request};
+use super::interrupt::watch;
+use super::scores::{aligned, overlays, report_table};
+
+/// Show the whole way on bundled data: identify, compare, find the missing effect, add it, generate constants, close
+/// the loop; leaves a report, models and data to play with.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Folder for the report, the pictures, the models and the data.
+    #[arg(long, value_name = "DIR", default_value = "out/demo")]
+    out: PathBuf,
+}
+
+macro_rules! bundled {
+    ($folder:literal, $file:literal) => {
+        (
+            concat!($folder, "/", $file),
+            include_str!(concat!("../../../data/", $folder, "/", $file)),
+        )
+    };
+}
+
+/// The bundled files, so that the program shows them wherever it is.
+const FILES: [(&str, &str); 16] = [
+    bundled!("ramp-cfd", "dataset.toml"),
+    bundled!("ramp-cfd", "README.md"),
+    bundled!("ramp-cfd", "step.csv"),
+    bundled!("ramp-cfd", "4Hz50.csv"),
+    bundled!("ramp-cfd", "4Hz80.csv"),
+    bundled!("ramp-cfd", "8Hz50.csv"),
+    bundled!("hidden-ramp", "dataset.toml"),
+    bundled!("hidden-ramp", "README.md"),
+    bundled!("hidden-ramp", "step.csv"),
+    bundled!("hidden-ramp", "sq4-50.csv"),
+    bundled!("hidden-ramp", "sq4-80.csv"),
+    bundled!("hidden-ramp", "sq8-50.csv"),
+    bundled!("hidden-ramp", "sq8-80.csv"),
+    bundled!("hidden-ramp", "sq2-30.csv"),
+    bundled!("hidden-ramp", "random-a.csv"),
+    bundled!("hidden-ramp", "random-b.csv"),
+];
+
+/// A few lags are enough to show the way, and quick.
+fn request(delay: DelayKind) -> Request {
+    Request {
+        delay,
+        n1: Some(2),
+        n2: Some(2),
+        max_lag: Some(150),
+        evaluations: 3_000,
+        ..Request::default()
+    }
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
+    let out = &args.out;
+    std::fs::create_dir_all(out)?;
+    let data = out.join("data");
+    let mut staging = Staging::new(&data)?;
+    for (name, text) in FILES {
+        staging.write(name, |file| file.write_all(text.as_bytes()))?;
+    }
+    staging.commit()?;
+
+    let mut report = Report::new(
+        "Demo",
+        "recordings → model → missing effect → constants → loop",
+    );
+    let fits = real_input(&data, out, console, &mut report)?;
+    let (model, words) = hidden_effect(&data, out, console, &mut report)?;
+    let constants = generate(&model)?;
+    write_atomic(&out.join("identified.rs"), |file| {
+        file.write_all(constants.as_bytes())
+    })?;
+    let figures = the_loop(&model, console, &mut report)?;
+    write_atomic(&out.join("report.html"), |file| {
+        file.write_all(report.html().as_bytes())
+    })?;
+    console.say(&format!(
+        "\nwritten to {}: report.html, models, identified.rs, data",
+        out.display()
+    ))?;
+    console.document(&serde_json::json!({
+        "out": out,
+        "ramp_cfd_validate_fit_percent": {"fixed": fits[0], "state_dependent": fits[1]},
+        "words": words,
+        "loop": figures,
+    }))
+}
+
+/// Fixed against state-dependent delay on the flow simulation; held-out FIT of both.
+fn real_input(
+    data: &Path,
+    out: &Path,
+    console: Console,
+    report: &mut Report,
+) -> anyhow::Result<[f64; 2]> {
+    let set = DataSet::load(&data.join("ramp-cfd"))?;
+    report.section("A flow over a ramp (2-D Navier–Stokes)");
+    let mut rows = Vec::new();
+    let mut fits = [f64::NAN; 2];
+    let mut runs = Vec::new();
+    let kinds = [
+        (DelayKind::Fixed, "fixed delay", "ramp-fixed.toml"),
+        (
+            DelayKind::StateDependent,
+            "state-dependent delay",
+            "ramp-state-dependent.toml",
+        ),
+    ];
+    for ((kind, name, file), fit) in kinds.into_iter().zip(&mut fits) {
+        let found = request(kind).identify(&set, console)?;
+        found.model.save(&out.join(file))?;
+        let percent = |i: &Option<host_fit::indicators::Indicators>| {
+            i.as_ref().map_or(f64::NAN, |i| i.fit_percent)
+        };
+        *fit = percent(&found.scores.validate);
+        rows.push(vec![
+            name.to_owned(),
+            format!("{:.1}", percent(&found.scores.identify)),
+            format!("{:.1}", *fit),
+        ]);
+        report.subsection(name);
+        report_table(report, &found.scores);
+        let (_, free) = score(&found.model, &set.records)?;
+        runs.push((name, free));
+    }
+    let runs: Vec<(&str, &[Vec<f64>])> = runs.iter().map(|(n, r)| (*n, r.as_slice())).collect();
+    for (_, svg) in overlays(&set.records, &runs) {
+        report.figure(&svg, "");
+    }
+    provenance(report, &set);
+    console.say("flow over a ramp (2-D Navier–Stokes), free run")?;
+    console.say(&aligned(
+        &["model", "FIT % identified", "held out"],
+        &rows,
+        1,
+    ))?;
+    Ok(fits)
+}
+
+/// From a model that lacks something to one that does not.
+fn hidden_effect(
+    data: &Path,
+    out: &Path,
+    console: Console,
+    report: &mut Report,
+) -> anyhow::Result<(Model, String)> {
+    let set = DataSet::load(&data.join("hidden-ramp"))?;
+    let found = request(DelayKind::StateDependent).identify(&set, console)?;
+    found.model.save(&out.join("hidden-before.toml"))?;
+    let bar = console.spinner("trying every effect");
+    let diagnosis = diagnose(&found.model, &set.records, &Options::default(), watch())?;
+    bar.finish_and_clear();
+    let (headline, meaning) = verdict_words(&diagnosis);
+    console.say(&format!(
+        "\na ramp with a hidden effect: {headline}\n{meaning}"
+    ))?;
+    console.say(&ladder_table(&diagnosis))?;
+    report_diagnosis(report, &set, &diagnosis);
+    let svg = ladder_picture(&diagnosis, &set);
+    write_atomic(&out.join("ladder.svg"), |file| {
+        file.write_all(svg.as_bytes())
+    })?;
+    let model = Model {
+        training: found.model.training.clone(),
+        ..diagnosis.model.clone()
+    };
+    let (scores, runs) = score(&model, &set.records)?;
+    report.section("With what was missing");
+    report_table(report, &scores);
+    let (_, before) = score(&found.model, &set.records)?;
+    for (_, svg) in overlays(&set.records, &[("before", &before), ("after", &runs)]) {
+        report.figure(&svg, "");
+    }
+    model.save(&out.join("hidden-after.toml"))?;
+    provenance(report, &set);
+    Ok((model, format!("{headline}. {meaning}")))
+}
+
+#[derive(serde::Serialize)]
+struct LoopRow {
+    controller: &'static str,
+    mean_friction: f64,
+    switches_per_s: f64,
+    air: f64,
+}
+
+/// Steady blowing and a plain relay on the plant that made the hidden set.
+fn the_loop(model: &Model, console: Console, report: &mut Report) -> anyhow::Result<Vec<LoopRow>> {
+    const SAMPLES: usize = 10_000;
+    const TARGET: f64 = 0.7;
+    let plan = HiddenSetPlan::draw(&["plenum-droop"], &[], 11)?;
+    let rig = || Rig::new(&plan.plant, None);
+    let times = HoldTimes { on: 10, off: 10 };
+    let references = || std::iter::repeat_n(TARGET, SAMPLES);
+    let steady = close_the_loop(&mut OpenLoop::steady(), &mut rig()?, references());
+    let relay = close_the_loop(&mut Relay::new(times, 0.02), &mut rig()?, references());
+    let mut rows = Vec::new();
+    let mut series = Vec::new();
+    for (controller, trace) in [("steady blowing", &steady), ("relay", &relay)] {
+        let figures = Figures::of(trace, 1000);
+        rows.push(LoopRow {
+            controller,
+            mean_friction: figures.mean,
+            switches_per_s: figures.switches_per_s,
+            air: figures.air,
+        });
+        let y: Vec<f64> = trace.samples.iter().map(|s| s.friction).collect();
+        let u: Vec<f64> = trace
+            .samples
+            .iter()
+            .map(|s| f64::from(u8::from(s.on)))
+            .collect();
+        series.push((controller, y, u));
+    }
+    let runs: Vec<LoopRun<'_>> = series
+        .iter()
+        .map(|(label, y, u)| LoopRun {
+            label,
+            y,
+            u,
+            air: &[],
+        })
+        .collect();
+    report.section("In the loop at 1 kHz, on the plant");
+    report.figure(
+        &closed_loop(&ClosedLoop {
+            title: "A relay against steady blowing",
+            y_label: "friction gain y",
+            air_label: "air used",
+            sample_period_s: model.sample_period_s,
+            reference: &vec![TARGET; SAMPLES],
+            runs: &runs,
+            window_s: Some((0.0, 3.0)),
+        }),
+        "",
+    );
+    let table: Vec<Vec<String>> = rows
+        .iter()
+        .map(|r| {
+            vec![
+                r.controller.to_owned(),
+                format!("{:.3}", r.mean_friction),
+                format!("{:.1}", r.switches_per_s),
+                format!("{:.2}", r.air),
+            ]
+        })
+        .collect();
+    report.table(
+        "",
+        &[
+            Column::Text("controller"),
+            Column::Number("mean friction"),
+            Column::Number("switches/s"),
+            Column::Number("air"),
+        ],
+        &table,
+    );
+    console.say("")?;
+    console.say(&aligned(
+        &[
+            "in the loop, on the plant",
+            "mean friction",
+            "switches/s",
+            "air",
+        ],
+        &table,
+        1,
+    ))?;
+    Ok(rows)
+}

@@ -181,7 +181,6 @@ impl Default for Model {
             definitions: Vec::new(),
             training: Training::default(),
             law: None,
-            definitions: Vec::new(),
         }
     }
 }

@@ -21,6 +21,9 @@ const SAMPLES: usize = 12_000;
 const JUDGED: usize = 3000;
 const TIMES: HoldTimes = HoldTimes { on: 10, off: 10 };
 
+/// Runs a contender for a target on a bench.
+type Run = fn(&Bench, f64) -> Option<Figures>;
+
 /// A flow with noise, and the model somebody identified of it: gain 5 % high,
 /// delays 5 % long, time constants 10 % short.
 struct Bench {
@@ -245,7 +248,7 @@ fn main() {
         heading(&format!(
             "Held at {level} of steady blowing; gains of PI chosen best for each plant"
         ));
-        let rows: [(&str, fn(&Bench, f64) -> Option<Figures>); 9] = [
+        let rows: [(&str, Run); 9] = [
             ("steady blowing", |b, g| {
                 Some(b.run(OpenLoop::steady(), g, g))
             }),

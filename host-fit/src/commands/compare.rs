@@ -6,7 +6,8 @@ use host_fit::data::DataSet;
 use host_fit::indicators::{Indicators, Scores, score};
 use host_fit::model::Model;
 use host_fit::output::{Staging, write_atomic};
-use host_fit::picture::{KeyNumber, Report};
+use host_fit::picture::{KeyNumber, Report, WhereItFails};
+use host_fit::residual::{Failures, Where, where_it_fails};
 
 use super::Console;
 use super::scores::{describe, overlays, report_table, short, table};
@@ -34,7 +35,8 @@ struct Document<'a> {
     identify: &'a Option<Indicators>,
     validate: &'a Option<Indicators>,
     #[serde(rename = "where")]
-    places: &'a [serde_json::Value],
+    places: &'a [Where],
+    words: &'a [String],
 }
 
 /// A model and the records it is judged on, as it sees them.
@@ -59,6 +61,8 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let (model, set) = load(&args.model, &args.dataset)?;
     let records = model.targets(&set.records);
     let (scores, runs) = score(&model, &records)?;
+    let failures = where_it_fails(&model, &records)?;
+    let words = failures.describe();
     let pictures = || overlays(&records, &[("model", &runs)]);
     if let Some(folder) = &args.pictures {
         let mut staging = Staging::new(folder)?;
@@ -69,11 +73,14 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         staging.commit()?;
     }
     if let Some(path) = &args.report {
-        let page = page(&model, &set, &scores, &pictures());
+        let page = page(&model, &set, &scores, &failures, &pictures());
         write_atomic(path, |out| out.write_all(page.as_bytes()))?;
     }
     console.say(&describe(&model))?;
     console.say(&table(&scores))?;
+    for sentence in &words {
+        console.say(sentence)?;
+    }
     for path in args.report.iter().chain(&args.pictures) {
         console.say(&format!("written to {}", path.display()))?;
     }
@@ -81,7 +88,8 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         records: &scores.records,
         identify: &scores.identify,
         validate: &scores.validate,
-        places: &[],
+        places: &failures.by,
+        words: &words,
     })
 }
 
@@ -97,7 +105,13 @@ fn file_name(name: &str) -> String {
     name.chars().map(plain).collect()
 }
 
-fn page(model: &Model, set: &DataSet, scores: &Scores, pictures: &[(String, String)]) -> String {
+fn page(
+    model: &Model,
+    set: &DataSet,
+    scores: &Scores,
+    failures: &Failures,
+    pictures: &[(String, String)],
+) -> String {
     let title = set.title.as_deref().unwrap_or("data set");
     let mut report = Report::new("Comparison", title);
     report.section("How well the model matches");
@@ -111,12 +125,30 @@ fn page(model: &Model, set: &DataSet, scores: &Scores, pictures: &[(String, Stri
         ]);
     }
     report_table(&mut report, scores);
+    report_failures(&mut report, failures);
     report.section("Record by record");
     for (_, svg) in pictures {
         report.figure(svg, "");
     }
     provenance(&mut report, set);
     report.html()
+}
+
+/// The part of a page that says where the model fails.
+pub(crate) fn report_failures(report: &mut Report, failures: &Failures) {
+    report.section("Where it fails");
+    for sentence in failures.describe() {
+        report.paragraph(&sentence);
+    }
+    let plot = WhereItFails {
+        title: "Error of the free run on the held-out records",
+        y_label: "rms error, y",
+        views: &failures.views(),
+    };
+    report.figure(
+        &host_fit::picture::where_it_fails(&plot),
+        "Each panel splits the same error by one coordinate.",
+    );
 }
 
 /// What a page was made from.

@@ -13,8 +13,11 @@ use host_fit::picture::{
     Candidate, Column, Ladder, LadderRecord, LadderStep, Ranking, Report, Tone, ladder, ranking,
 };
 
+use host_fit::power::{Detectable, detectable};
+use host_fit::residual::{Where, where_it_fails};
+
 use super::Console;
-use super::compare::{load, provenance};
+use super::compare::{load, provenance, report_failures};
 use super::effect_files::EffectFiles;
 use super::interrupt::watch;
 use super::scores::{aligned, describe, overlays, report_table, short};
@@ -54,6 +57,11 @@ struct Document<'a> {
     ladder: &'a [Rung],
     ranking: &'a [Ranked],
     not_tried: &'a [NotTried],
+    /// Where the last model of the ladder still fails.
+    #[serde(rename = "where")]
+    places: &'a [Where],
+    /// What of each effect would have been seen, had it been there.
+    detectable: &'a [Detectable],
     words: &'a str,
 }
 
@@ -68,6 +76,11 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     };
     let bar = console.spinner("trying every effect");
     let diagnosis = diagnose(&model, &records, &options, watch())?;
+    let failures = where_it_fails(&diagnosis.model, &records)?;
+    let detectable = match diagnosis.verdict {
+        Verdict::NothingMissing => detectable(&diagnosis.model, &records)?,
+        Verdict::EffectMissing | Verdict::Unexplained => Vec::new(),
+    };
     bar.finish_and_clear();
     let (headline, meaning) = verdict_words(&diagnosis);
     if let Some(path) = &args.output {
@@ -79,6 +92,12 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     }
     console.say(&headline)?;
     console.say(&meaning)?;
+    for sentence in failures.describe() {
+        console.say(&sentence)?;
+    }
+    for effect in &detectable {
+        console.say(&format!("  {}", effect.words))?;
+    }
     console.say(&format!("\n{}", ladder_table(&diagnosis)))?;
     if !diagnosis.ranking.is_empty() {
         console.say(&format!("\n{}", ranking_table(&diagnosis.ranking)))?;
@@ -98,6 +117,8 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         ladder: &diagnosis.ladder,
         ranking: &diagnosis.ranking,
         not_tried: &diagnosis.not_tried,
+        places: &failures.by,
+        detectable: &detectable,
         words: &format!("{headline}. {meaning}"),
     })
 }
@@ -397,6 +418,7 @@ fn page(given: &Model, set: &DataSet, diagnosis: &Diagnosis) -> anyhow::Result<S
     report_diagnosis(&mut report, set, diagnosis);
     let records = given.targets(&set.records);
     let (scores, runs) = score(&diagnosis.model, &records)?;
+    report_failures(&mut report, &where_it_fails(&diagnosis.model, &records)?);
     report.section("The model with what was missing");
     report.paragraph(&describe(&diagnosis.model));
     report_table(&mut report, &scores);

@@ -12,7 +12,7 @@ pub(crate) const TASK: Task = Task {
 };
 
 /// The model files in `firmware/identified/models`, without `.toml`.
-const MODELS: [&str; 3] = ["full", "averaged", "effects"];
+const MODELS: [&str; 4] = ["full", "averaged", "effects", "own"];
 
 pub(crate) fn identified(arguments: &[String]) -> Result<()> {
     let check = match arguments {

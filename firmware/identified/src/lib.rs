@@ -6,6 +6,7 @@
 pub mod averaged;
 pub mod effects;
 pub mod full;
+pub mod own;
 
 /// The model that the boards run: replace it with your own generated file.
 pub use full as on_board;
@@ -25,5 +26,5 @@ mod tests {
             }
         )+};
     }
-    says_what_the_host_said!(full, averaged, effects);
+    says_what_the_host_said!(full, averaged, effects, own);
 }

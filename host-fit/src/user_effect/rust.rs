@@ -46,6 +46,23 @@ pub fn rust_source(
     writer.module()
 }
 
+/// A struct's value as the last line of a function; short ones on one line.
+fn literal(out: &mut String, name: &str, entries: &[String]) {
+    const LONGEST_ON_A_LINE: usize = 18;
+    let joined = entries.join(", ");
+    if entries.is_empty() {
+        let _ = writeln!(out, "            {name} {{}}");
+    } else if joined.chars().count() <= LONGEST_ON_A_LINE {
+        let _ = writeln!(out, "            {name} {{ {joined} }}");
+    } else {
+        let _ = writeln!(out, "            {name} {{");
+        for entry in entries {
+            let _ = writeln!(out, "                {entry},");
+        }
+        out.push_str("            }\n");
+    }
+}
+
 struct Writer {
     definition: &'static Definition,
     lengths: Vec<usize>,
@@ -405,22 +422,14 @@ impl Writer {
                 self.binding(out, &format!("k{register}"), op, true);
             }
         }
-        if fields.is_empty() {
-            out.push_str("            Self {}\n");
-        } else {
-            out.push_str("            Self {\n");
-            for (name, _, value) in fields {
-                match value {
-                    Some(value) => {
-                        let _ = writeln!(out, "                {name}: {value},");
-                    }
-                    None => {
-                        let _ = writeln!(out, "                {name},");
-                    }
-                }
-            }
-            out.push_str("            }\n");
-        }
+        let entries: Vec<String> = fields
+            .iter()
+            .map(|(name, _, value)| match value {
+                Some(value) => format!("{name}: {value}"),
+                None => name.clone(),
+            })
+            .collect();
+        literal(out, "Self", &entries);
         out.push_str("        }\n    }\n");
     }
 
@@ -442,15 +451,11 @@ impl Writer {
         fn start(&self) -> State {{
 "
         );
-        if memory.is_empty() {
-            out.push_str("            State {}\n");
-        } else {
-            out.push_str("            State {\n");
-            for (name, _, start) in memory {
-                let _ = writeln!(out, "                {name}: {start},");
-            }
-            out.push_str("            }\n");
-        }
+        let entries: Vec<String> = memory
+            .iter()
+            .map(|(name, _, start)| format!("{name}: {start}"))
+            .collect();
+        literal(out, "State", &entries);
         out.push_str("        }\n\n");
         let state = if memory.is_empty() { "_state" } else { "state" };
         let signals = [

@@ -5,7 +5,7 @@ use host_fit::user_effect::Definition;
 use std::path::PathBuf;
 
 /// Effect files that a command was given.
-#[derive(Debug, Default, clap::Args)]
+#[derive(Debug, Clone, Default, clap::Args)]
 pub(crate) struct EffectFiles {
     /// File that defines an effect of your own, which then is like those of the catalogue; repeatable.
     #[arg(long, value_name = "FILE")]
@@ -13,10 +13,16 @@ pub(crate) struct EffectFiles {
 }
 
 impl EffectFiles {
+    /// Reads the files.
+    pub(crate) fn load(&self) -> anyhow::Result<Vec<&'static Definition>> {
+        let each = self.effect_file.iter().map(|path| Definition::load(path));
+        Ok(each.collect::<Result<_, _>>()?)
+    }
+
     /// Makes the effects known to `model`.
     pub(crate) fn define(&self, model: &mut Model) -> anyhow::Result<()> {
-        for path in &self.effect_file {
-            model.define(Definition::load(path)?)?;
+        for definition in self.load()? {
+            model.define(definition)?;
         }
         Ok(())
     }

@@ -19,6 +19,7 @@ use indicatif::ProgressBar;
 use model_core::recursion::LagConvention;
 
 use super::Console;
+use super::effect_files::EffectFiles;
 use super::interrupt::watch;
 use super::scores::{describe, short, table};
 
@@ -80,6 +81,8 @@ pub(crate) struct Request {
     /// Physical effect to add once the base model is there; repeatable.
     #[arg(long, value_name = "NAME")]
     pub(crate) effect: Vec<String>,
+    #[command(flatten)]
+    pub(crate) effect_files: EffectFiles,
 }
 
 /// `--delay`.
@@ -143,6 +146,7 @@ impl Default for Request {
             threads: 1,
             seed: 0,
             effect: Vec::new(),
+            effect_files: EffectFiles::default(),
         }
     }
 }
@@ -236,11 +240,16 @@ impl Request {
             },
             ..IdentifyOptions::default()
         };
+        // A fault in an effect file shows before the search, not after it.
+        let own = self.effect_files.load()?;
         let bar = console.progress(self.evaluations, "{spinner} {msg} ({elapsed})");
         let identified = identify(&set.records, &options, &Bar(&bar), watch())?;
         bar.finish_and_clear();
 
         let mut model = identified.model.clone();
+        for definition in own {
+            model.define(definition)?;
+        }
         let records = model.targets(&set.records);
         if !self.effect.is_empty() {
             effects_for(&model, &self.effect)?;

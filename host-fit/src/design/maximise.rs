@@ -584,7 +584,8 @@ mod tests {
     }
 
     /// Theory 0.6 has .93 at 250 ms with 40 % of the air, the best on its grid of
-    /// periods. A finer search finds a sharper resonance.
+    /// periods, and a finer search finds sharper resonances still. What counts is
+    /// what 2 % of detuning leaves of them.
     #[test]
     fn air_at_a_price_is_not_spent_on_a_sharp_resonance() {
         let model = paper_state_dependent(LagConvention::OneStep);
@@ -601,11 +602,7 @@ mod tests {
         let known = search.judge(&at_250);
         assert!((known.mean - 0.93).abs() < 0.01, "{known:?}");
         let optimum = maximise(&model, &request(0.4)).unwrap();
-        assert!(
-            optimum.mean - 0.4 * optimum.duty > known.value,
-            "{optimum:?}"
-        );
-        assert!(optimum.mean_detuned < 0.8 * optimum.mean, "{optimum:?}");
+        assert!(optimum.mean_detuned > 0.95 * optimum.mean, "{optimum:?}");
     }
 
     #[test]

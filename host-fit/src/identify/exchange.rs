@@ -12,7 +12,7 @@ use super::layout::{Column, Delays};
 use super::regression::Regression;
 
 /// Gains below this share of the residual are rounding.
-const NEGLIGIBLE: f64 = 1e-9;
+const NEGLIGIBLE: f64 = 1e-7;
 
 /// A new regressor must keep this share of its length after projection.
 const DEPENDENT: f64 = 1e-10;
@@ -83,9 +83,17 @@ impl<'a> Exchange<'a> {
             if let Some((lag, residual)) = self.best_single(delays, *slot)
                 && residual < best * (1.0 - NEGLIGIBLE)
             {
+                // Smooth records are badly conditioned: what the update promises
+                // is believed only if the residual itself falls.
+                let before = delays.clone();
                 set(delays, *slot, lag);
-                best = residual;
-                since = 0;
+                let reached = self.residual(delays);
+                if reached < best * (1.0 - NEGLIGIBLE) {
+                    best = reached;
+                    since = 0;
+                } else {
+                    *delays = before;
+                }
             }
         }
         sort(delays);
@@ -115,10 +123,15 @@ impl<'a> Exchange<'a> {
             if let Some((lags, residual)) = self.best_pair(delays, *first, *second)
                 && residual < best * (1.0 - NEGLIGIBLE)
             {
-                set(delays, *first, lags.0);
-                set(delays, *second, lags.1);
-                best = self.descend(delays);
-                since = 0;
+                let mut trial = delays.clone();
+                set(&mut trial, *first, lags.0);
+                set(&mut trial, *second, lags.1);
+                let reached = self.descend(&mut trial);
+                if reached < best * (1.0 - NEGLIGIBLE) {
+                    *delays = trial;
+                    best = reached;
+                    since = 0;
+                }
             }
         }
         best

@@ -212,8 +212,7 @@ pub mod user_supply_line_ringing {
             let v13 = Real::cos(v12);
             let v14 = v8 * v13;
             let v15 = 1.0_f32 - v14;
-            let v16 = v0 * v15;
-            v16
+            v0 * v15
         }
     }
 }

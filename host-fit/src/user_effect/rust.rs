@@ -186,31 +186,50 @@ impl Writer {
         }
     }
 
-    /// `let x = …;`, broken as rustfmt breaks a long choice.
-    fn binding(&self, out: &mut String, name: &str, op: &Op, preparing: bool) {
+    /// Whether the value is the very last thing computed: it is then returned
+    /// without a name.
+    fn is_last(&self, register: Register) -> bool {
+        let program = &self.definition.program;
+        let last = self.ops().filter(|(_, _, once)| !once).last();
+        register == program.value
+            && program.states.is_empty()
+            && last.is_some_and(|(last, ..)| last == register)
+    }
+
+    fn result(&self, out: &mut String, register: Register, op: &Op) {
+        if self.is_last(register) {
+            self.line(out, "", op, "", false);
+        } else {
+            self.line(out, &format!("let v{register} = "), op, ";", false);
+        }
+    }
+
+    /// An operation, broken as rustfmt breaks a long choice.
+    fn line(&self, out: &mut String, before: &str, op: &Op, after: &str, preparing: bool) {
         const LONGEST_CHOICE: usize = 50;
         let right = self.right_side(op, preparing);
         match *op {
+            // As the last line of a function, a choice is always broken.
             Op::Select {
                 condition,
                 then,
                 otherwise,
-            } if right.len() > LONGEST_CHOICE => {
+            } if right.len() > LONGEST_CHOICE || before.is_empty() => {
                 let of = |register: Register| self.operand(register, preparing);
                 let _ = writeln!(
                     out,
-                    "            let {name} = if {} {{
+                    "            {before}if {} {{
                 {}
             }} else {{
                 {}
-            }};",
+            }}{after}",
                     of(condition),
                     of(then),
                     of(otherwise)
                 );
             }
             _ => {
-                let _ = writeln!(out, "            let {name} = {right};");
+                let _ = writeln!(out, "            {before}{right}{after}");
             }
         }
     }
@@ -419,7 +438,7 @@ impl Writer {
         }
         for (register, op, once) in self.ops() {
             if is_prepared(op, once) {
-                self.binding(out, &format!("k{register}"), op, true);
+                self.line(out, &format!("let k{register} = "), op, ";", true);
             }
         }
         let entries: Vec<String> = fields
@@ -517,13 +536,15 @@ impl Writer {
                 }
                 _ => {}
             }
-            self.binding(out, &format!("v{register}"), op, false);
+            self.result(out, register, op);
         }
         for state in &program.states {
             let value = self.operand(state.update, false);
             let _ = writeln!(out, "            state.s_{} = {value};", state.name);
         }
-        let _ = writeln!(out, "            {}", self.operand(program.value, false));
+        if !self.is_last(program.value) {
+            let _ = writeln!(out, "            {}", self.operand(program.value, false));
+        }
         out.push_str("        }\n    }\n");
     }
 }

@@ -7,6 +7,7 @@ mod budgets;
 mod ci;
 mod faults;
 mod firmware;
+mod hidden_effects;
 mod identified;
 mod pil;
 mod setup;
@@ -28,6 +29,7 @@ const TASKS: &[Task] = &[
     ci::TASK,
     faults::TASK,
     firmware::TASK,
+    hidden_effects::TASK,
     identified::TASK,
     pil::TASK,
     setup::TASK,

@@ -1,0 +1,24 @@
+//! The hidden-effects campaign: what the diagnosis finds in rigs that hide something.
+
+use crate::Task;
+use crate::shell::{cargo, run};
+
+pub(crate) const TASK: Task = Task {
+    name: "hidden-effects",
+    does: "the diagnosis on rigs that hide something: [--draws N] [--nulls N] [--pairs N] [--seed N] [--only TEXT]",
+    run: hidden_effects,
+};
+
+fn hidden_effects(arguments: &[String]) -> anyhow::Result<()> {
+    let mut all = vec![
+        "run",
+        "--release",
+        "--package",
+        "scenarios",
+        "--bin",
+        "hidden-effects",
+        "--",
+    ];
+    all.extend(arguments.iter().map(String::as_str));
+    run(&mut cargo(&all))
+}

@@ -1,6 +1,6 @@
 //! A base model refitted, all of it, with one more effect.
 
-use super::lean::fresh_starts;
+use super::lean::{fresh_starts, settle_fixed_delay};
 use super::{Fit, FitOptions, fit};
 use crate::data::Record;
 use crate::model::{Delay, Model};
@@ -99,7 +99,11 @@ pub fn fit_with_effect(
     tried.truncate(FOLLOWED);
     let finished: Vec<Option<Fit>> = tried
         .par_iter()
-        .map(|start| fit(&start.model, records, options).ok())
+        .map(|start| {
+            let fitted = fit(&start.model, records, options).ok()?;
+            // A fixed delay has no derivative, and the base's may stand in for the effect.
+            settle_fixed_delay(fitted, records, options).ok()
+        })
         .collect();
     finished
         .into_iter()

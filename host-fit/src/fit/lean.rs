@@ -49,7 +49,7 @@ pub fn lean_base(given: &Model, records: &[&Record]) -> Result<Fit, SimulateErro
         (None, Some(error)) => return Err(error),
         (None, None) => fit(given, records, &brief)?,
     };
-    let best = settle_fixed_delay(best, records)?;
+    let best = settle_fixed_delay(best, records, &FitOptions::default())?;
     match given.delay {
         Delay::Fixed { .. } => Ok(best),
         Delay::StateDependent { .. } | Delay::EdgeDependent { .. } => {
@@ -106,10 +106,14 @@ fn steady_level(records: &[&Record]) -> f64 {
 ///
 /// # Errors
 /// As [`fit`].
-pub fn settle_fixed_delay(mut best: Fit, records: &[&Record]) -> Result<Fit, SimulateError> {
+pub fn settle_fixed_delay(
+    mut best: Fit,
+    records: &[&Record],
+    options: &FitOptions,
+) -> Result<Fit, SimulateError> {
     let brief = FitOptions {
         iterations: 3,
-        ..FitOptions::default()
+        ..*options
     };
     for step in [8_i32, 4, 2, 1] {
         loop {
@@ -136,7 +140,7 @@ pub fn settle_fixed_delay(mut best: Fit, records: &[&Record]) -> Result<Fit, Sim
             }
         }
     }
-    fit(&best.model, records, &FitOptions::default())
+    fit(&best.model, records, options)
 }
 
 /// The model with a delay law of the kind `given` has, from several starts.

@@ -5,6 +5,7 @@
 //! - units: y is the normalised friction gain, u is 0 or 1, delays and lags are samples of 0.001 s
 
 use model_core::checks;
+use model_core::control::{HoldTimes, PulseTrain};
 use model_core::delay::FixedDelay;
 use model_core::model::{Averaging, OnOffState, Params, Parts, matrix, vector};
 use model_core::recursion::{Grading, LagConvention};
@@ -152,3 +153,16 @@ pub const GOLDEN: Golden<32> = Golden {
         0x3f4a_9a6b,
     ],
 };
+
+/// The valve's shortest on and off times, samples.
+pub const HOLD: HoldTimes = HoldTimes { on: 10, off: 10 };
+/// The law: a train of pulses, (first sample, length) each, that repeats.
+pub const LAW: PulseTrain<[(u32, u32); 1]> = PulseTrain {
+    period: 555,
+    pulses: [(0, 237)],
+};
+
+const _: () = assert!(
+    checks::train(LAW.period, &LAW.pulses, HOLD),
+    "a pulse or a gap is shorter than the valve's shortest times"
+);

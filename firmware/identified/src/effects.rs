@@ -6,6 +6,9 @@
 //! - units: y is the normalised friction gain, u is 0 or 1, delays and lags are samples of 0.001 s
 
 use model_core::checks;
+use model_core::control::budget::Budget;
+use model_core::control::golden::GoldenLaw;
+use model_core::control::{Air, HoldTimes, Reachable, Switches, Tracking, TrackingState};
 use model_core::effect::{Physics, Setting};
 use model_core::effects::AmplitudeSaturation;
 use model_core::effects::HotFilmNonlinearity;
@@ -188,4 +191,63 @@ pub const GOLDEN: Golden<32> = Golden {
         0x3f14_dcbe,
         0x3f17_c71a,
     ],
+};
+
+/// Longest time from a command to its first arrival, samples.
+pub const FIRST_ARRIVAL: usize =
+    (checks::smallest(&DELAY_FACTORS) * (DELAY_FLOOR + DELAY_RISE.max(0.0)) + 0.5) as usize;
+/// Samples that the law looks ahead at most.
+pub const LOOK_AHEAD: usize = 82;
+/// The law: it holds the friction at its reference.
+pub const LAW: Tracking<f32> = Tracking {
+    reference: 0.6,
+    reachable: Reachable {
+        low: 0.0,
+        high: 0.9139403,
+    },
+    slope: 0.002,
+    hold: HoldTimes { on: 10, off: 25 },
+    budget: Budget {
+        switches: Some(Switches {
+            samples_per_switch: 25,
+            saved: 10,
+        }),
+        air: Some(Air {
+            per_mille: 900,
+            saved: 1000,
+        }),
+    },
+    lead: 47,
+    opening: 2,
+    closing: 6,
+    observer: 0.03,
+    bias_rate: 0.0021276595,
+    integral_rate: 0.0008510638,
+    correction_limit: 0.27418208,
+    residual_limit: 0.22848508,
+};
+/// What the law remembers, its model included.
+pub type LawState = TrackingState<f32, IdentifiedState, LOOK_AHEAD>;
+
+const _: () = {
+    assert!(
+        checks::law(&LAW),
+        "a constant of the law is out of range, or its reference is out of reach"
+    );
+    assert!(
+        LOOK_AHEAD >= checks::look_ahead(&LAW, FIRST_ARRIVAL),
+        "the law looks ahead less far than delay, valve and half a hold time"
+    );
+};
+
+/// The law and its model at rest.
+#[must_use]
+pub fn law_state(model: &Identified) -> LawState {
+    LAW.start(state(model))
+}
+
+/// What the law decides in its golden run, bit for bit, as the host computed it.
+pub const LAW_GOLDEN: GoldenLaw = GoldenLaw {
+    samples: 4096,
+    expected: 0xfc99_3a58,
 };

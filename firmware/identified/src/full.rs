@@ -6,6 +6,9 @@
 //! - units: y is the normalised friction gain, u is 0 or 1, delays and lags are samples of 0.001 s
 
 use model_core::checks;
+use model_core::control::budget::Budget;
+use model_core::control::golden::GoldenLaw;
+use model_core::control::{HoldTimes, Reachable, Tracking, TrackingState};
 use model_core::effects::StateDependentDelay;
 use model_core::model::{Averaging, OnOffState, Params, Parts, matrix, vector};
 use model_core::recursion::{Grading, LagConvention};
@@ -162,4 +165,57 @@ pub const GOLDEN: Golden<32> = Golden {
         0x3ebb_ef9d,
         0x3eca_d5c6,
     ],
+};
+
+/// Longest time from a command to its first arrival, samples.
+pub const FIRST_ARRIVAL: usize =
+    (checks::smallest(&DELAY_FACTORS) * (DELAY_FLOOR + DELAY_RISE.max(0.0)) + 0.5) as usize;
+/// Samples that the law looks ahead at most.
+pub const LOOK_AHEAD: usize = 73;
+/// The law: it holds the friction at its reference.
+pub const LAW: Tracking<f32> = Tracking {
+    reference: 0.5,
+    reachable: Reachable {
+        low: 0.0,
+        high: 1.0666124,
+    },
+    slope: 0.0,
+    hold: HoldTimes { on: 20, off: 20 },
+    budget: Budget {
+        switches: None,
+        air: None,
+    },
+    lead: 47,
+    opening: 0,
+    closing: 0,
+    observer: 0.03,
+    bias_rate: 0.0021276595,
+    integral_rate: 0.0008510638,
+    correction_limit: 0.31998372,
+    residual_limit: 0.2666531,
+};
+/// What the law remembers, its model included.
+pub type LawState = TrackingState<f32, IdentifiedState, LOOK_AHEAD>;
+
+const _: () = {
+    assert!(
+        checks::law(&LAW),
+        "a constant of the law is out of range, or its reference is out of reach"
+    );
+    assert!(
+        LOOK_AHEAD >= checks::look_ahead(&LAW, FIRST_ARRIVAL),
+        "the law looks ahead less far than delay, valve and half a hold time"
+    );
+};
+
+/// The law and its model at rest.
+#[must_use]
+pub fn law_state(model: &Identified) -> LawState {
+    LAW.start(state(model))
+}
+
+/// What the law decides in its golden run, bit for bit, as the host computed it.
+pub const LAW_GOLDEN: GoldenLaw = GoldenLaw {
+    samples: 4096,
+    expected: 0xc510_c0f2,
 };

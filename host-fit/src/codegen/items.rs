@@ -1,7 +1,7 @@
 //! The items of the generated file.
 
 use super::layout::{array, documented, number, numbers};
-use super::{CodegenError, jets, outputs, spec_of};
+use super::{CodegenError, jets, law, outputs, references, spec_of};
 use crate::model::{Added, Delay, Model};
 use crate::user_effect::rust_source;
 use model_core::effect::{Setting, Spec};
@@ -10,6 +10,9 @@ use std::fmt::Write as _;
 
 pub(super) fn imports(out: &mut String, model: &Model, graded: bool) {
     let mut lines = vec!["use model_core::checks;".to_owned()];
+    if let Some(designed) = &model.law {
+        lines.extend(law::imports(designed));
+    }
     if matches!(model.delay, Delay::Fixed { .. }) {
         lines.push("use model_core::delay::FixedDelay;".to_owned());
     }
@@ -85,15 +88,7 @@ pub const WORDS: usize = {};
             jets(model).div_ceil(32)
         );
     }
-    let channels = model.channels();
-    let references: Vec<f64> = channels
-        .iter()
-        .map(|channel| {
-            let of_channel = |added: &&Added| added.channel.as_ref() == Some(channel);
-            let added = model.effects.iter().find(of_channel);
-            added.and_then(|added| added.reference).unwrap_or(1.0)
-        })
-        .collect();
+    let (channels, references) = (model.channels(), references(model));
     let names: Vec<String> = channels.iter().map(|name| format!("{name:?}")).collect();
     let _ = writeln!(
         out,
@@ -105,7 +100,10 @@ pub const WORDS: usize = {};
         out,
         "REFERENCES",
         &format!("[f32; {}]", names.len()),
-        &numbers(&references),
+        &references
+            .iter()
+            .map(|x| format!("{x:?}"))
+            .collect::<Vec<_>>(),
     );
 }
 

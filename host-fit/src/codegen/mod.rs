@@ -5,10 +5,12 @@
 //! are the nearest `f32`, written as short as they can be read back.
 
 mod items;
+mod law;
 mod layout;
 
 use crate::model::{Added, Delay, Model};
 use crate::simulate::Ring;
+use model_core::control::tracking::Unusable;
 use model_core::effect::{Place, Spec};
 use model_core::{State, self_test};
 use std::fmt::Write as _;
@@ -50,6 +52,9 @@ pub enum CodegenError {
         /// Where it left all bounds.
         samples: u32,
     },
+    /// The designed law does not fit the model.
+    #[error("the designed law does not fit the model: {0}; run `host-fit design` again")]
+    Law(#[from] Unusable),
 }
 
 /// The generated file `identified.rs` for `model`.
@@ -69,6 +74,9 @@ pub fn generate(model: &Model) -> Result<String, CodegenError> {
     items::constructors(&mut out, model, graded);
     items::own_effects(&mut out, model);
     golden(&mut out, model)?;
+    if let Some(designed) = &model.law {
+        law::items(&mut out, model, designed)?;
+    }
     Ok(out)
 }
 
@@ -147,7 +155,16 @@ fn jets(model: &Model) -> usize {
     model.longest_delay() + 3 + window
 }
 
-/// Samples, measured; `None` for what is not known.
+/// Usual values of the measured channels, in the order in which they are passed.
+fn references(model: &Model) -> Vec<f32> {
+    let of_channel = |channel: &String| {
+        let mut owners = model.effects.iter();
+        let added = owners.find(|added| added.channel.as_ref() == Some(channel));
+        added.and_then(|added| added.reference).unwrap_or(1.0) as f32
+    };
+    model.channels().iter().map(of_channel).collect()
+}
+
 fn header(out: &mut String, model: &Model) {
     let training = &model.training;
     let mut line = |text: String| {
@@ -212,15 +229,7 @@ fn header(out: &mut String, model: &Model) {
 /// Checksum and golden run, by the code that the host simulates with.
 fn golden(out: &mut String, model: &Model) -> Result<(), CodegenError> {
     let prepared = model.prepare::<f32>();
-    let references: Vec<f32> = model
-        .channels()
-        .iter()
-        .map(|channel| {
-            let of_channel = |added: &&Added| added.channel.as_ref() == Some(channel);
-            let added = model.effects.iter().find(of_channel);
-            added.and_then(|added| added.reference).unwrap_or(1.0) as f32
-        })
-        .collect();
+    let references = references(model);
     // Long enough for what is sent to arrive, twice over.
     let memory = model.longest_lag().max(model.longest_delay());
     let every = (2 * memory).div_ceil(GOLDEN_VALUES).clamp(32, 4096) as u32;

@@ -2,11 +2,11 @@
 
 use super::Console;
 use anyhow::Context;
-use host_fit::model::Model;
+use host_fit::model::{Law, Model};
 use host_fit::{codegen, output};
 use std::path::PathBuf;
 
-/// Write a model's constants as Rust for a no_std crate on model-core.
+/// Write a model's constants as Rust for a no_std crate on model-core, the designed law's with them.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The model file.
@@ -25,9 +25,10 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         "output": args.output,
         "bytes": text.len(),
         "effects": model.effect_names(),
+        "law": model.law,
     }))?;
     console.say(&format!(
-        "{}: N1 = {}, N2 = {}, N3 = {}, effects: {}",
+        "{}: N1 = {}, N2 = {}, N3 = {}, effects: {}, law: {}",
         args.output.display(),
         model.a.len(),
         model.product_lags.len(),
@@ -35,6 +36,11 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         match model.effect_names().as_slice() {
             [] => "none".to_owned(),
             names => names.join(", "),
+        },
+        match &model.law {
+            None => "none".to_owned(),
+            Some(Law::Track(law)) => format!("holds {}", law.reference),
+            Some(Law::Maximise(law)) => format!("pulses every {} samples", law.period),
         }
     ))
 }

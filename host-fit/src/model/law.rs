@@ -1,6 +1,7 @@
 //! The control law that `design` writes into a model file.
 
 use model_core::Real;
+use model_core::checks;
 use model_core::control::budget::Budget;
 use model_core::control::{Air, HoldTimes, PulseTrain, Reachable, Switches, Tracking};
 use serde::{Deserialize, Serialize};
@@ -163,6 +164,14 @@ impl Law {
             Self::Maximise(law) => {
                 if law.period == 0 || law.pulses.is_empty() {
                     return fault("period", "a pulse train needs a period and a pulse");
+                }
+                let mut pulses = law.pulses.clone();
+                pulses.sort_unstable();
+                if !checks::train(law.period, &pulses, law.hold.into()) {
+                    return fault(
+                        "pulses",
+                        "are outside the period, too close or too short for `law.hold`",
+                    );
                 }
                 if !law.air_price.is_finite() {
                     return fault("air_price", "must be a finite number");

@@ -7,6 +7,7 @@
 
 pub mod ahead;
 pub mod budget;
+pub mod golden;
 pub mod hold;
 pub mod pulses;
 pub mod reference;

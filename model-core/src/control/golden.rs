@@ -1,0 +1,79 @@
+//! A golden run of the tracking law: whether a board decides what the host decided.
+
+use crate::control::tracking::{Tracking, TrackingState};
+use crate::effect::Effect;
+use crate::history::Memory;
+use crate::model::{Parts, StateOf};
+use crate::self_test::{Crc32, command};
+
+/// What a tracking law must decide in the golden run, bit for bit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GoldenLaw {
+    /// Length of the run, samples.
+    pub samples: u32,
+    /// CRC-32 over every decision, estimate, foreseen friction and bias.
+    pub expected: u32,
+}
+
+/// Runs `law` from `state` and returns the CRC-32 of what it did, or `None`
+/// where a number of it was not finite.
+///
+/// The law reads its own estimate, disturbed: up and down by an eighth of the
+/// residual limit as the command of the golden run says, beyond the limit now
+/// and then, and nothing at all for a sixteenth of the time.
+pub fn run<M, Y, J, const A: usize>(
+    law: &Tracking<f32>,
+    model: &M,
+    mut state: TrackingState<f32, StateOf<f32, M, Y, J>, A>,
+    channels: &[f32],
+    samples: u32,
+) -> Option<u32>
+where
+    M: Parts<f32>,
+    Y: Memory<f32>,
+    J: Memory<f32>,
+    <M::Effects as Effect<f32>>::State: Clone,
+{
+    let mut crc = Crc32::new();
+    let mut estimate = 0.0;
+    for k in 0..samples {
+        let share = match (k % 97, command(k)) {
+            (0, _) => 2.0,
+            (_, true) => 0.125,
+            (_, false) => -0.125,
+        };
+        let reading = (k / 64 % 16 != 15).then_some(estimate + share * law.residual_limit);
+        let decision = law.step(model, &mut state, reading, channels);
+        estimate = decision.estimate;
+        for number in [decision.estimate, decision.foreseen, decision.bias] {
+            if !number.is_finite() {
+                return None;
+            }
+            crc = crc.word(number.to_bits());
+        }
+        crc = crc.word(decision.on.into());
+    }
+    Some(crc.value())
+}
+
+impl GoldenLaw {
+    /// Whether `law` on `model` decides what is expected, from `state` at rest
+    /// with `channels` at their references.
+    #[must_use]
+    pub fn holds<M, Y, J, const A: usize>(
+        &self,
+        law: &Tracking<f32>,
+        model: &M,
+        state: StateOf<f32, M, Y, J>,
+        channels: &[f32],
+    ) -> bool
+    where
+        M: Parts<f32>,
+        Y: Memory<f32>,
+        J: Memory<f32>,
+        <M::Effects as Effect<f32>>::State: Clone,
+    {
+        let start = law.start::<_, A>(state);
+        run(law, model, start, channels, self.samples) == Some(self.expected)
+    }
+}

@@ -1,4 +1,4 @@
-//! Puts the memory map where the linker looks for it.
+//! Puts the memory map where the linker looks for it, and the log's sections.
 
 fn main() {
     let out = std::env::var("OUT_DIR").unwrap_or_default();
@@ -6,5 +6,8 @@ fn main() {
         println!("cargo::error=memory.x: {error}");
     }
     println!("cargo::rustc-link-search={out}");
+    if std::env::var_os("CARGO_FEATURE_DEFMT").is_some() {
+        println!("cargo::rustc-link-arg-bins=-Tdefmt.x");
+    }
     println!("cargo::rerun-if-changed=memory.x");
 }

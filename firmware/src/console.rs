@@ -1,6 +1,68 @@
 //! What the operator types and reads over the serial line.
 
-use crate::controller::Mode;
+use crate::controller::{Controller, Mode};
+use crate::law::Law;
+
+/// Samples between two lines of telemetry.
+const TELEMETRY: u32 = 100;
+
+/// The operator's end of the loop: commands in, answers and telemetry out.
+#[derive(Clone, Debug)]
+pub struct Operator {
+    console: Console,
+    /// Samples since the last telemetry.
+    since: u32,
+    told: Mode,
+}
+
+impl Operator {
+    /// Nothing typed, nothing told.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            console: Console::new(),
+            since: 0,
+            told: Mode::Disarmed,
+        }
+    }
+
+    /// Takes a byte that was typed and carries out the command that it ends;
+    /// the answer is the status after it, with `?` before it if the command was
+    /// not understood.
+    pub fn receive<L: Law>(&mut self, byte: u8, controller: &mut Controller<L>) -> Option<Line> {
+        let command = self.console.receive(byte)?;
+        match command {
+            Command::Arm => controller.arm(),
+            Command::Disarm => controller.disarm(),
+            Command::Status | Command::Unknown => {}
+        }
+        let prefix = if command == Command::Unknown {
+            "? "
+        } else {
+            ""
+        };
+        Some(Line::status(prefix, controller))
+    }
+
+    /// Telemetry after a sample: a status line that begins with `t`, ten times a
+    /// second and at once when the mode has changed.
+    pub fn report<L: Law>(&mut self, controller: &Controller<L>) -> Option<Line> {
+        self.since += 1;
+        let mode = controller.mode();
+        if self.since < TELEMETRY && mode == self.told {
+            return None;
+        }
+        self.since = 0;
+        self.told = mode;
+        Some(Line::status("t ", controller))
+    }
+}
+
+impl Default for Operator {
+    fn default() -> Self {
+        Self::new()
+    }
+}
 
 /// A command of the operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,13 +124,24 @@ pub struct Line {
 }
 
 impl Line {
-    /// How things are: `armed y=0.512 valve=1 samples=61234`.
+    /// How things are: `armed y=0.512 valve=1 samples=61234`, after `prefix`.
     #[must_use]
-    pub fn status(mode: Mode, friction: f32, open: bool, samples: u64) -> Self {
+    pub fn status<L: Law>(prefix: &str, controller: &Controller<L>) -> Self {
+        Self::new(
+            prefix,
+            controller.mode(),
+            controller.friction(),
+            controller.is_open(),
+            controller.samples(),
+        )
+    }
+
+    fn new(prefix: &str, mode: Mode, friction: f32, open: bool, samples: u64) -> Self {
         let mut line = Self {
             bytes: [0; 96],
             length: 0,
         };
+        line.text(prefix);
         match mode {
             Mode::Disarmed => line.text("disarmed"),
             Mode::Armed => line.text("armed"),
@@ -169,14 +242,52 @@ mod tests {
 
     #[test]
     fn the_status_is_one_line() {
-        let line = Line::status(Mode::Armed, 0.5124, true, u64::MAX);
+        let line = Line::new("", Mode::Armed, 0.5124, true, u64::MAX);
         assert_eq!(
             line.bytes(),
             b"armed y=0.512 valve=1 samples=18446744073709551615\r\n"
         );
-        let line = Line::status(Mode::Faulted(Fault::Stuck), -0.0306, false, 0);
-        assert_eq!(line.bytes(), b"fault=stuck y=-0.031 valve=0 samples=0\r\n");
-        let line = Line::status(Mode::Disarmed, f32::NAN, false, 7);
+        let line = Line::new("t ", Mode::Faulted(Fault::Stuck), -0.0306, false, 0);
+        assert_eq!(
+            line.bytes(),
+            b"t fault=stuck y=-0.031 valve=0 samples=0\r\n"
+        );
+        let line = Line::new("", Mode::Disarmed, f32::NAN, false, 7);
         assert_eq!(line.bytes(), b"disarmed y=nan valve=0 samples=7\r\n");
+    }
+
+    #[test]
+    fn the_operator_is_answered_and_told_of_changes() {
+        use crate::cases::{RELAY, SETTINGS};
+        use crate::controller::Reading;
+        use crate::law::{Direct, Relay};
+        use identified::full;
+
+        let model = full::model();
+        let relay = Relay::new(model, full::state(&model), Direct, RELAY);
+        let mut controller = Controller::new(SETTINGS, relay);
+        let mut operator = Operator::new();
+        let mut typed = |text: &str, controller: &mut Controller<_>| {
+            let answers = text.bytes().filter_map(|b| operator.receive(b, controller));
+            let texts =
+                answers.map(|line| std::string::String::from_utf8_lossy(line.bytes()).into_owned());
+            texts.collect::<std::string::String>()
+        };
+        assert!(typed("launch\n", &mut controller).starts_with("? disarmed y=0.000 valve=0"));
+        assert!(typed("arm\r\n", &mut controller).starts_with("armed"));
+        let mut lines = 0;
+        let mut operator = Operator::new();
+        for k in 0..250_u16 {
+            let counts = f32::from(800 + k % 2);
+            controller.tick(Reading { counts, periods: 1 });
+            lines += u32::from(operator.report(&controller).is_some());
+        }
+        // One for the change of mode, two for the time.
+        assert_eq!(lines, 3);
+        controller.latch(Fault::Stuck);
+        let line = operator
+            .report(&controller)
+            .expect("a fault is told at once");
+        assert!(line.bytes().starts_with(b"t fault=stuck"));
     }
 }

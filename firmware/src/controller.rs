@@ -60,6 +60,7 @@ pub struct Controller<L> {
     /// Residual, low-pass filtered.
     strayed: f32,
     last: f32,
+    open: bool,
 }
 
 impl<L: Law> Controller<L> {
@@ -76,6 +77,7 @@ impl<L: Law> Controller<L> {
             samples: 0,
             strayed: 0.0,
             last: 0.0,
+            open: false,
         }
     }
 
@@ -84,18 +86,30 @@ impl<L: Law> Controller<L> {
         if self.mode == Mode::Disarmed {
             self.mode = Mode::Armed;
             self.strayed = 0.0;
+            #[cfg(feature = "defmt")]
+            defmt::info!("armed at sample {}", self.samples);
         }
     }
 
-    /// Shuts the valve and takes note of a latched fault.
+    /// Shuts the valve and takes note of a latched fault. A failed self-test is
+    /// not cleared: damaged constants drive nothing.
     pub fn disarm(&mut self) {
+        self.open = false;
+        if self.mode == Mode::Faulted(Fault::SelfTest) {
+            return;
+        }
         self.mode = Mode::Disarmed;
+        #[cfg(feature = "defmt")]
+        defmt::info!("disarmed at sample {}", self.samples);
     }
 
     /// Shuts the valve and latches `fault`; the first fault stays.
     pub fn latch(&mut self, fault: Fault) {
+        self.open = false;
         if !matches!(self.mode, Mode::Faulted(_)) {
             self.mode = Mode::Faulted(fault);
+            #[cfg(feature = "defmt")]
+            defmt::error!("fault latched: {} at sample {}", fault, self.samples);
         }
     }
 
@@ -115,6 +129,12 @@ impl<L: Law> Controller<L> {
     #[must_use]
     pub fn friction(&self) -> f32 {
         self.last
+    }
+
+    /// Whether the valve is open.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.open
     }
 
     /// One sample.
@@ -142,13 +162,12 @@ impl<L: Law> Controller<L> {
         let strayed = self.strayed.abs();
         // Also true for NaN: a model that has left all bounds is caught here.
         let within = strayed <= self.settings.residual_envelope;
-        let mut open = action.open;
+        self.open = action.open;
         if self.mode == Mode::Armed && !within {
             self.latch(Fault::Residual);
-            open = false;
         }
         Tick {
-            open,
+            open: self.open,
             predicted: action.predicted,
             mode: self.mode,
         }

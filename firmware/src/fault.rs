@@ -2,7 +2,6 @@
 
 /// A reason to shut the valves. It stays until the operator disarms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Fault {
     /// A sample was not done when the next one was due.
@@ -45,5 +44,12 @@ impl Fault {
             Self::Watchdog => "watchdog",
             Self::SelfTest => "self-test",
         }
+    }
+}
+
+#[cfg(feature = "defmt")]
+impl defmt::Format for Fault {
+    fn format(&self, formatter: defmt::Formatter<'_>) {
+        defmt::write!(formatter, "{=str}", self.name());
     }
 }

@@ -16,6 +16,8 @@ pub mod controller;
 pub mod fault;
 pub mod law;
 pub mod link;
+pub mod queue;
 pub mod rig;
 pub mod sensor;
+pub mod start;
 pub mod tracking;

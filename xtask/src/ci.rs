@@ -61,10 +61,25 @@ const STEPS: &[Step] = &[
     ("board lints", || {
         let mut clippy = crate::setup::cross_cargo("clippy", TARGETS[0])?;
         clippy
-            .args(["--package", "qemu-mps2", "--", "-Dwarnings"])
+            .args(["--package", "board", "--package", "qemu-mps2"])
+            .args(["--package", "nucleo-f446re"])
+            .args(["--features", "qemu-mps2/peer", "--", "-Dwarnings"])
             .current_dir(crate::shell::root().join("firmware"))
             .env("CARGO_TARGET_DIR", crate::shell::firmware_target());
         run(&mut clippy)
+    }),
+    // The loop without board code, also for smaller and newer cores.
+    ("firmware no_std", || {
+        TARGETS
+            .iter()
+            .try_for_each(|target| crate::firmware::library(target))
+    }),
+    // Link only without panics.
+    ("boards", || {
+        for board in crate::firmware::BOARDS {
+            crate::firmware::firmware(&["--board".to_owned(), board.to_owned()])?;
+        }
+        crate::firmware::build("nucleo-f446re", "nucleo-pil", &[]).map(|_| ())
     }),
     ("faults", || crate::faults::faults(&[])),
     // Links only without panics; runs the constants; checks the budgets.

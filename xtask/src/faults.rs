@@ -1,9 +1,10 @@
-//! Fault injection: the firmware under QEMU with a sensor that falls ill; each
-//! fault must shut the valve, stay latched with its reason, and be cleared only
-//! by the operator.
+//! Fault injection: the firmware under QEMU with a sensor that falls ill, a loop
+//! that is late or hangs, and constants that are damaged. Each fault must shut
+//! the valve, stay latched with its reason, and leave a message in the log.
 
 use crate::Task;
 use crate::firmware::{build, qemu};
+use crate::shell::{firmware_cargo, output};
 use anyhow::{Context, Result, bail};
 use std::io::{BufRead, BufReader, Write};
 use std::process::{ChildStdin, Stdio};
@@ -12,22 +13,29 @@ use std::time::{Duration, Instant};
 
 pub(crate) const TASK: Task = Task {
     name: "faults",
-    does: "fault injection under QEMU: each fault shuts the valve and is latched",
+    does: "fault injection under QEMU: each fault shuts the valve, is latched and logged",
     run: faults,
 };
 
-/// What makes the sensor ill, and the reason that must be latched.
-const ILLNESSES: [(&str, &str); 5] = [
+/// What is injected into the armed loop, and the reason that must be latched.
+const INJECTED: [(&str, &str); 6] = [
     ("1", "not-finite"),
     ("2", "at-rail"),
     ("3", "stuck"),
     ("4", "residual"),
     ("5", "overrun"),
+    ("6", "watchdog"),
 ];
+/// A restart with damaged constants: what injects it, and what the log says.
+const DAMAGED: [(&str, &str); 2] = [("7", "self-test: Checksum"), ("8", "self-test: Golden")];
 
 pub(crate) fn faults(_arguments: &[String]) -> Result<()> {
-    let elf = build("qemu-mps2", "qemu-mps2")?;
+    let elf = build("qemu-mps2", "qemu-mps2", &["--features", "defmt"])?;
+    let log = elf.with_extension("log");
     let mut process = qemu(&elf)
+        .args(["-semihosting-config", "enable=on,target=native,chardev=log"])
+        .arg("-chardev")
+        .arg(format!("file,id=log,path={}", log.display()))
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
@@ -40,7 +48,9 @@ pub(crate) fn faults(_arguments: &[String]) -> Result<()> {
         .and_then(|(to, from)| {
             let (sender, lines) = channel();
             std::thread::spawn(move || {
-                for line in BufReader::new(from).lines().map_while(Result::ok) {
+                let lines = BufReader::new(from).lines().map_while(Result::ok);
+                // Telemetry comes unasked; here only answers count.
+                for line in lines.filter(|line| !line.starts_with("t ")) {
                     if sender.send(line).is_err() {
                         return;
                     }
@@ -50,27 +60,60 @@ pub(crate) fn faults(_arguments: &[String]) -> Result<()> {
         });
     let _ = process.kill();
     let _ = process.wait();
-    result
+    result?;
+    let messages = output(
+        firmware_cargo(&[
+            "run",
+            "--release",
+            "--quiet",
+            "--package",
+            "log-reader",
+            "--",
+        ])
+        .arg(&elf)
+        .arg(&log),
+    )?;
+    print!("{messages}");
+    let injected = INJECTED.map(|(_, reason)| format!("latched: {reason}"));
+    let damaged = DAMAGED.map(|(_, message)| message.to_owned());
+    for expected in injected.iter().chain(&damaged) {
+        if !messages.contains(expected.as_str()) {
+            bail!("the log does not say `{expected}`");
+        }
+    }
+    Ok(())
 }
 
 fn dialogue(line: &mut Line) -> Result<()> {
     // The self-test must have passed: a fault would show instead.
     line.until("status", |answer| answer.starts_with("disarmed"))?;
-    for (illness, reason) in ILLNESSES {
+    for (injection, reason) in INJECTED {
         line.until("arm", |answer| answer.starts_with("armed"))?;
         line.until("status", |answer| answer.contains("valve=1"))?;
-        line.send(illness)?;
-        let latched = |answer: &str| {
-            answer.starts_with(&format!("fault={reason} ")) && answer.contains("valve=0")
-        };
-        let answer = line.until("status", latched)?;
-        println!("{illness}: {answer}");
+        line.send(injection)?;
+        let answer = line.until("status", latched(reason))?;
+        println!("{injection}: {answer}");
         // Well again: the fault stays, and arming does not help.
         line.send("0")?;
-        line.until("arm", latched)?;
+        line.until("arm", latched(reason))?;
         line.until("disarm", |answer| answer.starts_with("disarmed"))?;
     }
+    for (injection, _) in DAMAGED {
+        line.send(injection)?;
+        let answer = line.until("status", latched("self-test"))?;
+        println!("{injection}: {answer}");
+        // Damaged constants stay so: not even the operator clears this one.
+        line.until("disarm", latched("self-test"))?;
+        line.until("arm", latched("self-test"))?;
+    }
+    line.send("9")?;
+    line.until("arm", |answer| answer.starts_with("armed"))?;
     Ok(())
+}
+
+fn latched(reason: &str) -> impl Fn(&str) -> bool {
+    let begins = format!("fault={reason} ");
+    move |answer| answer.starts_with(&begins) && answer.contains("valve=0")
 }
 
 struct Line {
@@ -84,18 +127,17 @@ impl Line {
         Ok(self.to.flush()?)
     }
 
-    /// Repeats `command` until the answer is as wanted.
+    /// Repeats `command` until the answer is as wanted. A board that restarts
+    /// gives none meanwhile.
     fn until(&mut self, command: &str, wanted: impl Fn(&str) -> bool) -> Result<String> {
         let until = Instant::now() + Duration::from_secs(30);
         let mut last = String::new();
         while Instant::now() < until {
-            self.send(&format!("{command}\n"))?;
-            last = self
-                .lines
-                .recv_timeout(Duration::from_secs(10))
-                .context("the firmware does not answer")?;
-            if wanted(&last) {
-                return Ok(last);
+            self.send(&format!("\n{command}\n"))?;
+            match self.lines.recv_timeout(Duration::from_secs(1)) {
+                Ok(answer) if wanted(&answer) => return Ok(answer),
+                Ok(answer) => last = answer,
+                Err(_) => last.clear(),
             }
         }
         bail!("after `{command}` the firmware goes on saying `{last}`")

@@ -16,26 +16,27 @@ pub(crate) const TASK: Task = Task {
 /// Cortex-M4F: both boards.
 pub(crate) const BOARD_TARGET: &str = TARGETS[0];
 
-fn firmware(arguments: &[String]) -> Result<()> {
+/// A board with a program of its own name.
+pub(crate) const BOARDS: [&str; 2] = ["nucleo-f446re", "qemu-mps2"];
+
+pub(crate) fn firmware(arguments: &[String]) -> Result<()> {
     let board = match arguments {
-        [option, board] if option == "--board" => board.as_str(),
-        _ => bail!("name a board: --board nucleo-f446re or --board qemu-mps2"),
+        [option, board] if option == "--board" && BOARDS.contains(&board.as_str()) => board,
+        _ => bail!("name a board: --board {}", BOARDS.join(" or --board ")),
     };
-    let known = ["qemu-mps2", "nucleo-f446re"].contains(&board)
-        && root().join("firmware").join(board).is_dir();
-    if !known {
-        bail!("no board `{board}` in firmware/");
-    }
-    let elf = build(board, board)?;
+    let elf = build(board, board, &[])?;
+    let size = size(&elf)?;
+    eprintln!("flash {} bytes, static RAM {} bytes", size.flash, size.ram);
     println!("{}", elf.display());
     Ok(())
 }
 
 /// Builds program `bin` of package `board`; a panic in it would not link.
-pub(crate) fn build(board: &str, bin: &str) -> Result<PathBuf> {
+pub(crate) fn build(board: &str, bin: &str, options: &[&str]) -> Result<PathBuf> {
     let mut cargo = cross_cargo("build", BOARD_TARGET)?;
     cargo
         .args(["--package", board, "--bin", bin])
+        .args(options)
         .current_dir(root().join("firmware"))
         .env("CARGO_TARGET_DIR", firmware_target());
     run(&mut cargo)?;
@@ -43,6 +44,16 @@ pub(crate) fn build(board: &str, bin: &str) -> Result<PathBuf> {
         .join(BOARD_TARGET)
         .join("release")
         .join(bin))
+}
+
+/// Builds the loop's library, with its log messages, for `target`.
+pub(crate) fn library(target: &str) -> Result<()> {
+    let mut cargo = cross_cargo("build", target)?;
+    cargo
+        .args(["--package", "firmware", "--features", "defmt"])
+        .current_dir(root().join("firmware"))
+        .env("CARGO_TARGET_DIR", firmware_target());
+    run(&mut cargo)
 }
 
 /// QEMU with the program, its serial line on standard input and output. Time

@@ -1,5 +1,6 @@
 //! SysTick, 25 MHz: under `-icount shift=5` a tick is 1.25 instructions.
 
+use board::lockstep::Stopwatch;
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 
@@ -31,21 +32,40 @@ impl Ticks {
         ticks
     }
 
-    /// What `work` gives, and the ticks it took (at most 0.67 s).
+    /// Lets the first period begin now.
+    pub fn begin(&mut self) {
+        self.due = SYST::get_current();
+    }
+
+    /// Waits for the next multiple of `period` ticks since the last wait ended,
+    /// and says how many periods that were: more than 1 if it came too late.
+    pub fn wait(&mut self, period: u32) -> u32 {
+        let mut periods = 0;
+        loop {
+            let due = self.due.wrapping_sub(period) & FULL;
+            if periods > 0 && !is_past(due) {
+                return periods;
+            }
+            while !is_past(due) {}
+            self.due = due;
+            periods += 1;
+        }
+    }
+}
+
+/// Whether the count has gone down to `due`; right for half its range.
+#[inline]
+fn is_past(due: u32) -> bool {
+    SYST::get_current().wrapping_sub(due) & FULL >= FULL / 2
+}
+
+impl Stopwatch for Ticks {
     #[inline(always)]
-    pub fn measure<R>(&mut self, work: impl FnOnce() -> R) -> (R, u32) {
+    fn measure<R>(&mut self, work: impl FnOnce() -> R) -> (R, u32) {
         let before = SYST::get_current();
         let result = work();
         let after = SYST::get_current();
         let ticks = before.wrapping_sub(after) & FULL;
         (result, ticks.saturating_sub(self.overhead))
-    }
-
-    /// Waits until `period` ticks have gone by since the last wait ended.
-    pub fn wait(&mut self, period: u32) {
-        let due = self.due.wrapping_sub(period) & FULL;
-        // In the future while less than half the range behind the count.
-        while SYST::get_current().wrapping_sub(due) & FULL < FULL / 2 {}
-        self.due = due;
     }
 }

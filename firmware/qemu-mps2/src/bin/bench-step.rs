@@ -3,6 +3,7 @@
 #![no_std]
 #![no_main]
 
+use board::lockstep::Stopwatch;
 use cortex_m_rt::entry;
 use identified::full;
 use model_core::self_test::command;

@@ -1,30 +1,45 @@
 //! The loop on QEMU's mps2-an386, with a flow that the model itself plays and
-//! a sensor whose illnesses are switched on over the serial line.
+//! faults that are injected over the serial line.
 //!
 //! Lines: `arm`, `disarm`, `status`; and for the fault-injection run a digit:
 //! `0` a healthy sensor, `1` no number, `2` at the rail, `3` stuck, `4` away
-//! from the model, `5` one sample too late.
+//! from the model, `5` a sample that takes longer than a period, `6` a loop that
+//! hangs, `7` and `8` a restart with a damaged coefficient and a damaged delay
+//! law, `9` a restart with nothing damaged.
 #![no_std]
 #![no_main]
 
+use board::stack;
 use core::convert::Infallible;
+use core::mem::MaybeUninit;
+use core::ptr::{addr_of, addr_of_mut};
 use cortex_m_rt::entry;
 use embedded_hal::digital::{ErrorType, OutputPin};
-use firmware::cases::SETTINGS;
-use firmware::console::{Command, Console, Line};
-use firmware::controller::{Controller, Mode};
-use firmware::fault::Fault;
+use firmware::cases::{RELAY, SETTINGS};
+use firmware::console::Operator;
+use firmware::controller::Controller;
 use firmware::law::{Direct, Relay};
 use firmware::rig::{Clock, Rig, Sensor};
+use firmware::start;
 use identified::on_board as model;
-use model_core::self_test::checksum;
+use model_core::model::vector;
 use model_core::{Input, step};
 use qemu_mps2::clock::Ticks;
-use qemu_mps2::stack;
 use qemu_mps2::uart::Uart;
+use qemu_mps2::watchdog::{Watchdog, restarted};
 
 /// SysTick ticks in a sample of 1 ms.
 const TICKS_PER_SAMPLE: u32 = 25_000;
+/// At 32 ns an instruction.
+const TWO_AND_A_HALF_PERIODS: u32 = 78_000;
+/// The watchdog waits twice 10 ms.
+const PATIENCE: u32 = 10 * TICKS_PER_SAMPLE;
+
+/// What is to be damaged at the next start; RAM survives a restart.
+#[unsafe(link_section = ".uninit.damage")]
+static mut DAMAGE: MaybeUninit<u32> = MaybeUninit::uninit();
+const COEFFICIENT: u32 = 0xDA_0001;
+const DELAY_LAW: u32 = 0xDA_0002;
 
 /// The flow, played by the model, and the sensor's illness.
 struct Played {
@@ -55,7 +70,7 @@ impl Sensor for Played {
     }
 }
 
-/// Counts samples; one can be skipped.
+/// Counts sample periods.
 struct Samples(core::cell::Cell<u32>);
 
 impl Clock for &Samples {
@@ -88,21 +103,21 @@ fn main() -> ! {
             cortex_m::asm::wfi();
         }
     };
+    let by_watchdog = restarted();
     let mut uart = Uart::new(core.ITM);
     let mut ticks = Ticks::new(core.SYST);
     let identified = model::model();
-    let law = Relay::new(
-        identified,
-        model::state(&identified),
-        Direct,
-        firmware::cases::RELAY,
-    );
+    let law = Relay::new(identified, model::state(&identified), Direct, RELAY);
     let mut controller = Controller::new(SETTINGS, law);
-    let sound = checksum(&identified) == model::CHECKSUM
-        && model::GOLDEN.holds(&identified, model::state(&identified), &model::REFERENCES);
-    if !sound {
-        controller.latch(Fault::SelfTest);
-    }
+    let tested = damaged(identified);
+    let tested = start::self_test(
+        &tested,
+        model::state(&tested),
+        &model::REFERENCES,
+        model::CHECKSUM,
+        &model::GOLDEN,
+    );
+    start::latch(&mut controller, tested, by_watchdog);
     let sensor = Played {
         model: identified,
         state: model::state(&identified),
@@ -112,36 +127,53 @@ fn main() -> ! {
     };
     let samples = Samples(core::cell::Cell::new(0));
     let mut rig = Rig::new(controller, sensor, &samples, Pin, Pin);
-    let mut console = Console::new();
+    let mut operator = Operator::new();
+    let mut watchdog = Watchdog::start(core.TPIU, PATIENCE);
+    ticks.begin();
     loop {
-        ticks.wait(TICKS_PER_SAMPLE);
-        samples.0.set(samples.0.get().wrapping_add(1));
-        let tick = rig.sample();
-        let mut open = tick.open;
-        rig.sensor().open = open;
+        let periods = ticks.wait(TICKS_PER_SAMPLE);
+        samples.0.set(samples.0.get().wrapping_add(periods));
+        rig.sensor().open = rig.controller().is_open();
+        rig.sample();
+        watchdog.feed();
+        if let Some(line) = operator.report(rig.controller()) {
+            uart.send(line.bytes());
+        }
         while let Some(byte) = uart.receive() {
-            if let b'0'..=b'4' = byte {
-                rig.sensor().illness = byte;
-            } else if byte == b'5' {
-                samples.0.set(samples.0.get().wrapping_add(1));
-            } else if let Some(command) = console.receive(byte) {
-                let controller = rig.controller();
-                match command {
-                    Command::Arm => controller.arm(),
-                    Command::Disarm => controller.disarm(),
-                    Command::Status => {}
-                    Command::Unknown => uart.send(b"? "),
+            match byte {
+                b'0'..=b'4' => rig.sensor().illness = byte,
+                b'5' => cortex_m::asm::delay(TWO_AND_A_HALF_PERIODS),
+                b'6' => loop {
+                    cortex_m::asm::nop();
+                },
+                b'7' => restart(COEFFICIENT),
+                b'8' => restart(DELAY_LAW),
+                b'9' => restart(0),
+                _ => {
+                    if let Some(line) = operator.receive(byte, rig.controller()) {
+                        uart.send(line.bytes());
+                    }
                 }
-                // What the valve will be after this sample.
-                open &= controller.mode() == Mode::Armed;
-                let line = Line::status(
-                    controller.mode(),
-                    controller.friction(),
-                    open,
-                    controller.samples(),
-                );
-                uart.send(line.bytes());
             }
         }
     }
+}
+
+/// The model as the self-test is to find it.
+fn damaged(mut model: model::Identified) -> model::Identified {
+    // SAFETY: the word is in RAM, any bits are a u32, and nothing runs beside.
+    match unsafe { addr_of!(DAMAGE).cast::<u32>().read_volatile() } {
+        COEFFICIENT => model.a = vector(model::A.map(|a| f32::from_bits(a.to_bits() ^ 1))),
+        DELAY_LAW => model.delay.floor += 1.0,
+        _ => {}
+    }
+    model
+}
+
+/// Restarts by command, which is not the watchdog's doing.
+fn restart(damage: u32) {
+    let _ = restarted();
+    // SAFETY: as in `damaged`.
+    unsafe { addr_of_mut!(DAMAGE).cast::<u32>().write_volatile(damage) };
+    cortex_m::peripheral::SCB::sys_reset();
 }

@@ -8,7 +8,8 @@ const PAINT: u32 = 0xA5A5_5A5A;
 const MARGIN: usize = 64;
 
 unsafe extern "C" {
-    static __ebss: u32;
+    /// The end of what has a place in memory, `.uninit` included.
+    static __sheap: u32;
     static _stack_start: u32;
 }
 
@@ -16,9 +17,10 @@ unsafe extern "C" {
 #[inline(never)]
 pub fn paint() {
     let top = cortex_m::register::msp::read() as usize - MARGIN;
-    let mut at = addr_of!(__ebss) as usize;
+    let mut at = addr_of!(__sheap) as usize;
     while at < top {
-        // SAFETY: between the end of .bss and the stack in use nothing lives.
+        // SAFETY: between the end of static memory and the stack in use nothing
+        // lives (there is no heap).
         unsafe { (at as *mut u32).write_volatile(PAINT) };
         at += 4;
     }
@@ -28,7 +30,7 @@ pub fn paint() {
 #[must_use]
 pub fn deepest() -> u32 {
     let top = addr_of!(_stack_start) as usize;
-    let mut at = addr_of!(__ebss) as usize;
+    let mut at = addr_of!(__sheap) as usize;
     // SAFETY: reading RAM.
     while at < top && unsafe { (at as *const u32).read_volatile() } == PAINT {
         at += 4;

@@ -1,0 +1,101 @@
+//! The loop on the Nucleo-F446RE: `arm`, `disarm`, `status` and telemetry over
+//! the ST-LINK's serial port.
+#![no_std]
+#![no_main]
+
+use board::stack;
+use cortex_m_rt::{entry, exception};
+use firmware::cases::{RELAY, SETTINGS};
+use firmware::console::Operator;
+use firmware::controller::Controller;
+use firmware::law::{Direct, Relay};
+use firmware::rig::Rig;
+use firmware::start;
+use identified::on_board as model;
+use nucleo_f446re::sampler::{Periods, Sampler, periods};
+use nucleo_f446re::uart::Uart;
+use nucleo_f446re::{clocks, valve};
+use stm32f4xx_hal::pac::{CorePeripherals, Peripherals};
+use stm32f4xx_hal::prelude::*;
+use stm32f4xx_hal::watchdog::IndependentWatchdog;
+
+/// The watchdog's patience: 20 samples; its own clock may be 50 % off.
+const PATIENCE_MS: u32 = 20;
+
+#[entry]
+fn main() -> ! {
+    stack::paint();
+    let (Some(_), Some(chip)) = (CorePeripherals::take(), Peripherals::take()) else {
+        stopped();
+    };
+    let by_watchdog = clocks::restarted_by_watchdog(&chip.RCC);
+    let mut rcc = chip.RCC.constrain();
+    let (a, b) = (chip.GPIOA.split(&mut rcc), chip.GPIOB.split(&mut rcc));
+    let valve = valve::shut(b.pb10);
+    clocks::start(&rcc, &chip.FLASH);
+    let button = chip.GPIOC.split(&mut rcc).pc13;
+
+    let identified = model::model();
+    let law = Relay::new(identified, model::state(&identified), Direct, RELAY);
+    let mut controller = Controller::new(SETTINGS, law);
+    let tested = start::self_test(
+        &identified,
+        model::state(&identified),
+        &model::REFERENCES,
+        model::CHECKSUM,
+        &model::GOLDEN,
+    );
+    start::latch(&mut controller, tested, by_watchdog);
+
+    let mut uart = Uart::new(chip.USART2, a.pa2, a.pa3, &mut rcc);
+    let mut watchdog = IndependentWatchdog::new(chip.IWDG);
+    watchdog.start(PATIENCE_MS.millis());
+    let sampler = Sampler::start(
+        chip.ADC1,
+        &chip.ADC_COMMON,
+        a.pa0.into_analog(),
+        chip.TIM2,
+        &mut rcc,
+    );
+    let lamp = a.pa5.into_push_pull_output();
+    let mut rig = Rig::new(controller, sampler, Periods, valve, lamp);
+    let mut operator = Operator::new();
+    let mut sampled = periods();
+    loop {
+        // No sample, no food: a converter that stands still ends in a restart.
+        while periods() == sampled {
+            uart.work();
+        }
+        sampled = periods();
+        rig.sample();
+        watchdog.feed();
+        if button.is_low() {
+            rig.controller().disarm();
+        }
+        while let Some(byte) = uart.receive() {
+            if let Some(line) = operator.receive(byte, rig.controller()) {
+                uart.send(line.bytes());
+            }
+        }
+        if let Some(line) = operator.report(rig.controller()) {
+            uart.send(line.bytes());
+        }
+    }
+}
+
+#[exception]
+unsafe fn HardFault(_frame: &cortex_m_rt::ExceptionFrame) -> ! {
+    stopped();
+}
+
+#[exception]
+unsafe fn DefaultHandler(_irqn: i16) {
+    stopped();
+}
+
+/// Valves shut until the watchdog, if it runs, restarts the board.
+fn stopped() -> ! {
+    loop {
+        valve::emergency();
+    }
+}

@@ -1,0 +1,9 @@
+//! ST's Nucleo-F446RE: what the rig's programs need of it. Pins and levels are
+//! in `firmware/WIRING.md`.
+#![no_std]
+
+pub mod clocks;
+pub mod cycles;
+pub mod sampler;
+pub mod uart;
+pub mod valve;

@@ -1,0 +1,98 @@
+//! The sensor: TIM2 starts a conversion on PA0 every millisecond, and the
+//! converter's interrupt puts the reading away and counts the period.
+
+use crate::clocks::CORE;
+use core::sync::atomic::{AtomicU32, Ordering};
+use firmware::rig::{Clock, Sensor};
+use stm32f4xx_hal::gpio::{Analog, PA0};
+use stm32f4xx_hal::interrupt;
+use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, Interrupt, NVIC, TIM2};
+use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
+
+/// Samples per second.
+const RATE: u32 = 1000;
+
+static READING: AtomicU32 = AtomicU32::new(0);
+static PERIODS: AtomicU32 = AtomicU32::new(0);
+
+/// The readings, and the sample clock that they are.
+pub struct Sampler {
+    _pin: PA0<Analog>,
+}
+
+impl Sampler {
+    /// Starts the 1 kHz conversions. Written register by register: the HAL
+    /// calibrates with a division that can panic (RM0390, 13.13).
+    #[must_use]
+    pub fn start(
+        converter: ADC1,
+        common: &ADC_COMMON,
+        pin: PA0<Analog>,
+        timer: TIM2,
+        rcc: &mut Rcc,
+    ) -> Self {
+        ADC1::enable(rcc);
+        ADC1::reset(rcc);
+        // 84 MHz / 4 = 21 MHz; 480 cycles of it are 23 µs, for a source of some kΩ.
+        common.ccr().write(|w| w.adcpre().div4());
+        converter.smpr2().write(|w| w.smp0().cycles480());
+        converter.cr1().write(|w| w.eocie().enabled());
+        // One conversion of channel 0, which the resets of SQR1 to SQR3 say.
+        converter.cr2().write(|w| {
+            w.exten().rising_edge().extsel().tim2trgo();
+            w.eocs().each_conversion().adon().enabled()
+        });
+        TIM2::enable(rcc);
+        TIM2::reset(rcc);
+        timer.arr().write(|w| w.set(CORE / RATE - 1));
+        timer.cr2().write(|w| w.mms().update());
+        // SAFETY: the interrupt touches the converter and atomics only.
+        unsafe { NVIC::unmask(Interrupt::ADC) };
+        timer.cr1().write(|w| w.cen().enabled());
+        Self { _pin: pin }
+    }
+}
+
+/// Sample periods since the start, wrapping.
+#[inline]
+#[must_use]
+pub fn periods() -> u32 {
+    PERIODS.load(Ordering::Acquire)
+}
+
+impl Sensor for Sampler {
+    fn counts(&mut self) -> f32 {
+        READING.load(Ordering::Relaxed) as f32
+    }
+}
+
+/// The sample clock.
+#[derive(Clone, Copy, Debug)]
+pub struct Periods;
+
+impl Clock for Periods {
+    fn periods(&self) -> u32 {
+        periods()
+    }
+}
+
+#[interrupt]
+fn ADC() {
+    // SAFETY: this interrupt alone touches status and data after the start.
+    let converter = unsafe { &*ADC1::ptr() };
+    // A reading that was overwritten is a period too, and the converter stands
+    // still until its flag is cleared.
+    let overwritten = converter.sr().read().ovr().bit_is_set();
+    if overwritten {
+        converter.sr().modify(|_, w| w.ovr().clear_bit());
+    }
+    READING.store(
+        converter.dr().read().data().bits().into(),
+        Ordering::Relaxed,
+    );
+    let periods = PERIODS.load(Ordering::Relaxed);
+    PERIODS.store(
+        periods.wrapping_add(1 + u32::from(overwritten)),
+        Ordering::Release,
+    );
+}

@@ -1,0 +1,112 @@
+//! What is checked before the first sample: the constants, and why the board
+//! started.
+
+use crate::controller::Controller;
+use crate::fault::Fault;
+use crate::law::Law;
+use model_core::Parts;
+use model_core::history::Memory;
+use model_core::model::StateOf;
+use model_core::self_test::{Golden, checksum};
+
+/// What the self-test found wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Failure {
+    /// Structure and coefficients are not those that were generated.
+    Checksum,
+    /// The model does not say what it said where it was generated.
+    Golden,
+}
+
+/// Compares the constants' checksum and runs the golden trajectory.
+///
+/// # Errors
+/// What is wrong.
+pub fn self_test<M, Y, J, const N: usize>(
+    model: &M,
+    state: StateOf<f32, M, Y, J>,
+    references: &[f32],
+    expected: u32,
+    golden: &Golden<N>,
+) -> Result<(), Failure>
+where
+    M: Parts<f32>,
+    Y: Memory<f32>,
+    J: Memory<f32>,
+{
+    if checksum(model) != expected {
+        Err(Failure::Checksum)
+    } else if !golden.holds(model, state, references) {
+        Err(Failure::Golden)
+    } else {
+        Ok(())
+    }
+}
+
+/// Latches what the start brought to light: nothing is armed before the
+/// operator has taken note.
+pub fn latch<L: Law>(
+    controller: &mut Controller<L>,
+    tested: Result<(), Failure>,
+    by_watchdog: bool,
+) {
+    if let Err(_failure) = tested {
+        #[cfg(feature = "defmt")]
+        defmt::error!("self-test: {}", _failure);
+        controller.latch(Fault::SelfTest);
+    } else if by_watchdog {
+        controller.latch(Fault::Watchdog);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cases::{RELAY, SETTINGS};
+    use crate::controller::Mode;
+    use crate::law::{Direct, Relay};
+    use identified::full;
+    use model_core::model::vector;
+
+    fn tested(model: &full::Identified) -> Result<(), Failure> {
+        self_test(
+            model,
+            full::state(model),
+            &full::REFERENCES,
+            full::CHECKSUM,
+            &full::GOLDEN,
+        )
+    }
+
+    #[test]
+    fn damage_is_told_apart() {
+        let mut model = full::model();
+        assert_eq!(tested(&model), Ok(()));
+        model.delay.floor += 1.0;
+        assert_eq!(tested(&model), Err(Failure::Golden));
+        model.b = vector([0.009]);
+        assert_eq!(tested(&model), Err(Failure::Checksum));
+    }
+
+    #[test]
+    fn nothing_is_armed_after_a_bad_start() {
+        for (test, by_watchdog, fault) in [
+            (Ok(()), true, Fault::Watchdog),
+            (Err(Failure::Golden), false, Fault::SelfTest),
+            (Err(Failure::Checksum), true, Fault::SelfTest),
+        ] {
+            let model = full::model();
+            let relay = Relay::new(model, full::state(&model), Direct, RELAY);
+            let mut controller = Controller::new(SETTINGS, relay);
+            latch(&mut controller, test, by_watchdog);
+            controller.arm();
+            assert_eq!(controller.mode(), Mode::Faulted(fault));
+            // A restart is disarmed by the operator, damaged constants never.
+            controller.disarm();
+            controller.arm();
+            let armed = fault == Fault::Watchdog;
+            assert_eq!(controller.mode() == Mode::Armed, armed);
+        }
+    }
+}

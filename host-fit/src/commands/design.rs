@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use firmware_sim::closed_loop::{Figures, Trace};
 use host_fit::design::{
-    Case, CaseGroup, MaximiseRequest, Optimum, Outside, Proof, Steady, TrackDesign, TrackRequest,
-    maximise, prove, prove_pulses, track,
+    Case, CaseGroup, MaximiseRequest, Optimum, Outside, Planned, Proof, Steady, TrackDesign,
+    TrackRequest, maximise, prove, prove_pulses, track,
 };
 use host_fit::model::{Law, Model};
 use host_fit::output::write_atomic;
@@ -56,6 +56,9 @@ pub(crate) struct Args {
     /// Most pulses in a period (maximising).
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=4))]
     pulses: u8,
+    /// Horizon over which free on/off commands are searched as well, in seconds (maximising).
+    #[arg(long, value_name = "S", value_parser = positive)]
+    horizon: Option<f64>,
     /// Picture of the loop; by default beside the model file, ending in `-loop.svg`.
     #[arg(long, value_name = "FILE.svg")]
     picture: Option<PathBuf>,
@@ -115,6 +118,8 @@ struct MaximiseDocument {
     refused_mean: Option<f64>,
     pole_moduli: [f64; 2],
     outside: Option<Outside>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    planned: Option<Planned>,
 }
 
 #[derive(Serialize)]
@@ -191,6 +196,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
                     air_price: args.air_price,
                     pulses: args.pulses.into(),
                     longest_period_s: 3.0,
+                    horizon_s: args.horizon,
                 },
             )?;
             let proof = prove_pulses(&model, &optimum.law, args.seed)?;
@@ -256,6 +262,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
                 refused_mean: o.refused_mean,
                 pole_moduli: o.moduli,
                 outside: o.outside,
+                planned: o.planned,
             }),
             Design::Track(_) => None,
         },
@@ -336,6 +343,25 @@ fn optimum_words(optimum: &Optimum) -> String {
         text.push_str(&format!(
             "\nrefused: {} pulse trains that looked better (up to {mean:.3}) but grow in a long run: instabilities of the model",
             optimum.refused
+        ));
+    }
+    if let Some(planned) = &optimum.planned {
+        text.push_str(&format!(
+            "\nfree commands over {} s from rest ({}, every {:.0} ms): value {:.3} with {:.1} % of the air (steady blowing {:.3}); {}",
+            planned.horizon_s,
+            if planned.exact { "all tried" } else { "beam search" },
+            1000.0 * planned.block_s,
+            planned.value,
+            100.0 * planned.duty,
+            planned.steady_value,
+            match planned.cycle_s {
+                None => "planning again and again, the valve comes to rest or the model grows".to_owned(),
+                Some(cycle_s) => format!(
+                    "planning again and again runs into a cycle of {:.0} ms ({:.0} % of it irregular), tried with the others",
+                    1000.0 * cycle_s,
+                    100.0 * planned.irregular
+                ),
+            }
         ));
     }
     match &optimum.outside {

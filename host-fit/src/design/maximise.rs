@@ -3,10 +3,12 @@
 //! Since the mean friction is affine in every single command, best commands are
 //! on/off by themselves (theory A.4); over a horizon shorter than the longest
 //! lags the benefit of pulsing is invisible, so the search is over periodic
-//! commands: period, lengths and phases of the pulses.
+//! commands: period, lengths and phases of the pulses. A search of free commands
+//! over a finite horizon ([`super::horizon`]) can propose further ones.
 
 use super::DesignError;
 use super::bench::{Bench, HostState};
+use super::horizon::{self, Flow, Horizon};
 use super::steady::dominant_modulus;
 use crate::model::{Hold, Maximise, Model, Start};
 use rayon::prelude::*;
@@ -25,6 +27,30 @@ pub struct MaximiseRequest {
     pub pulses: usize,
     /// Longest period, s.
     pub longest_period_s: f64,
+    /// Horizon over which free on/off commands are searched as well, s.
+    pub horizon_s: Option<f64>,
+}
+
+/// What the search over a finite horizon found.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Planned {
+    /// The horizon, s.
+    pub horizon_s: f64,
+    /// Time between two chances to switch, s.
+    pub block_s: f64,
+    /// From rest: mean friction minus price times duty of the best command.
+    pub value: f64,
+    /// The same under steady blowing.
+    pub steady_value: f64,
+    /// Duty of the best command.
+    pub duty: f64,
+    /// Whether all commands were tried; otherwise a beam of them.
+    pub exact: bool,
+    /// The cycle that a law with this horizon runs into, planning again and again, s;
+    /// `None` if the valve comes to rest or the model grows.
+    pub cycle_s: Option<f64>,
+    /// Share of samples in which a cycle differs from the one before.
+    pub irregular: f64,
 }
 
 /// The best pulses and what they are worth.
@@ -55,6 +81,8 @@ pub struct Optimum {
     pub moduli: [f64; 2],
     /// Where the optimum leaves what was recorded; `None` if nothing is known of that.
     pub outside: Option<Outside>,
+    /// The search over a finite horizon, if asked for.
+    pub planned: Option<Planned>,
 }
 
 /// How far an optimum lies outside the recorded data.
@@ -82,6 +110,11 @@ const JUDGED: usize = 5000;
 /// For the best: where the judged part begins, and the long run ends.
 const SETTLED: usize = 20_000;
 const LONG_RUN: usize = 240_000;
+/// A search over a horizon: blocks at most, commands kept, samples of planning
+/// again and again.
+const MOST_BLOCKS: u32 = 60;
+const WIDTH: usize = 16;
+const RECEDED: usize = 8000;
 /// A long-run mean this far from the judged one (share) is another motion.
 const SAME_MEAN: f64 = 0.05;
 
@@ -123,6 +156,13 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
         .collect();
     refined.extend(distinct(&candidates, 40));
     refined.push(search.judge(&steady));
+    let planned = request.horizon_s.map(|horizon_s| {
+        let (planned, train) = search.planned(samples(horizon_s));
+        if let Some(train) = train {
+            refined.push(search.descend(search.judge(&train)));
+        }
+        planned
+    });
     best_first(&mut refined);
 
     // The best are judged again where slow models have settled, and must last.
@@ -160,6 +200,7 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
             refused_mean: better().map(|(mean, _)| *mean).reduce(f64::max),
             moduli,
             outside: outside(model, best),
+            planned,
         });
     }
     Err(DesignError::OnlyInstabilities {
@@ -283,6 +324,53 @@ impl Search {
             }
         }
         trains.par_iter().map(|train| self.judge(train)).collect()
+    }
+
+    /// The best command over a horizon of `length` samples from rest, and the
+    /// pulses that planning so again and again runs into.
+    fn planned(&self, length: u32) -> (Planned, Option<Train>) {
+        let block = self
+            .hold
+            .on
+            .max(self.hold.off)
+            .max(length.div_ceil(MOST_BLOCKS));
+        let search = horizon::Search {
+            bench: &self.bench,
+            hold: self.hold,
+            price: self.price,
+            horizon: Horizon {
+                length,
+                block,
+                width: WIDTH,
+            },
+        };
+        let plan = search.plan(&Flow::at_rest(&self.bench));
+        let blown = Flow::at_rest(&self.bench).play(&self.bench, true, length, self.price);
+        let open = plan.command.iter().filter(|on| **on).count();
+        let mut planned = Planned {
+            horizon_s: f64::from(length) * 0.001,
+            block_s: f64::from(block) * 0.001,
+            value: plan.value,
+            steady_value: blown / f64::from(length),
+            duty: open as f64 / plan.command.len() as f64,
+            exact: plan.exact,
+            cycle_s: None,
+            irregular: 0.0,
+        };
+        // A third of a plan is played: its end is cut off from what follows.
+        let played = search.recede(length / 3, RECEDED);
+        let shortest = self.hold.on + self.hold.off;
+        let train = played.and_then(|command| {
+            let (period, irregular) = horizon::cycle(&command, shortest as usize)?;
+            let pulses = horizon::pulses(&command, period)?;
+            planned.cycle_s = Some(period as f64 * 0.001);
+            planned.irregular = irregular;
+            Some(Train {
+                period: period as u32,
+                pulses,
+            })
+        });
+        (planned, train)
     }
 
     /// Coordinate search with shrinking steps, then with one pulse more as long
@@ -544,6 +632,7 @@ mod tests {
             air_price,
             pulses: 1,
             longest_period_s: 3.0,
+            horizon_s: None,
         }
     }
 
@@ -603,6 +692,22 @@ mod tests {
         assert!((known.mean - 0.93).abs() < 0.01, "{known:?}");
         let optimum = maximise(&model, &request(0.4)).unwrap();
         assert!(optimum.mean_detuned > 0.95 * optimum.mean, "{optimum:?}");
+    }
+
+    /// Theory 0.2 (i): this reading grows under steady blowing; whatever the
+    /// horizon promises, what is designed must last four minutes.
+    #[test]
+    fn a_finite_horizon_proposes_and_the_long_run_disposes() {
+        let request = MaximiseRequest {
+            min_on_s: 0.050,
+            min_off_s: 0.050,
+            horizon_s: Some(1.2),
+            ..request(0.0)
+        };
+        let optimum = maximise(&paper_fixed(LagConvention::OneStep), &request).unwrap();
+        let planned = optimum.planned.unwrap();
+        assert!(planned.value >= planned.steady_value - 1e-9, "{planned:?}");
+        assert!((optimum.mean_after_minutes / optimum.mean - 1.0).abs() < 0.05);
     }
 
     #[test]

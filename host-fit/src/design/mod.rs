@@ -1,14 +1,14 @@
 //! Control laws designed from a model and tried in the loop before they reach a valve.
 
 mod bench;
+mod horizon;
 mod maximise;
-
 mod physical;
 mod proof;
 mod steady;
 mod tracking;
 
-pub use maximise::{MaximiseRequest, Optimum, Outside, maximise};
+pub use maximise::{MaximiseRequest, Optimum, Outside, Planned, maximise};
 pub use physical::nearest_plant;
 pub use proof::{Case, CaseGroup, Proof, prove, prove_pulses};
 pub use steady::{Steady, dominant_modulus, steady};

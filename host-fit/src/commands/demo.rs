@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use firmware_sim::closed_loop::{Figures, OpenLoop, Relay, run as close_the_loop};
 use firmware_sim::hidden_set::HiddenSetPlan;
-use firmware_sim::plant::Rig;
+use firmware_sim::plant::{PlantSpec, Rig};
 use host_fit::codegen::generate;
 use host_fit::data::DataSet;
+use host_fit::design::{TrackRequest, run_law, track};
 use host_fit::diagnose::{Options, diagnose};
 use host_fit::indicators::score;
-use host_fit::model::Model;
+use host_fit::model::{Law, Model, Track};
 use host_fit::output::{Staging, write_atomic};
 use host_fit::picture::{ClosedLoop, Column, LoopRun, Report, closed_loop};
 use model_core::control::HoldTimes;
@@ -59,6 +60,13 @@ const FILES: [(&str, &str); 16] = [
     bundled!("hidden-ramp", "random-b.csv"),
 ];
 
+/// What really made the hidden set; only the loop is run on it.
+const ANSWER: &str = include_str!("../../../data/hidden-ramp/answer.toml");
+/// Friction to hold in the loop (y), about 0.8 of steady blowing.
+const TARGET: f64 = 0.7;
+/// Shortest on and off times of the valve, samples.
+const TIMES: HoldTimes = HoldTimes { on: 10, off: 10 };
+
 /// A few lags are enough to show the way, and quick.
 fn request(delay: DelayKind) -> Request {
     Request {
@@ -87,12 +95,26 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         "recordings → model → missing effect → constants → loop",
     );
     let fits = real_input(&data, out, console, &mut report)?;
-    let (model, words) = hidden_effect(&data, out, console, &mut report)?;
+    let (mut model, words) = hidden_effect(&data, out, console, &mut report)?;
+    let law = track(
+        &model,
+        &TrackRequest {
+            target: TARGET,
+            min_on_s: 0.001 * f64::from(TIMES.on),
+            min_off_s: 0.001 * f64::from(TIMES.off),
+            switches_per_s: None,
+            air: None,
+            ramp_per_s: None,
+        },
+    )?
+    .law;
+    model.law = Some(Law::Track(law.clone()));
+    model.save(&out.join("controlled.toml"))?;
     let constants = generate(&model)?;
     write_atomic(&out.join("identified.rs"), |file| {
         file.write_all(constants.as_bytes())
     })?;
-    let figures = the_loop(&model, console, &mut report)?;
+    let figures = the_loop(&model, &law, console, &mut report)?;
     write_atomic(&out.join("report.html"), |file| {
         file.write_all(report.html().as_bytes())
     })?;
@@ -202,27 +224,55 @@ fn hidden_effect(
 struct LoopRow {
     controller: &'static str,
     mean_friction: f64,
+    rms_error: f64,
     switches_per_s: f64,
     air: f64,
 }
 
-/// Steady blowing and a plain relay on the plant that made the hidden set.
-fn the_loop(model: &Model, console: Console, report: &mut Report) -> anyhow::Result<Vec<LoopRow>> {
+/// The plant that made the hidden set, drawn again from what its answer records.
+fn hidden_plant() -> anyhow::Result<PlantSpec> {
+    #[derive(serde::Deserialize)]
+    struct Answer {
+        seed: u64,
+        effect: Vec<Named>,
+    }
+    #[derive(serde::Deserialize)]
+    struct Named {
+        name: String,
+    }
+    let answer: Answer = toml::from_str(ANSWER)?;
+    let names: Vec<&str> = answer.effect.iter().map(|e| e.name.as_str()).collect();
+    Ok(HiddenSetPlan::draw(&names, &[], answer.seed)?.plant)
+}
+
+/// Steady blowing, a plain relay and the designed law on the plant that made the
+/// hidden set. The law runs in single precision as its generated constants do on
+/// the board: the golden run in `identified.rs` is of this code.
+fn the_loop(
+    model: &Model,
+    law: &Track,
+    console: Console,
+    report: &mut Report,
+) -> anyhow::Result<Vec<LoopRow>> {
     const SAMPLES: usize = 10_000;
-    const TARGET: f64 = 0.7;
-    let plan = HiddenSetPlan::draw(&["plenum-droop"], &[], 11)?;
-    let rig = || Rig::new(&plan.plant, None);
-    let times = HoldTimes { on: 10, off: 10 };
+    let plant = hidden_plant()?;
+    let rig = || Rig::new(&plant, None);
     let references = || std::iter::repeat_n(TARGET, SAMPLES);
     let steady = close_the_loop(&mut OpenLoop::steady(), &mut rig()?, references());
-    let relay = close_the_loop(&mut Relay::new(times, 0.02), &mut rig()?, references());
+    let relay = close_the_loop(&mut Relay::new(TIMES, 0.02), &mut rig()?, references());
+    let designed = run_law(model, law, &mut rig()?, references());
     let mut rows = Vec::new();
     let mut series = Vec::new();
-    for (controller, trace) in [("steady blowing", &steady), ("relay", &relay)] {
+    for (controller, trace) in [
+        ("steady blowing", &steady),
+        ("relay", &relay),
+        ("the generated law", &designed),
+    ] {
         let figures = Figures::of(trace, 1000);
         rows.push(LoopRow {
             controller,
             mean_friction: figures.mean,
+            rms_error: figures.rms,
             switches_per_s: figures.switches_per_s,
             air: figures.air,
         });
@@ -246,7 +296,7 @@ fn the_loop(model: &Model, console: Console, report: &mut Report) -> anyhow::Res
     report.section("In the loop at 1 kHz, on the plant");
     report.figure(
         &closed_loop(&ClosedLoop {
-            title: "A relay against steady blowing",
+            title: "Held at 0.7",
             y_label: "friction gain y",
             air_label: "air used",
             sample_period_s: model.sample_period_s,
@@ -262,6 +312,7 @@ fn the_loop(model: &Model, console: Console, report: &mut Report) -> anyhow::Res
             vec![
                 r.controller.to_owned(),
                 format!("{:.3}", r.mean_friction),
+                format!("{:.3}", r.rms_error),
                 format!("{:.1}", r.switches_per_s),
                 format!("{:.2}", r.air),
             ]
@@ -272,6 +323,7 @@ fn the_loop(model: &Model, console: Console, report: &mut Report) -> anyhow::Res
         &[
             Column::Text("controller"),
             Column::Number("mean friction"),
+            Column::Number("rms error"),
             Column::Number("switches/s"),
             Column::Number("air"),
         ],
@@ -282,6 +334,7 @@ fn the_loop(model: &Model, console: Console, report: &mut Report) -> anyhow::Res
         &[
             "in the loop, on the plant",
             "mean friction",
+            "rms error",
             "switches/s",
             "air",
         ],

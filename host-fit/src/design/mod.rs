@@ -10,7 +10,7 @@ mod tracking;
 
 pub use maximise::{MaximiseRequest, Optimum, Outside, Planned, maximise};
 pub use physical::nearest_plant;
-pub use proof::{Case, CaseGroup, Proof, prove, prove_pulses};
+pub use proof::{Case, CaseGroup, Proof, prove, prove_pulses, run_law};
 pub use steady::{Steady, dominant_modulus, steady};
 pub use tracking::{TrackDesign, TrackRequest, track};
 

@@ -186,6 +186,18 @@ pub fn prove_pulses(model: &Model, law: &Maximise, seed: u64) -> Result<Proof, D
     })
 }
 
+/// Runs the tracking `law` of `model` on `flow`, in single precision as on a
+/// board, for as many samples as there are references.
+pub fn run_law(
+    model: &Model,
+    law: &Track,
+    flow: &mut impl Flow,
+    references: impl IntoIterator<Item = f64>,
+) -> Trace {
+    let bench = Bench::<f32>::of(model);
+    run(&mut host_law(&bench, law), flow, references)
+}
+
 type HostLaw<'a> = Law<
     'a,
     f32,

@@ -95,9 +95,12 @@ pub struct Instant<'a, T> {
     pub command: T,
     /// The friction of the flow, s_k: the base model's y.
     pub flow: T,
-    /// The jet strength that arrives at the flow at this sample; 0 while the
-    /// jets are being shaped.
+    /// The jet strength that drives the flow from this sample to the next; 0
+    /// while the jets are being shaped.
     pub arrived: T,
+    /// The jet strength at the flow at this very instant, j(t_k − h). Differs
+    /// from [`arrived`](Self::arrived) where an edge arrives between two samples.
+    pub present: T,
     /// Measured channels, in the order of the model's settings.
     pub channels: &'a [T],
 }

@@ -255,6 +255,7 @@ where
         command: input.command,
         flow,
         arrived: T::ZERO,
+        present: T::ZERO,
         channels: input.channels,
     };
     let command = law.command(&mut state.delay, input.command);
@@ -275,7 +276,9 @@ where
         .capacity()
         .saturating_sub(1 + usize::from(M::Delay::INTERPOLATES));
     let mut beyond = false;
-    let mut arriving = |l: usize| {
+    // What drives the flow until the next sample, and what is there now: the
+    // newest jet of a tap between samples arrives only on the way.
+    let mut both = |l: usize| {
         let tap = law.tap(l, evaluated);
         beyond |= tap.whole > farthest;
         let whole = tap.whole.min(farthest);
@@ -286,15 +289,17 @@ where
                 jets.back(lag)
             }
         };
-        if M::Delay::INTERPOLATES {
-            let newer = read(whole);
-            newer + tap.fraction * (read(whole + 1) - newer)
+        let newer = read(whole);
+        if M::Delay::INTERPOLATES && tap.fraction > T::ZERO {
+            let older = read(whole + 1);
+            (newer + tap.fraction * (older - newer), older)
         } else {
-            read(whole)
+            (newer, newer)
         }
     };
 
-    at.arrived = arriving(0);
+    (at.arrived, at.present) = both(0);
+    let mut arriving = |l: usize| both(l).0;
     let measured = effects.sense(&mut state.effects, flow, &at);
     let recursion = model.recursion();
     let first = at.arrived;

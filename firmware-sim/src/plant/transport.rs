@@ -63,7 +63,7 @@ impl ArrivalClock {
         clock
     }
 
-    /// The delay at mean friction `mean` (s).
+    /// The delay at mean friction `mean` (s); reversed flow is no more separated than none.
     pub(crate) fn delay(&self, mean: f64) -> f64 {
         match self.law {
             DelayLaw::Fixed { delay_s } => delay_s,
@@ -71,7 +71,7 @@ impl ArrivalClock {
                 floor_s,
                 rise_s,
                 rate,
-            } => floor_s + rise_s * (-rate * mean).exp(),
+            } => floor_s + rise_s * (-rate * mean.max(0.0)).exp(),
             // The edges have been re-timed before they reached the valve.
             DelayLaw::EdgeDependent { .. } => 0.0,
         }

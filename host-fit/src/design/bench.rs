@@ -90,6 +90,7 @@ impl<T: Real> Bench<T> {
             let at = Instant {
                 command,
                 arrived: T::ZERO,
+                present: T::ZERO,
                 flow: T::ZERO,
                 channels: &self.channels,
             };

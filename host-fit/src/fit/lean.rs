@@ -90,13 +90,18 @@ pub(super) fn fresh_starts(given: &Model, records: &[&Record]) -> Vec<Model> {
     pairs.collect()
 }
 
-/// What y settles at under u = 1: the 95 % quantile of y while the input is on.
+/// What |y| settles at under u = 1: the 95 % quantile of |y/u| while the input is
+/// at least half as strong as it ever is (under a weak one, y is still on its way
+/// down from a strong one).
 fn steady_level(records: &[&Record]) -> f64 {
-    let mut ratios: Vec<f64> = records
-        .iter()
-        .flat_map(|record| record.y.iter().zip(&record.u))
-        .filter(|(_, u)| u.abs() > 0.1)
-        .map(|(y, u)| y / u)
+    let samples = || {
+        let pairs = records.iter().flat_map(|record| record.y.iter().zip(&record.u));
+        pairs.map(|(y, u)| (y, u.abs()))
+    };
+    let strongest = samples().fold(0.0, |most: f64, (_, u)| most.max(u));
+    let mut ratios: Vec<f64> = samples()
+        .filter(|(_, u)| *u > 0.5 * strongest)
+        .map(|(y, u)| (y / u).abs())
         .collect();
     ratios.sort_by(f64::total_cmp);
     ratios.get(ratios.len() * 95 / 100).copied().unwrap_or(1.0)

@@ -661,6 +661,7 @@ update = "reading"
                     command: *u,
                     flow: 0.0,
                     arrived: 0.0,
+                    present: 0.0,
                     channels: &[9.0],
                 };
                 effect.sense(&mut state, k as f64, &at)

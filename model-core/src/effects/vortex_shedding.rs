@@ -31,8 +31,8 @@ impl<T: Real> Effect<T> for VortexShedding<T> {
     }
     #[inline]
     fn sense(&self, state: &mut Oscillation<T>, signal: T, at: &Instant<'_, T>) -> T {
+        let shown = signal + self.gain * (state.q - at.present);
         let apart = state.q - at.arrived;
-        let shown = signal + self.gain * apart;
         let rate = state.rate;
         state.q = at.arrived + self.from_q[0] * apart + self.from_rate[0] * rate;
         state.rate = self.from_q[1] * apart + self.from_rate[1] * rate;

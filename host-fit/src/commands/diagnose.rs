@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use host_fit::data::DataSet;
 use host_fit::diagnose::{
-    Diagnosis, NotTried, Options, ParameterEstimate, Ranked, Rung, Verdict, diagnose,
+    Diagnosis, HeldOutBy, NotTried, Options, ParameterEstimate, Ranked, Rung, Verdict, diagnose,
 };
 use host_fit::indicators::score;
 use host_fit::model::{Model, Training};
@@ -14,7 +14,7 @@ use host_fit::picture::{
 };
 
 use host_fit::power::{Detectable, detectable};
-use host_fit::residual::{Where, where_it_fails};
+use host_fit::residual::{NoiseSource, Where, where_it_fails};
 
 use super::Console;
 use super::compare::{load, provenance, report_failures};
@@ -40,6 +40,9 @@ pub(crate) struct Args {
     /// File for the model with the missing effects added.
     #[arg(short, long, value_name = "new.toml")]
     output: Option<PathBuf>,
+    /// Write the command (columns t, u) that would tell apart what these records cannot.
+    #[arg(long, value_name = "command.csv")]
+    experiment: Option<PathBuf>,
     /// Most effects that are added one after the other.
     #[arg(long, value_name = "COUNT", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=12))]
     most_effects: u32,
@@ -62,7 +65,21 @@ struct Document<'a> {
     places: &'a [Where],
     /// What of each effect would have been seen, had it been there.
     detectable: &'a [Detectable],
+    /// How the errors were held out.
+    held_out_by: HeldOutBy,
+    /// Where the noise floor comes from, and its size, y rms.
+    noise_source: NoiseSource,
+    noise_estimate: f64,
+    /// The experiment for effects that these records cannot tell apart.
+    experiment: Option<ExperimentDocument<'a>>,
     words: &'a str,
+}
+
+#[derive(serde::Serialize)]
+struct ExperimentDocument<'a> {
+    effects: &'a [String],
+    description: &'a str,
+    separation_sigmas: f64,
 }
 
 /// Runs the command.
@@ -86,6 +103,10 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     if let Some(path) = &args.output {
         finished(&diagnosis.model, &set, args.seed)?.save(path)?;
     }
+    let separation = diagnosis.separation.as_ref();
+    if let (Some(path), Some(separation)) = (&args.experiment, separation) {
+        separation.experiment.write_csv(path)?;
+    }
     if let Some(path) = &args.report {
         let page = page(&model, &set, &diagnosis)?;
         write_atomic(path, |out| out.write_all(page.as_bytes()))?;
@@ -108,7 +129,12 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
             console.say(&format!("  {}: {}", entry.effect, entry.reason))?;
         }
     }
-    for path in args.report.iter().chain(&args.output) {
+    let command = args.experiment.as_ref();
+    if command.is_some() && separation.is_none() {
+        console.say("no experiment was written: there is nothing to tell apart")?;
+    }
+    let command = command.filter(|_| separation.is_some());
+    for path in args.report.iter().chain(&args.output).chain(command) {
         console.say(&format!("written to {}", path.display()))?;
     }
     console.document(&Document {
@@ -119,6 +145,14 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         not_tried: &diagnosis.not_tried,
         places: &failures.by,
         detectable: &detectable,
+        held_out_by: diagnosis.held_out_by,
+        noise_source: diagnosis.noise_source,
+        noise_estimate: diagnosis.noise_estimate,
+        experiment: separation.map(|separation| ExperimentDocument {
+            effects: &separation.effects,
+            description: &separation.experiment.description,
+            separation_sigmas: separation.experiment.separation_sigmas,
+        }),
         words: &format!("{headline}. {meaning}"),
     })
 }
@@ -144,16 +178,46 @@ fn finished(model: &Model, set: &DataSet, seed: u64) -> anyhow::Result<Model> {
 
 /// Headline and meaning of a diagnosis, in words.
 pub(crate) fn verdict_words(diagnosis: &Diagnosis) -> (String, String) {
+    let (headline, mut meaning) = finding_words(diagnosis);
+    match diagnosis.held_out_by {
+        HeldOutBy::Records => {}
+        HeldOutBy::Turns => meaning.push_str(
+            " No record is marked `validate`: each in turn was judged by models that had not seen it.",
+        ),
+        HeldOutBy::End => meaning.push_str(
+            " There is one record only: its end was judged by models that saw its beginning; a second record would say more.",
+        ),
+    }
+    if let Some(separation) = &diagnosis.separation {
+        meaning.push_str(&format!(
+            " To tell {} apart, play this: {} (`--experiment command.csv` writes it).",
+            separation.effects.join(" and "),
+            separation.experiment.words().trim_end_matches('.')
+        ));
+    }
+    (headline, meaning)
+}
+
+fn finding_words(diagnosis: &Diagnosis) -> (String, String) {
     let rmse = |rung: Option<&Rung>| rung.map_or(f64::NAN, |rung| rung.validate_rmse);
     let first = rmse(diagnosis.ladder.first());
     let last = rmse(diagnosis.ladder.last());
-    let floor = match diagnosis.ladder.last().and_then(|rung| rung.noise_rmse) {
-        Some(noise) => format!(
+    let noise = diagnosis.noise_estimate;
+    let floor = match diagnosis.noise_source {
+        NoiseSource::Measured => format!(
             "the noise floor is {} ({:.2} times it is left)",
             short(noise),
             last / noise
         ),
-        None => "the noise floor is not known: the data set has no y_sd".to_owned(),
+        NoiseSource::Repeats => format!(
+            "there is no y_sd; how y differs between repeats of the command puts the noise floor at {} ({:.2} times it is left)",
+            short(noise),
+            last / noise
+        ),
+        NoiseSource::Scatter => format!(
+            "the noise floor is not known: there is no y_sd and no repeat; from sample to sample y scatters by {}",
+            short(noise)
+        ),
     };
     match diagnosis.verdict {
         Verdict::NothingMissing => (

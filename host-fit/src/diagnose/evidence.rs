@@ -1,7 +1,6 @@
 //! What held-out records say about two models: effect size, significance under
 //! correlated errors, and what chance would have given.
 
-use crate::data::Record;
 use crate::fit::dot;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -34,17 +33,29 @@ impl HeldOut {
     }
 }
 
+/// Samples of a block.
+fn block(period_s: f64) -> usize {
+    ((BLOCK_S / period_s).round() as usize).max(20)
+}
+
 /// One-sided p-value of "`better` has the smaller held-out error than `worse`",
 /// a paired t-test on the squared errors of blocks.
 pub(super) fn p_value(worse: &HeldOut, better: &HeldOut, period_s: f64) -> f64 {
-    let block = ((BLOCK_S / period_s).round() as usize).max(20);
+    let block = block(period_s);
     let mut gains = Vec::new();
     for (worse, better) in worse.errors.iter().zip(&better.errors) {
+        let (worse, better) = last_of_both(worse, better);
         for (worse, better) in worse.chunks(block).zip(better.chunks(block)) {
             gains.push(dot(worse, worse) - dot(better, better));
         }
     }
     p_above_zero(&gains)
+}
+
+/// What two series have in common at their ends: warm-ups differ.
+pub(super) fn last_of_both<'a>(a: &'a [f64], b: &'a [f64]) -> (&'a [f64], &'a [f64]) {
+    let n = a.len().min(b.len());
+    (&a[a.len() - n..], &b[b.len() - n..])
 }
 
 /// One-sided p-value of "the mean of these independent numbers is above 0".
@@ -63,22 +74,22 @@ pub(super) fn p_above_zero(numbers: &[f64]) -> f64 {
 }
 
 /// Whether the error is above the noise floor: p-value of "Σ e² exceeds `margin`
-/// times Σ y_sd²" by blocks; `None` without y_sd.
+/// times Σ σ²" by blocks; σ² per sample in the same shape as the errors.
 pub(super) fn p_above_noise(
     held_out: &HeldOut,
-    records: &[&Record],
-    warm_up: usize,
+    variance: &[Vec<f64>],
+    period_s: f64,
     margin: f64,
-) -> Option<f64> {
+) -> f64 {
+    let block = block(period_s);
     let mut excess = Vec::new();
-    for (errors, record) in held_out.errors.iter().zip(records) {
-        let block = ((BLOCK_S / record.sample_period_s).round() as usize).max(20);
-        let sd = record.y_sd.as_ref()?.get(warm_up..)?;
-        for (errors, sd) in errors.chunks(block).zip(sd.chunks(block)) {
-            excess.push(dot(errors, errors) - margin * dot(sd, sd));
+    for (errors, variance) in held_out.errors.iter().zip(variance) {
+        let (errors, variance) = last_of_both(errors, variance);
+        for (errors, variance) in errors.chunks(block).zip(variance.chunks(block)) {
+            excess.push(dot(errors, errors) - margin * variance.iter().sum::<f64>());
         }
     }
-    Some(p_above_zero(&excess))
+    p_above_zero(&excess)
 }
 
 /// Fractions of the error energy that chance would have removed: what the

@@ -1,6 +1,6 @@
 //! A base model refitted, all of it, with one more effect.
 
-use super::lean::{fresh_starts, settle_fixed_delay};
+use super::lean::{fresh_starts, settle_fixed_delay, with_law_of};
 use super::{Fit, FitOptions, fit};
 use crate::data::Record;
 use crate::model::{Delay, Model};
@@ -100,6 +100,12 @@ pub fn fit_with_effect(
     let finished: Vec<Option<Fit>> = tried
         .par_iter()
         .map(|start| {
+            let lost_its_law = spec.parameters.is_empty()
+                && matches!(start.model.delay, Delay::Fixed { .. })
+                && !matches!(base.delay, Delay::Fixed { .. });
+            if lost_its_law {
+                return with_law_of(&start.model, base, records).ok();
+            }
             let fitted = fit(&start.model, records, options).ok()?;
             // A fixed delay has no derivative, and the base's may stand in for the effect.
             settle_fixed_delay(fitted, records, options).ok()

@@ -95,7 +95,9 @@ pub(super) fn fresh_starts(given: &Model, records: &[&Record]) -> Vec<Model> {
 /// down from a strong one).
 fn steady_level(records: &[&Record]) -> f64 {
     let samples = || {
-        let pairs = records.iter().flat_map(|record| record.y.iter().zip(&record.u));
+        let pairs = records
+            .iter()
+            .flat_map(|record| record.y.iter().zip(&record.u));
         pairs.map(|(y, u)| (y, u.abs()))
     };
     let strongest = samples().fold(0.0, |most: f64, (_, u)| most.max(u));
@@ -149,7 +151,11 @@ pub fn settle_fixed_delay(
 }
 
 /// The model with a delay law of the kind `given` has, from several starts.
-fn with_law_of(model: &Model, given: &Model, records: &[&Record]) -> Result<Fit, SimulateError> {
+pub(super) fn with_law_of(
+    model: &Model,
+    given: &Model,
+    records: &[&Record],
+) -> Result<Fit, SimulateError> {
     let delay = model.longest_delay() as f64;
     let period = model.sample_period_s;
     let laws: Vec<Delay> = match &given.delay {
@@ -184,26 +190,21 @@ fn with_law_of(model: &Model, given: &Model, records: &[&Record]) -> Result<Fit,
             })
             .collect(),
     };
-    let tried: Vec<_> = laws
+    let tried: Vec<Option<Fit>> = laws
         .into_par_iter()
         .map(|delay| {
             let model = Model {
                 delay,
                 ..model.clone()
             };
-            fit(&model, records, &FitOptions::default())
+            // A law from which the free run diverges is no place to start.
+            fit(&model, records, &FitOptions::default()).ok()
         })
         .collect();
-    let mut best: Option<Fit> = None;
-    for attempt in tried {
-        let attempt = attempt?;
-        if best
-            .as_ref()
-            .is_none_or(|b| attempt.sum_of_squares < b.sum_of_squares)
-        {
-            best = Some(attempt);
-        }
-    }
+    let best = tried
+        .into_iter()
+        .flatten()
+        .min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
     match best {
         Some(best) => Ok(best),
         None => fit(model, records, &FitOptions::default()),

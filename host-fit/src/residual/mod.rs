@@ -139,6 +139,15 @@ pub fn where_it_fails(model: &Model, records: &[Record]) -> Result<Failures, Sim
     ))
 }
 
+/// σ² of the noise per record and sample, from `y_sd`, from repeats of the
+/// command, or from the scatter of `series` (one per record).
+pub(crate) fn noise_floor(
+    records: &[&Record],
+    series: &[Vec<f64>],
+) -> (Vec<Vec<f64>>, NoiseSource) {
+    noise::floor(records, series, 0)
+}
+
 /// As [`where_it_fails`], for free runs that were made already: y_sim per
 /// record, the samples at the start that are not judged, and the samples from
 /// the command to the flow.

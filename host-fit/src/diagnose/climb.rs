@@ -1,0 +1,202 @@
+//! Effect after effect: forward with pruning, from more than one first step.
+
+use super::bench::{Bench, FLOOR_MARGIN, Judged, LEVEL, Round};
+use super::evidence::p_value;
+use super::rank::{WORTHWHILE, alike, prefers};
+use super::{NotTried, Ranked, Rung};
+use crate::model::Model;
+use crate::simulate::SimulateError;
+use model_core::effect::Spec;
+
+/// Other first steps that are followed where the first one did not end at once.
+const OTHER_STARTS: usize = 2;
+/// What another first step must gain, as a share of the best one's gain.
+const CONTENDER: f64 = 0.5;
+
+/// From a base model, effect by effect.
+pub(super) struct Climb {
+    pub(super) base: Judged,
+    pub(super) current: Judged,
+    pub(super) added: Vec<&'static Spec>,
+    pub(super) ladder: Vec<Rung>,
+    pub(super) ranking: Vec<Ranked>,
+    pub(super) not_tried: Vec<NotTried>,
+    /// Candidates that matched an effect when it was added, by its name.
+    pub(super) matched: Vec<(&'static Spec, Vec<String>)>,
+}
+
+impl Bench<'_> {
+    /// Adds effects as long as one is significant and worth it. Where one is not
+    /// enough, other first steps are tried as well: the best first one can be an
+    /// imitation that only a second one completes.
+    pub(super) fn climb(&self, base: Judged, step: &str, most: usize) -> Climb {
+        let names = base.model().effect_names();
+        let mut start = Climb {
+            ladder: vec![self.rung(&base.held_out, &names, step)],
+            current: base.clone(),
+            base,
+            added: Vec::new(),
+            ranking: Vec::new(),
+            not_tried: Vec::new(),
+            matched: Vec::new(),
+        };
+        if most == 0 || self.at_the_floor(&start.current.held_out) {
+            return start;
+        }
+        let round = self.round(&start.current);
+        if self.interrupted() {
+            return start;
+        }
+        start.ranking = self.rank(&start.base, &start.current, &round);
+        start.not_tried.clone_from(&round.not_tried);
+        let before = start.current.held_out.rmse().powi(2);
+        let gain = |ranked: &Ranked| before - ranked.validate_rmse.powi(2);
+        let contenders: Vec<&Ranked> = start.ranking.iter().filter(|r| r.significant).collect();
+        let Some(leader) = contenders.first() else {
+            return start;
+        };
+        let mut best = self.follow(&start, &round, leader, most);
+        let simple = best.added.len() == 1 && !self.is_above_floor(&best.current);
+        if !simple {
+            let others = contenders
+                .iter()
+                .skip(1)
+                .filter(|other| gain(other) >= CONTENDER * gain(leader));
+            for other in others.take(OTHER_STARTS) {
+                if self.interrupted() {
+                    break;
+                }
+                let path = self.follow(&start, &round, other, most);
+                let ends = |climb: &Climb| climb.added.len();
+                if prefers((&path.current, ends(&path)), (&best.current, ends(&best))) {
+                    best = path;
+                }
+            }
+        }
+        best
+    }
+
+    /// One path: `first`, then always the leader of the next round.
+    fn follow(&self, start: &Climb, round: &Round, first: &Ranked, most: usize) -> Climb {
+        let mut climb = Climb {
+            base: start.base.clone(),
+            current: start.current.clone(),
+            added: Vec::new(),
+            ladder: start.ladder.clone(),
+            ranking: start.ranking.clone(),
+            not_tried: start.not_tried.clone(),
+            matched: Vec::new(),
+        };
+        self.add(&mut climb, round, first);
+        while climb.added.len() < most && !self.at_the_floor(&climb.current.held_out) {
+            let round = self.round(&climb.current);
+            if self.interrupted() {
+                break;
+            }
+            let ranked = self.rank(&climb.base, &climb.current, &round);
+            let Some(leader) = ranked.iter().find(|candidate| candidate.significant) else {
+                break;
+            };
+            self.add(&mut climb, &round, leader);
+        }
+        climb
+    }
+
+    fn add(&self, climb: &mut Climb, round: &Round, winner: &Ranked) {
+        let mut candidates = round.candidates.iter();
+        let Some((spec, judged)) = candidates.find(|(spec, _)| spec.name == winner.effect) else {
+            return;
+        };
+        climb.added.push(spec);
+        climb.matched.push((spec, winner.confounded_with.clone()));
+        climb.current = judged.clone();
+        self.prune(climb);
+        let names: Vec<String> = climb.added.iter().map(|s| s.name.to_owned()).collect();
+        let step = format!("with {}", winner.effect);
+        climb
+            .ladder
+            .push(self.rung(&climb.current.held_out, &names, &step));
+    }
+
+    /// Drops effects that the last one has made needless.
+    fn prune(&self, climb: &mut Climb) {
+        let base = climb.base.model().clone();
+        let mut index = 0;
+        while climb.added.len() > 1 && index + 1 < climb.added.len() {
+            let without = self.without(&climb.current, climb.added[index], &base);
+            let needless = without.filter(|judged| {
+                let loss = judged.held_out.rmse() / climb.current.held_out.rmse() - 1.0;
+                let p = p_value(&judged.held_out, &climb.current.held_out, self.period_s);
+                loss < WORTHWHILE || p > LEVEL
+            });
+            match needless {
+                Some(judged) => {
+                    climb.current = judged;
+                    let dropped = climb.added.remove(index);
+                    climb.matched.retain(|(spec, _)| spec.name != dropped.name);
+                }
+                None => index += 1,
+            }
+        }
+    }
+
+    /// The models in which another effect stands for one that was added and the
+    /// held-out records still cannot tell: by the name of the one, the name of
+    /// the other and its model.
+    pub(super) fn stand_ins(&self, climb: &Climb) -> Vec<(String, String, Model)> {
+        let base = climb.base.model().clone();
+        let mut found = Vec::new();
+        for (spec, others) in &climb.matched {
+            let others = others.iter().filter(|name| {
+                let added = climb.added.iter().any(|spec| spec.name == name.as_str());
+                !added && !self.interrupted()
+            });
+            let others: Vec<&String> = others.collect();
+            if others.is_empty() {
+                continue;
+            }
+            let without = if climb.added.len() == 1 {
+                Some(climb.base.clone())
+            } else {
+                self.without(&climb.current, spec, &base)
+            };
+            let Some(without) = without else { continue };
+            for name in others {
+                let Some(other) = climb.current.model().spec(name) else {
+                    continue;
+                };
+                let Ok(judged) = self.with(&without, other) else {
+                    continue;
+                };
+                if alike(&judged.held_out, &climb.current.held_out, self.period_s) {
+                    found.push((spec.name.to_owned(), name.clone(), judged.model().clone()));
+                }
+            }
+        }
+        found
+    }
+
+    /// Climbs again from the given structure where its free lags hold more than
+    /// the lean model and all its effects: then its dynamics is not lean.
+    pub(super) fn or_from_given(
+        &self,
+        climb: Climb,
+        given: &Model,
+        most: usize,
+    ) -> Result<Climb, SimulateError> {
+        let lean = climb.base.model();
+        let richer = given.a.len() + given.c.len() > lean.a.len() + lean.c.len();
+        let floor = FLOOR_MARGIN * self.noise_rmse();
+        let reached = climb.current.held_out.rmse() <= floor;
+        if !richer || reached || self.interrupted() {
+            return Ok(climb);
+        }
+        let Ok(base) = self.refitted(given) else {
+            return Ok(climb);
+        };
+        if base.held_out.rmse() > (1.0 - WORTHWHILE) * climb.current.held_out.rmse() {
+            return Ok(climb);
+        }
+        Ok(self.climb(base, "refitted in free run", most))
+    }
+}

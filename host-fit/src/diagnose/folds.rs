@@ -1,0 +1,173 @@
+//! What is learned from and what is judged on: records that were held out, each
+//! record in turn, or the end of the only one.
+
+use crate::data::{Record, Use};
+
+/// Most folds of a cross-validation.
+const MOST_FOLDS: usize = 4;
+/// Share of the only record that is learned from.
+const LEARNED_SHARE: f64 = 0.6;
+
+/// One split into learning and judging.
+#[derive(Clone, Debug)]
+pub(super) struct Fold {
+    /// Records to fit.
+    pub(super) learning: Vec<Record>,
+    /// Records to judge, each from a sample on.
+    pub(super) judging: Vec<Judging>,
+}
+
+/// A record that is judged from a sample on; the run before leads up to it.
+#[derive(Clone, Debug)]
+pub(super) struct Judging {
+    pub(super) record: Record,
+    pub(super) from: usize,
+}
+
+/// How the error was held out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HeldOutBy {
+    /// The data set has `validate` records.
+    Records,
+    /// No `validate` record: each record in turn was judged by a model that had
+    /// not seen it.
+    Turns,
+    /// One record only: its end was judged by a model that saw its beginning.
+    End,
+}
+
+/// The folds of a data set; none if there is nothing to learn from.
+pub(super) fn folds(records: &[Record]) -> (Vec<Fold>, HeldOutBy) {
+    let of = |role: Use| -> Vec<&Record> { records.iter().filter(|r| r.role == role).collect() };
+    let (identify, validate) = (of(Use::Identify), of(Use::Validate));
+    let owned = |records: &[&Record]| -> Vec<Record> {
+        records.iter().map(|record| (*record).clone()).collect()
+    };
+    let whole = |record: &Record| Judging {
+        record: record.clone(),
+        from: 0,
+    };
+    if identify.is_empty() {
+        return (Vec::new(), HeldOutBy::Records);
+    }
+    if !validate.is_empty() {
+        let fold = Fold {
+            learning: owned(&identify),
+            judging: validate.iter().map(|r| whole(r)).collect(),
+        };
+        return (vec![fold], HeldOutBy::Records);
+    }
+    if let [only] = identify.as_slice() {
+        let from = (LEARNED_SHARE * only.len() as f64) as usize;
+        let fold = Fold {
+            learning: vec![beginning(only, from)],
+            judging: vec![Judging {
+                record: (*only).clone(),
+                from,
+            }],
+        };
+        return (vec![fold], HeldOutBy::End);
+    }
+    let count = identify.len().min(MOST_FOLDS);
+    let fold = |turn: usize| {
+        let mut fold = Fold {
+            learning: Vec::new(),
+            judging: Vec::new(),
+        };
+        for (i, record) in identify.iter().enumerate() {
+            if i % count == turn {
+                fold.judging.push(whole(record));
+            } else {
+                fold.learning.push((*record).clone());
+            }
+        }
+        fold
+    };
+    ((0..count).map(fold).collect(), HeldOutBy::Turns)
+}
+
+/// The first `samples` of a record.
+fn beginning(record: &Record, samples: usize) -> Record {
+    let cut = |series: &Vec<f64>| series.iter().take(samples).copied().collect();
+    Record {
+        u: cut(&record.u),
+        y: cut(&record.y),
+        y_sd: record.y_sd.as_ref().map(cut),
+        y_min: record.y_min.as_ref().map(cut),
+        y_max: record.y_max.as_ref().map(cut),
+        channels: record
+            .channels
+            .iter()
+            .map(|(name, series)| (name.clone(), cut(series)))
+            .collect(),
+        ..record.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    fn record(name: &str, role: Use) -> Record {
+        Record {
+            name: name.to_owned(),
+            role,
+            sample_period_s: 0.001,
+            t0: 0.0,
+            u: vec![0.0; 10],
+            y: (0..10).map(f64::from).collect(),
+            y_sd: Some(vec![0.1; 10]),
+            y_min: None,
+            y_max: None,
+            channels: BTreeMap::from([("u_inf".to_owned(), vec![9.0; 10])]),
+        }
+    }
+
+    fn names(fold: &Fold) -> (Vec<&str>, Vec<&str>) {
+        (
+            fold.learning.iter().map(|r| r.name.as_str()).collect(),
+            fold.judging
+                .iter()
+                .map(|j| j.record.name.as_str())
+                .collect(),
+        )
+    }
+
+    #[test]
+    fn records_that_were_held_out_are_never_learned_from() {
+        let set = [record("a", Use::Identify), record("b", Use::Validate)];
+        let (folds, by) = folds(&set);
+        assert_eq!(by, HeldOutBy::Records);
+        assert_eq!(folds.len(), 1);
+        assert_eq!(names(&folds[0]), (vec!["a"], vec!["b"]));
+    }
+
+    #[test]
+    fn every_record_is_judged_once_in_turn() {
+        let set: Vec<Record> = ["a", "b", "c", "d", "e"]
+            .map(|n| record(n, Use::Identify))
+            .into();
+        let (folds, by) = folds(&set);
+        assert_eq!(by, HeldOutBy::Turns);
+        let mut judged: Vec<&str> = folds.iter().flat_map(|fold| names(fold).1).collect();
+        judged.sort_unstable();
+        assert_eq!(judged, ["a", "b", "c", "d", "e"]);
+        for fold in &folds {
+            let (learned, judged) = names(fold);
+            assert_eq!(learned.len() + judged.len(), 5);
+            assert!(judged.iter().all(|name| !learned.contains(name)));
+        }
+    }
+
+    #[test]
+    fn the_only_record_is_judged_at_its_end() {
+        let (folds, by) = folds(&[record("a", Use::Identify)]);
+        assert_eq!(by, HeldOutBy::End);
+        assert_eq!(folds[0].learning[0].len(), 6);
+        assert_eq!(folds[0].learning[0].channels["u_inf"].len(), 6);
+        assert_eq!(folds[0].judging[0].from, 6);
+        assert_eq!(folds[0].judging[0].record.len(), 10);
+    }
+}

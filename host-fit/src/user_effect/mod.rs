@@ -550,6 +550,7 @@ starts = [0.1]
                     command: u,
                     flow: y,
                     arrived: u,
+                    present: u,
                     channels: &channel,
                 };
                 let flow = Flow {

@@ -188,8 +188,8 @@ pub fn extend(
     };
     let (fitted, structure) = match (given, lean) {
         (Ok(given), Ok(lean)) => {
-            let as_good = given.sum_of_squares * AS_GOOD * AS_GOOD;
-            if lean.sum_of_squares <= as_good {
+            let as_good = given.mean_square() * AS_GOOD * AS_GOOD;
+            if lean.mean_square() <= as_good {
                 (lean, Structure::Lean)
             } else {
                 (given, Structure::Given)
@@ -206,7 +206,7 @@ pub fn extend(
     Ok(Extended {
         structure,
         parameters: parameters.collect(),
-        identify_rmse: (fitted.sum_of_squares / fitted.samples.max(1) as f64).sqrt(),
+        identify_rmse: fitted.mean_square().sqrt(),
         model: Model {
             // A law was designed for the model as it was.
             law: None,

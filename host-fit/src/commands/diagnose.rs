@@ -14,7 +14,8 @@ use host_fit::picture::{
 };
 
 use host_fit::power::{Detectable, detectable};
-use host_fit::residual::{NoiseSource, Where, where_it_fails};
+use host_fit::residual::{Failures, NoiseSource, Where, where_it_fails};
+use host_fit::simulate::SimulateError;
 
 use super::Console;
 use super::compare::{load, provenance, report_failures};
@@ -93,9 +94,17 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     };
     let bar = console.spinner("trying every effect");
     let diagnosis = diagnose(&model, &records, &options, watch())?;
-    let failures = where_it_fails(&diagnosis.model, &records)?;
+    let (failures, unstable) = match where_it_fails(&diagnosis.model, &records) {
+        Ok(failures) => (Some(failures), None),
+        Err(error @ SimulateError::Diverged { .. }) => (None, Some(error.to_string())),
+        Err(error) => return Err(error.into()),
+    };
     let detectable = match diagnosis.verdict {
-        Verdict::NothingMissing => detectable(&diagnosis.model, &records)?,
+        // A model on the verge of instability has no amplitudes to tell.
+        Verdict::NothingMissing => match detectable(&diagnosis.model, &records) {
+            Err(SimulateError::Diverged { .. }) => Vec::new(),
+            other => other?,
+        },
         Verdict::EffectMissing | Verdict::Unexplained => Vec::new(),
     };
     bar.finish_and_clear();
@@ -108,12 +117,13 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         separation.experiment.write_csv(path)?;
     }
     if let Some(path) = &args.report {
-        let page = page(&model, &set, &diagnosis)?;
+        let page = page(&model, &set, &diagnosis, failures.as_ref())?;
         write_atomic(path, |out| out.write_all(page.as_bytes()))?;
     }
     console.say(&headline)?;
     console.say(&meaning)?;
-    for sentence in failures.describe() {
+    let described = failures.as_ref().map(Failures::describe);
+    for sentence in described.into_iter().flatten().chain(unstable) {
         console.say(&sentence)?;
     }
     for effect in &detectable {
@@ -143,7 +153,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         ladder: &diagnosis.ladder,
         ranking: &diagnosis.ranking,
         not_tried: &diagnosis.not_tried,
-        places: &failures.by,
+        places: failures.as_ref().map_or(&[], |failures| &failures.by),
         detectable: &detectable,
         held_out_by: diagnosis.held_out_by,
         noise_source: diagnosis.noise_source,
@@ -476,24 +486,32 @@ pub(crate) fn report_diagnosis(report: &mut Report, set: &DataSet, diagnosis: &D
     }
 }
 
-fn page(given: &Model, set: &DataSet, diagnosis: &Diagnosis) -> anyhow::Result<String> {
+fn page(
+    given: &Model,
+    set: &DataSet,
+    diagnosis: &Diagnosis,
+    failures: Option<&Failures>,
+) -> anyhow::Result<String> {
     let title = set.title.as_deref().unwrap_or("data set");
     let mut report = Report::new("Diagnosis", title);
     report_diagnosis(&mut report, set, diagnosis);
     let records = given.targets(&set.records);
-    let (scores, runs) = score(&diagnosis.model, &records)?;
-    report_failures(&mut report, &where_it_fails(&diagnosis.model, &records)?);
-    report.section("The model with what was missing");
-    report.paragraph(&describe(&diagnosis.model));
-    report_table(&mut report, &scores);
-    let before = score(given, &records).ok().map(|(_, runs)| runs);
-    let mut all: Vec<(&str, &[Vec<f64>])> = Vec::new();
-    if let Some(before) = &before {
-        all.push(("as given", before));
-    }
-    all.push(("with what was missing", &runs));
-    for (_, svg) in overlays(&records, &all) {
-        report.figure(&svg, "");
+    // A model whose free run diverges has neither scores nor pictures.
+    if let Some(failures) = failures {
+        let (scores, runs) = score(&diagnosis.model, &records)?;
+        report_failures(&mut report, failures);
+        report.section("The model with what was missing");
+        report.paragraph(&describe(&diagnosis.model));
+        report_table(&mut report, &scores);
+        let before = score(given, &records).ok().map(|(_, runs)| runs);
+        let mut all: Vec<(&str, &[Vec<f64>])> = Vec::new();
+        if let Some(before) = &before {
+            all.push(("as given", before));
+        }
+        all.push(("with what was missing", &runs));
+        for (_, svg) in overlays(&records, &all) {
+            report.figure(&svg, "");
+        }
     }
     provenance(&mut report, set);
     Ok(report.html())

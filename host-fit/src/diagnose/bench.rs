@@ -19,9 +19,12 @@ const AT_THE_FLOOR: f64 = 1.005;
 pub(super) const FLOOR_MARGIN: f64 = 1.10;
 /// Level of the tests.
 pub(super) const LEVEL: f64 = 0.05;
-/// Where slow noise is not known, a misfit counts only if it depends on
-/// something: cross-validated share that one coordinate explains.
+/// Where slow noise is not known, a misfit counts if it depends on something
+/// (cross-validated share that one coordinate explains) …
 const DEPENDS: f64 = 0.1;
+/// … or if it is more than noise can be in a recording worth fitting: the share
+/// of the variance of y.
+const TOO_MUCH: f64 = 0.06;
 /// A run that diverges counts as this many times the largest |y| off.
 const DIVERGED: f64 = 10.0;
 /// Decoys per candidate.
@@ -181,8 +184,8 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// The same start refitted in every fold.
-    fn fit_each(&self, model: &Model) -> Result<Judged, SimulateError> {
+    /// A model refitted in free run in every fold, its structure and delays kept.
+    pub(super) fn refitted(&self, model: &Model) -> Result<Judged, SimulateError> {
         let fits = (0..self.folds.len())
             .map(|fold| fit(model, &self.learning(fold), &self.options))
             .collect::<Result<_, _>>()?;
@@ -196,12 +199,7 @@ impl<'a> Bench<'a> {
         let kept = std::mem::take(&mut bare.effects);
         let mut model = lean_base(&bare, &self.learning(0))?.model;
         model.effects = kept;
-        self.fit_each(&model)
-    }
-
-    /// A model refitted in free run, its structure and delays kept.
-    pub(super) fn refitted(&self, model: &Model) -> Result<Judged, SimulateError> {
-        self.fit_each(model)
+        self.refitted(&model)
     }
 
     /// The model that is handed over: fitted to everything that may be learned from.
@@ -214,7 +212,8 @@ impl<'a> Bench<'a> {
         fit(&own.model, &all, &self.options).unwrap_or(own)
     }
 
-    pub(super) fn rung(&self, held_out: &HeldOut, effects: &[String], step: &str) -> Rung {
+    /// Σ e² over Σ (y − ȳ)² on what is judged.
+    fn unexplained_share(&self, held_out: &HeldOut) -> f64 {
         let judging = self.folds.iter().flat_map(|fold| &fold.judging);
         let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
         for (judging, errors) in judging.zip(&held_out.errors) {
@@ -226,14 +225,18 @@ impl<'a> Bench<'a> {
             }
         }
         let spread = squares - sum * sum / f64::max(n, 1.0);
+        if spread > 0.0 {
+            held_out.sum_of_squares / spread
+        } else {
+            1.0
+        }
+    }
+
+    pub(super) fn rung(&self, held_out: &HeldOut, effects: &[String], step: &str) -> Rung {
         Rung {
             effects: effects.to_vec(),
             validate_rmse: held_out.rmse(),
-            validate_fit_percent: if spread > 0.0 {
-                100.0 * (1.0 - (held_out.sum_of_squares / spread).sqrt())
-            } else {
-                0.0
-            },
+            validate_fit_percent: 100.0 * (1.0 - self.unexplained_share(held_out).sqrt()),
             noise_rmse: (self.noise_source == NoiseSource::Measured).then(|| self.noise_rmse()),
             step: step.to_owned(),
         }
@@ -255,9 +258,14 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Refits `current` with each candidate and judges it on the held-out records.
-    pub(super) fn round(&self, current: &Judged) -> Round {
-        let candidates: Vec<&'static Spec> = current.model().candidates().collect();
+    /// Refits `current` with each candidate that is `wanted` and judges it on the
+    /// held-out records.
+    pub(super) fn round(&self, current: &Judged, wanted: &dyn Fn(&str) -> bool) -> Round {
+        let candidates: Vec<&'static Spec> = current
+            .model()
+            .candidates()
+            .filter(|spec| wanted(spec.name))
+            .collect();
         let tried: Vec<(&'static Spec, Result<Judged, String>)> = candidates
             .into_par_iter()
             .map(|spec| {
@@ -335,7 +343,10 @@ impl<'a> Bench<'a> {
     pub(super) fn is_above_floor(&self, judged: &Judged) -> bool {
         let margin = FLOOR_MARGIN * FLOOR_MARGIN;
         let p = p_above_noise(&judged.held_out, &self.floor, self.period_s, margin);
-        p < LEVEL && (self.noise_source != NoiseSource::Scatter || self.depends(judged))
+        p < LEVEL
+            && (self.noise_source != NoiseSource::Scatter
+                || self.unexplained_share(&judged.held_out) > TOO_MUCH
+                || self.depends(judged))
     }
 
     /// Whether the held-out error depends on anything but its own frequency.

@@ -43,7 +43,7 @@ impl Bench<'_> {
         if most == 0 || self.at_the_floor(&start.current.held_out) {
             return start;
         }
-        let round = self.round(&start.current);
+        let round = self.round(&start.current, &|_| true);
         if self.interrupted() {
             return start;
         }
@@ -55,7 +55,8 @@ impl Bench<'_> {
         let Some(leader) = contenders.first() else {
             return start;
         };
-        let mut best = self.follow(&start, &round, leader, most);
+        let mut seen: Vec<String> = contenders.iter().map(|r| r.effect.clone()).collect();
+        let mut best = self.follow(&start, &round, leader, most, &mut seen, false);
         let simple = best.added.len() == 1 && !self.is_above_floor(&best.current);
         if !simple {
             let others = contenders
@@ -66,7 +67,7 @@ impl Bench<'_> {
                 if self.interrupted() {
                     break;
                 }
-                let path = self.follow(&start, &round, other, most);
+                let path = self.follow(&start, &round, other, most, &mut seen, true);
                 let ends = |climb: &Climb| climb.added.len();
                 if prefers((&path.current, ends(&path)), (&best.current, ends(&best))) {
                     best = path;
@@ -76,8 +77,17 @@ impl Bench<'_> {
         best
     }
 
-    /// One path: `first`, then always the leader of the next round.
-    fn follow(&self, start: &Climb, round: &Round, first: &Ranked, most: usize) -> Climb {
+    /// One path: `first`, then always the leader of the next round. `seen` are the
+    /// effects that counted in any round so far; `only_seen` tries no others.
+    fn follow(
+        &self,
+        start: &Climb,
+        round: &Round,
+        first: &Ranked,
+        most: usize,
+        seen: &mut Vec<String>,
+        only_seen: bool,
+    ) -> Climb {
         let mut climb = Climb {
             base: start.base.clone(),
             current: start.current.clone(),
@@ -89,11 +99,18 @@ impl Bench<'_> {
         };
         self.add(&mut climb, round, first);
         while climb.added.len() < most && !self.at_the_floor(&climb.current.held_out) {
-            let round = self.round(&climb.current);
+            let round = self.round(&climb.current, &|name| {
+                !only_seen || seen.iter().any(|seen| seen == name)
+            });
             if self.interrupted() {
                 break;
             }
             let ranked = self.rank(&climb.base, &climb.current, &round);
+            for counted in ranked.iter().filter(|r| r.significant) {
+                if !seen.contains(&counted.effect) {
+                    seen.push(counted.effect.clone());
+                }
+            }
             let Some(leader) = ranked.iter().find(|candidate| candidate.significant) else {
                 break;
             };
@@ -174,6 +191,30 @@ impl Bench<'_> {
             }
         }
         found
+    }
+
+    /// A given model refitted; with the product u·y where it has none and gains by
+    /// it: that term is in the base class and never counts as missing.
+    pub(super) fn with_the_product(
+        &self,
+        given: &Model,
+    ) -> Result<(Judged, &'static str), SimulateError> {
+        let plain = self.refitted(given)?;
+        if given.product_lags.is_empty() {
+            let bilinear = Model {
+                product_lags: vec![1],
+                c: vec![0.0; given.b.len()],
+                ..plain.model().clone()
+            };
+            if let Ok(bilinear) = self.refitted(&bilinear) {
+                let gain = 1.0 - bilinear.held_out.rmse() / plain.held_out.rmse();
+                let p = p_value(&plain.held_out, &bilinear.held_out, self.period_s);
+                if gain > WORTHWHILE && p < LEVEL {
+                    return Ok((bilinear, "refitted with the product of input and output"));
+                }
+            }
+        }
+        Ok((plain, "refitted in free run"))
     }
 
     /// Climbs again from the given structure where its free lags hold more than

@@ -28,8 +28,12 @@ impl HeldOut {
         }
     }
 
+    /// Infinite if nothing was judged.
     pub(super) fn rmse(&self) -> f64 {
-        (self.sum_of_squares / (self.samples.max(1)) as f64).sqrt()
+        if self.samples == 0 {
+            return f64::INFINITY;
+        }
+        (self.sum_of_squares / self.samples as f64).sqrt()
     }
 }
 

@@ -228,7 +228,8 @@ pub fn diagnose(
     let mut climb = if given.start == Start::Measured {
         // Records that begin in mid-run come from rigs that are no blown ramp:
         // their dynamics is the user's choice of lags.
-        bench.climb(bench.refitted(given)?, "refitted in free run", most)
+        let (base, step) = bench.with_the_product(given)?;
+        bench.climb(base, step, most)
     } else {
         let lean = bench.lean(given)?;
         let climb = bench.climb(lean, "refitted with the fewest lags", most);

@@ -10,6 +10,8 @@ pub(super) const WORTHWHILE: f64 = 0.015;
 /// … and the excess error of the base by this one: what a model's own coarseness
 /// leaves (its sampling, the shape of a threshold) is no effect.
 const MINOR: f64 = 0.01;
+/// A simpler candidate may fall short of the best one's gain by this share.
+const NEARLY_ALL: f64 = 0.1;
 /// Held-out errors that differ by less than this are the same for any purpose.
 const ALIKE: f64 = 0.005;
 
@@ -39,8 +41,8 @@ impl Bench<'_> {
     pub(super) fn rank(&self, base: &Judged, current: &Judged, round: &Round) -> Vec<Ranked> {
         let candidates = &round.candidates;
         let mut order: Vec<usize> = (0..candidates.len()).collect();
-        let sum = |i: &usize| candidates[*i].1.held_out.sum_of_squares;
-        order.sort_by(|a, b| sum(a).total_cmp(&sum(b)));
+        let error = |i: &usize| candidates[*i].1.held_out.rmse();
+        order.sort_by(|a, b| error(a).total_cmp(&error(b)));
         let p: Vec<f64> = candidates
             .iter()
             .map(|(_, judged)| p_value(&current.held_out, &judged.held_out, self.period_s))
@@ -49,8 +51,9 @@ impl Bench<'_> {
         if let Some(best) = order.first().copied() {
             let matches = |i: &usize| {
                 let (a, b) = (&candidates[*i].1.held_out, &candidates[best].1.held_out);
-                let gain = current.held_out.sum_of_squares - b.sum_of_squares;
-                alike(a, b, self.period_s) && a.sum_of_squares - b.sum_of_squares < 0.05 * gain
+                let square = |held_out: &HeldOut| held_out.rmse().powi(2);
+                let gain = square(&current.held_out) - square(b);
+                alike(a, b, self.period_s) && square(a) - square(b) < NEARLY_ALL * gain
             };
             let leading = order.iter().take_while(|i| matches(i)).count();
             // A stable sort: the smaller error first among equals.

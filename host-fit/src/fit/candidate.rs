@@ -95,7 +95,7 @@ pub fn fit_with_effect(
         .map(|model| fit(model, records, &brief).ok())
         .collect();
     let mut tried: Vec<Fit> = tried.into_iter().flatten().collect();
-    tried.sort_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
+    tried.sort_by(|a, b| a.mean_square().total_cmp(&b.mean_square()));
     tried.truncate(FOLLOWED);
     let finished: Vec<Option<Fit>> = tried
         .par_iter()
@@ -114,7 +114,7 @@ pub fn fit_with_effect(
     finished
         .into_iter()
         .flatten()
-        .min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares))
+        .min_by(|a, b| a.mean_square().total_cmp(&b.mean_square()))
         .ok_or_else(|| CandidateError::Unstable {
             effect: spec.name.to_owned(),
         })

@@ -36,7 +36,7 @@ pub fn lean_base(given: &Model, records: &[&Record]) -> Result<Fit, SimulateErro
             Ok(fit)
                 if best
                     .as_ref()
-                    .is_none_or(|b| fit.sum_of_squares < b.sum_of_squares) =>
+                    .is_none_or(|b| fit.mean_square() < b.mean_square()) =>
             {
                 best = Some(fit);
             }
@@ -122,6 +122,9 @@ pub fn settle_fixed_delay(
         iterations: 3,
         ..*options
     };
+    // A record that begins in mid-run is judged after the longest delay only.
+    let shortest = records.iter().map(|r| r.len()).min().unwrap_or(0);
+    let most = i32::try_from(shortest / 4).unwrap_or(i32::MAX);
     for step in [8_i32, 4, 2, 1] {
         loop {
             let Delay::Fixed { delays } = &best.model.delay else {
@@ -129,7 +132,8 @@ pub fn settle_fixed_delay(
             };
             let moved = |by: i32| {
                 let mut model = best.model.clone();
-                let shift = |h: &u16| (i32::from(*h) + by).clamp(0, i32::from(u16::MAX)) as u16;
+                let shift =
+                    |h: &u16| (i32::from(*h) + by).clamp(0, most.min(i32::from(u16::MAX))) as u16;
                 model.delay = Delay::Fixed {
                     delays: delays.iter().map(shift).collect(),
                 };
@@ -139,8 +143,8 @@ pub fn settle_fixed_delay(
             let nearer = [up, down]
                 .into_iter()
                 .flatten()
-                .filter(|fit| fit.sum_of_squares < best.sum_of_squares * (1.0 - 1e-6))
-                .min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
+                .filter(|fit| fit.mean_square() < best.mean_square() * (1.0 - 1e-6))
+                .min_by(|a, b| a.mean_square().total_cmp(&b.mean_square()));
             match nearer {
                 Some(fit) => best = fit,
                 None => break,
@@ -204,7 +208,7 @@ pub(super) fn with_law_of(
     let best = tried
         .into_iter()
         .flatten()
-        .min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares));
+        .min_by(|a, b| a.mean_square().total_cmp(&b.mean_square()));
     match best {
         Some(best) => Ok(best),
         None => fit(model, records, &FitOptions::default()),

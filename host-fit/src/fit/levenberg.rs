@@ -59,6 +59,16 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// Mean square error over the samples that were judged: comparable between
+    /// models that need warm-ups of different lengths. Infinite if none was.
+    #[must_use]
+    pub fn mean_square(&self) -> f64 {
+        if self.samples == 0 {
+            return f64::INFINITY;
+        }
+        self.sum_of_squares / self.samples as f64
+    }
+
     /// Standard error of the coordinate with index `index`, if it is known.
     #[must_use]
     pub fn standard_error(&self, index: usize) -> Option<f64> {

@@ -104,7 +104,7 @@ pub(crate) struct Signals {
     /// Its smallest and largest value.
     base_range: Vec<(f64, f64)>,
     /// Where the input changes.
-    edges: Vec<Vec<usize>>,
+    pub(crate) edges: Vec<Vec<usize>>,
     /// Whether every input is 0 or 1.
     binary: bool,
     /// Rows at the start of each record that are not fitted.

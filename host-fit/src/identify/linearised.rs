@@ -10,6 +10,7 @@
 
 use super::arrival::Signals;
 use super::free_run::Coefficients;
+use super::free_runner::Trajectory;
 use super::lagged_products::ONE;
 use super::layout::{Column, Delays, Layout};
 use super::regression::Regression;
@@ -20,19 +21,10 @@ use crate::linalg;
 const STRIDE: usize = 41;
 
 /// Sensitivities run side by side.
-const LANES: usize = 8;
+const LANES: usize = 16;
 
 /// Sampled rows multiplied at a time.
 const BLOCK_ROWS: usize = 512;
-
-/// A simulated candidate: output and arriving commands of each record.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Trajectory {
-    /// y_sim, as many values as samples.
-    pub(crate) simulated: Vec<Vec<f64>>,
-    /// d_k of each input.
-    pub(crate) arrived: Vec<Vec<Vec<f64>>>,
-}
 
 /// One record of the run that is linearised.
 struct Run<'a> {
@@ -41,6 +33,83 @@ struct Run<'a> {
     state: &'a [(usize, f32)],
     product: &'a [Vec<(usize, f32)>],
     rows: &'a [usize],
+}
+
+/// Runs the incumbent's recursion on `LANES` regressors from lag `first` of a
+/// block on and samples the result. Block 0 are the outputs alone, block l the
+/// outputs times the command that arrives through input l.
+struct Filter<'a> {
+    run: &'a Run<'a>,
+    lags: usize,
+    first_element: usize,
+    block: usize,
+    first: usize,
+    /// What the recursion puts out; zeros for as long as the longest lag go before.
+    outputs: &'a mut [[f32; LANES]],
+    sampled: &'a mut [f64],
+}
+
+impl pulp::NullaryFnOnce for Filter<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Run {
+            padded,
+            arrived,
+            state,
+            product,
+            rows,
+        } = self.run;
+        let reach = self.lags + 1;
+        let samples = self.outputs.len() - reach;
+        let gate = self.block.checked_sub(1).and_then(|l| arrived.get(l));
+        let count = rows.len();
+        let mut rows = rows.iter().enumerate().peekable();
+        for k in 0..samples {
+            // Lane 0 is the constant 1 if it starts the block, then lags ascend.
+            if let Some((at, _)) = rows.next_if(|(_, row)| **row == k) {
+                let place = self.block * (1 + self.lags) + self.first;
+                let lanes = self.outputs[reach + k - 1];
+                for (i, value) in lanes.iter().enumerate().take(1 + self.lags - self.first) {
+                    self.sampled[(place + i) * count + at] = f64::from(*value);
+                }
+            }
+            let mut next = [0.0f32; LANES];
+            let gate = gate.map_or(1.0, |gate| gate[k]);
+            if gate != 0.0 {
+                // The newest output that a lane reads is the last of these.
+                let newest = LANES + reach + k + 4 - self.first - self.first_element;
+                let past = &padded[newest - LANES..newest];
+                for (n, y) in next.iter_mut().zip(past.iter().rev()) {
+                    *n = gate * y;
+                }
+                if self.first == 0 {
+                    next[0] = gate;
+                }
+            }
+            let (past, rest) = self.outputs.split_at_mut(reach + k);
+            for &(m, a) in state.iter() {
+                add_lanes(&mut next, &past[reach + k - 1 - m], a);
+            }
+            for (terms, d) in product.iter().zip(arrived.iter()) {
+                let d = d[k];
+                if d != 0.0 {
+                    for &(m, c) in terms {
+                        add_lanes(&mut next, &past[reach + k - 1 - m], c * d);
+                    }
+                }
+            }
+            rest[0] = next;
+        }
+    }
+}
+
+#[inline(always)]
+fn add_lanes(sums: &mut [f32; LANES], past: &[f32; LANES], weight: f32) {
+    for lane in 0..LANES {
+        sums[lane] += weight * past[lane];
+    }
 }
 
 /// The free run linearised at an incumbent.
@@ -118,9 +187,18 @@ impl Linearised {
                 product: &product,
                 rows: &rows,
             };
+            let mut outputs = vec![[0.0f32; LANES]; lags + 1 + measured.len()];
             for block in 0..=inputs {
                 for first in (0..=lags).step_by(LANES) {
-                    linearised.filter(&run, block, first, &mut sampled);
+                    pulp::Arch::new().dispatch(Filter {
+                        run: &run,
+                        lags,
+                        first_element: linearised.first_element,
+                        block,
+                        first,
+                        outputs: &mut outputs,
+                        sampled: &mut sampled,
+                    });
                 }
             }
             let error = &mut sampled[(size - 1) * rows.len()..];
@@ -140,65 +218,6 @@ impl Linearised {
             column.element + 1 - self.first_element
         };
         column.input * (1 + self.lags) + within
-    }
-
-    /// Runs the incumbent's recursion on `LANES` regressors from lag `first` of
-    /// a block on and samples the result. Block 0 are the outputs alone, block
-    /// l the outputs times the command that arrives through input l.
-    fn filter(&self, run: &Run<'_>, block: usize, first: usize, sampled: &mut [f64]) {
-        let Run {
-            padded,
-            arrived,
-            state,
-            product,
-            rows,
-        } = run;
-        let reach = self.lags + 1;
-        let samples = padded.len() - reach - LANES - 1;
-        let mut s = vec![[0.0f32; LANES]; reach + 1];
-        s.reserve(samples);
-        let ones = vec![1.0f32; samples];
-        let gate = block
-            .checked_sub(1)
-            .and_then(|l| arrived.get(l))
-            .unwrap_or(&ones);
-        // Lane 0 is the constant 1 if it starts the block, then lags ascend.
-        let mut rows = rows.iter().enumerate().peekable();
-        let count = rows.len();
-        for k in 0..samples {
-            if let Some((at, _)) = rows.next_if(|(_, row)| **row == k) {
-                for (i, value) in s[reach + k].iter().enumerate().take(1 + self.lags - first) {
-                    sampled[(block * (1 + self.lags) + first + i) * count + at] = f64::from(*value);
-                }
-            }
-            let mut next = [0.0f32; LANES];
-            let gate = gate[k];
-            if gate != 0.0 {
-                // The newest output that a lane reads is the last of these.
-                let newest = LANES + reach + k + 4 - first - self.first_element;
-                let past = &padded[newest - LANES..newest];
-                next.iter_mut()
-                    .zip(past.iter().rev())
-                    .for_each(|(n, y)| *n = gate * y);
-                if first == 0 {
-                    next[0] = gate;
-                }
-            }
-            for &(m, a) in state.iter() {
-                let past = &s[reach + k - m];
-                next.iter_mut().zip(past).for_each(|(n, p)| *n += a * p);
-            }
-            for (terms, d) in product.iter().zip(arrived.iter()) {
-                let d = d[k];
-                if d != 0.0 {
-                    for &(m, c) in terms {
-                        let (past, gain) = (&s[reach + k - m], c * d);
-                        next.iter_mut().zip(past).for_each(|(n, p)| *n += gain * p);
-                    }
-                }
-            }
-            s.push(next);
-        }
     }
 
     fn add_products(&mut self, sampled: &[f64], rows: usize) {

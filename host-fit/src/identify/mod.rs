@@ -10,6 +10,7 @@ mod cholesky;
 mod exchange;
 mod free_run;
 mod free_run_steps;
+mod free_runner;
 mod lagged_products;
 mod layout;
 mod linearised;

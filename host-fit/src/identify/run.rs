@@ -10,7 +10,8 @@ use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
 use super::arrival::factor;
-use super::free_run::{Coefficients, DIVERGED_VALUE, FreeRun, FreeRunner};
+use super::free_run::{Coefficients, DIVERGED_VALUE, FreeRun};
+use super::free_runner::FreeRunner;
 use super::free_run_steps::{FreeKickStep, InputStep, PredictedStep};
 use super::layout::Delays;
 use super::one_step::{ExchangeStep, KickStep, OneStep, PairStep};

@@ -3,9 +3,10 @@
 //! The recursion is that of `model-core`, taken in blocks of samples. A lag
 //! longer than the block reads outputs that are known before it begins, so its
 //! terms are added to all samples of the block at once; only the short lags go
-//! sample by sample. So do the few samples around each edge of the command where
-//! the delay decides whether it has arrived. Terms are added in another order
-//! than in `model-core`: the last bits differ, which a search does not see.
+//! sample by sample. Where the delay decides whether an edge has arrived, a block
+//! is run with the delay of its first sample and, should the delay have moved
+//! within it, again sample by sample. Terms are added in another order than in
+//! `model-core`: the last bits differ, which a search does not see.
 
 use model_core::delay::DelayLaw as _;
 
@@ -62,7 +63,7 @@ impl Terms {
     }
 
     /// Adds the long lags' terms to `sums`, the first of which follows place `at`.
-    #[inline]
+    #[inline(always)]
     fn add_far(&self, past: &[f64], at: usize, sums: &mut [f64]) {
         for &(behind, weight) in &self.far {
             let from = &past[at - behind..][..sums.len()];
@@ -71,7 +72,7 @@ impl Terms {
     }
 
     /// The short lags' terms of the value that follows place `at`.
-    #[inline]
+    #[inline(always)]
     fn near(&self, outputs: &[f64], at: usize) -> f64 {
         self.near
             .iter()
@@ -107,6 +108,7 @@ impl Recursion {
 
     /// Computes the `count` values that follow place `at`, at most [`BLOCK`].
     /// `arrived` are the commands of each input at these steps.
+    #[inline(always)]
     fn run(&self, outputs: &mut [f64], at: usize, count: usize, arrived: &[[f64; BLOCK]]) {
         let (past, next) = outputs.split_at_mut(at + 1);
         let next = &mut next[..count];
@@ -156,6 +158,15 @@ impl Arrival {
             longest: ends[0].max(ends[1]),
         }
     }
+
+    /// The delay in samples where it follows the value given.
+    #[inline(always)]
+    fn delay(&self, follows: f64) -> usize {
+        match &self.law {
+            Some(law) => law.tap(0, law.evaluate(follows)).whole,
+            None => self.shortest,
+        }
+    }
 }
 
 /// Where the delay decides whether an edge has arrived, in ascending order.
@@ -192,7 +203,7 @@ impl FreeRunner {
         delays: &Delays,
         coefficients: &Coefficients,
         give_up_at: f64,
-        mut keep: Option<&mut Trajectory>,
+        keep: Option<&mut Trajectory>,
     ) -> Outcome {
         let recursion = Recursion::new(&self.structure, delays, coefficients);
         let law = match &self.structure.delay {
@@ -200,104 +211,167 @@ impl FreeRunner {
             InputDelay::StateDependent { law, .. } => Some(law),
         };
         let arrivals: Vec<Arrival> = delays.ticks.iter().map(|t| Arrival::new(*t, law)).collect();
-        let averaged_terms = WINDOW as usize - 1;
+        pulp::Arch::new().dispatch(Run {
+            runner: self,
+            signals,
+            recursion: &recursion,
+            arrivals: &arrivals,
+            give_up_at,
+            keep,
+        })
+    }
+}
+
+/// One run over all records, compiled for the vector unit that the machine has.
+struct Run<'a> {
+    runner: &'a FreeRunner,
+    signals: &'a Signals,
+    recursion: &'a Recursion,
+    arrivals: &'a [Arrival],
+    give_up_at: f64,
+    keep: Option<&'a mut Trajectory>,
+}
+
+/// Terms of ỹ's sum, eq. (1).
+const AVERAGED: usize = WINDOW as usize - 1;
+
+impl Run<'_> {
+    /// What the delay follows at the step that place `at` holds, given ỹ's sum.
+    #[inline(always)]
+    fn follows(&self, outputs: &[f64], at: usize, sum: f64) -> f64 {
+        let follows = if self.runner.structure.averaged {
+            outputs[at]
+        } else {
+            sum / f64::from(WINDOW)
+        };
+        follows.max(0.0)
+    }
+
+    /// The delays of all inputs there.
+    #[inline(always)]
+    fn delays(&self, follows: f64, delays: &mut [usize]) {
+        for (delay, arrival) in delays.iter_mut().zip(self.arrivals) {
+            *delay = arrival.delay(follows);
+        }
+    }
+}
+
+impl pulp::NullaryFnOnce for Run<'_> {
+    type Output = Outcome;
+
+    #[inline(always)]
+    fn call(mut self) -> Outcome {
+        let FreeRunner {
+            structure,
+            bound,
+            samples: all_samples,
+        } = self.runner;
+        let inputs = self.arrivals.len();
         // Zeros before a record, for the longest lag and the average.
-        let padding = usize::from(self.structure.longest_lag).max(averaged_terms);
+        let padding = usize::from(structure.longest_lag).max(AVERAGED);
         let mut sum = 0.0;
         let mut done = 0;
         let mut outputs: Vec<f64> = Vec::new();
-        let mut arrived = vec![[0.0; BLOCK]; arrivals.len()];
-        for (record, measured) in signals.y.iter().enumerate() {
-            let u = &signals.u[record];
+        let mut arrived = vec![[0.0; BLOCK]; inputs];
+        let (mut delays, mut moved) = (vec![0; inputs], vec![0; inputs]);
+        for (record, measured) in self.signals.y.iter().enumerate() {
+            let u = &self.signals.u[record];
             let samples = measured.len();
-            let mut kept_arrived = vec![Vec::new(); arrivals.len()];
+            let mut kept_arrived = vec![Vec::new(); inputs];
             outputs.clear();
             outputs.resize(padding + samples + 1, 0.0);
-            if signals.skipped > 0 {
+            if self.signals.skipped > 0 {
                 outputs[padding] = measured.first().copied().unwrap_or(0.0);
             } else {
                 sum += measured.first().map_or(0.0, |y| y * y);
             }
-            let undecided = undecided(&signals.edges[record], &arrivals);
+            let undecided = undecided(&self.signals.edges[record], self.arrivals);
             let mut undecided = undecided.into_iter().peekable();
-            // ỹ's sum, for the step that it was formed for.
-            let mut average: Option<(usize, f64)> = None;
+            // Until here one sample is taken at a time, because the delay moves.
+            let mut singly = 0;
             let mut k = 0;
             while k < samples {
                 let at = padding + k;
                 while undecided.next_if(|(_, end)| *end <= k).is_some() {}
                 let mut count = BLOCK.min(samples - k);
                 let mut decided = true;
-                if let Some((start, _)) = undecided.peek() {
+                if let Some((start, end)) = undecided.peek() {
                     decided = *start > k;
-                    count = if decided { count.min(start - k) } else { 1 };
+                    count = count.min(if decided { *start } else { *end } - k);
                 }
+                let mut average = 0.0;
                 if decided {
-                    for (arrived, arrival) in arrived.iter_mut().zip(&arrivals) {
-                        for (step, d) in arrived[..count].iter_mut().enumerate() {
-                            let source = (k + step).checked_sub(arrival.shortest);
-                            *d = source.map_or(0.0, |i| u[i]);
-                        }
+                    for (delay, arrival) in delays.iter_mut().zip(self.arrivals) {
+                        *delay = arrival.shortest;
                     }
                 } else {
-                    let follows = if self.structure.averaged {
-                        outputs[at]
-                    } else {
-                        let sum = match average {
-                            Some((step, sum)) if step + 1 == k => {
-                                sum + outputs[at - 1] - outputs[at - 1 - averaged_terms]
-                            }
-                            _ => outputs[at - averaged_terms..at].iter().sum(),
-                        };
-                        average = Some((k, sum));
-                        sum / f64::from(WINDOW)
-                    };
-                    for (arrived, arrival) in arrived.iter_mut().zip(&arrivals) {
-                        let delay = match &arrival.law {
-                            Some(law) => law.tap(0, law.evaluate(follows.max(0.0))).whole,
-                            None => arrival.shortest,
-                        };
-                        arrived[0] = k.checked_sub(delay).map_or(0.0, |i| u[i]);
+                    if k < singly {
+                        count = 1;
+                    }
+                    average = outputs[at - AVERAGED..at].iter().sum();
+                    self.delays(self.follows(&outputs, at, average), &mut delays);
+                }
+                for (arrived, delay) in arrived.iter_mut().zip(&delays) {
+                    copy_late(u, k, *delay, &mut arrived[..count]);
+                }
+                self.recursion.run(&mut outputs, at, count, &arrived);
+                if !decided && count > 1 {
+                    let (mut least, mut most) = (f64::INFINITY, 0.0f64);
+                    for step in 0..count {
+                        let follows = self.follows(&outputs, at + step, average);
+                        (least, most) = (least.min(follows), most.max(follows));
+                        average += outputs[at + step] - outputs[at + step - AVERAGED];
+                    }
+                    let mut same = true;
+                    for end in [least, most] {
+                        self.delays(end, &mut moved);
+                        same &= moved == delays;
+                    }
+                    if !same {
+                        singly = k + count;
+                        continue;
                     }
                 }
-                recursion.run(&mut outputs, at, count, &arrived);
-                if keep.is_some() {
+                if self.keep.is_some() {
                     for (kept, arrived) in kept_arrived.iter_mut().zip(&arrived) {
                         kept.extend_from_slice(&arrived[..count]);
                     }
                 }
                 let next = &mut outputs[at + 1..at + 1 + count];
                 let known = measured.get(k + 1..).unwrap_or_default();
-                if k + 1 < signals.skipped {
-                    // Until the past is recorded the run follows the measurement.
-                    let follow = signals.skipped - (k + 1);
-                    next.iter_mut()
-                        .zip(known)
-                        .take(follow)
-                        .for_each(|(n, y)| *n = *y);
+                let unjudged = self.signals.skipped.saturating_sub(k + 1);
+                // Until the past is recorded the run follows the measurement.
+                let follow = next.iter_mut().zip(known).take(unjudged);
+                follow.for_each(|(n, y)| *n = *y);
+                if next.iter().any(|y| !(y.abs() <= *bound)) {
+                    return Outcome::Diverged((done + k) as f64 / *all_samples as f64);
                 }
-                if next.iter().any(|y| y.abs() > self.bound || y.is_nan()) {
-                    return Outcome::Diverged((done + k) as f64 / self.samples as f64);
+                for (s, y) in next.iter().zip(known).skip(unjudged) {
+                    sum += (y - s) * (y - s);
                 }
-                let judged = signals.skipped.saturating_sub(k + 1);
-                sum += next
-                    .iter()
-                    .zip(known)
-                    .skip(judged)
-                    .map(|(s, y)| (y - s) * (y - s))
-                    .sum::<f64>();
-                if sum >= give_up_at {
+                if sum >= self.give_up_at {
                     return Outcome::AtLeast(sum);
                 }
                 k += count;
             }
             done += samples;
-            if let Some(keep) = keep.as_deref_mut() {
+            if let Some(keep) = self.keep.as_deref_mut() {
                 keep.arrived.push(kept_arrived);
                 keep.simulated
                     .push(outputs[padding..padding + samples].to_vec());
             }
         }
         Outcome::Squared(sum)
+    }
+}
+
+/// The command from step `k` on as it is `delay` samples later; 0 before it begins.
+#[inline(always)]
+fn copy_late(u: &[f64], k: usize, delay: usize, late: &mut [f64]) {
+    let missing = delay.saturating_sub(k).min(late.len());
+    let (before, after) = late.split_at_mut(missing);
+    before.fill(0.0);
+    if !after.is_empty() {
+        after.copy_from_slice(&u[k + missing - delay..][..after.len()]);
     }
 }

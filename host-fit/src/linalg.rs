@@ -74,6 +74,25 @@ pub(crate) fn add_cross_products(out: &mut [f64], a: &[f64], b: &[f64], rows: us
     );
 }
 
+/// AᵀB for A and B of `rows` rows, column by column; the result too. Whole
+/// columns only: what is left over is ignored.
+pub(crate) fn cross_products(a: &[f64], b: &[f64], rows: usize) -> Vec<f64> {
+    if rows == 0 {
+        return Vec::new();
+    }
+    let (columns_a, columns_b) = (a.len() / rows, b.len() / rows);
+    let mut out = vec![0.0; columns_a * columns_b];
+    matmul(
+        MatMut::from_column_major_slice_mut(&mut out, columns_a, columns_b),
+        Accum::Replace,
+        MatRef::from_column_major_slice(&a[..rows * columns_a], rows, columns_a).transpose(),
+        MatRef::from_column_major_slice(&b[..rows * columns_b], rows, columns_b),
+        1.0,
+        Par::Seq,
+    );
+    out
+}
+
 /// Magnitudes of the roots of zⁿ − Σ_i w_i z^(n−i), largest first: the poles of
 /// x_{k+1} = Σ_i w_i x_{k+1−i}, with `weights[i − 1]` = w_i.
 ///
@@ -130,6 +149,14 @@ mod tests {
         let mut out = vec![1.0; 4];
         add_cross_products(&mut out, &a, &b, 2, 2);
         close(&out, &[18.0, 40.0, 24.0, 54.0], 1e-12);
+    }
+
+    #[test]
+    fn cross_products_of_unequal_widths() {
+        let (a, b) = ([1.0, 2.0, 3.0, 4.0], [5.0, 6.0]);
+        close(&cross_products(&a, &b, 2), &[17.0, 39.0], 1e-12);
+        close(&cross_products(&b, &a, 2), &[17.0, 39.0], 1e-12);
+        assert!(cross_products(&a, &b, 0).is_empty());
     }
 
     #[test]

@@ -1,15 +1,19 @@
 //! Search steps for the free-run objective.
 
+use rand::RngExt;
+
 use super::exchange::{Exchange, List, Slot, set};
 use super::free_run::{DIVERGED_VALUE, FreeRun};
 use super::layout::Delays;
 use super::linearised::Linearised;
-use super::one_step::kick;
 use crate::search::{Around, Evaluator, Point, SearchStep, StopReason, Success};
 
 /// Exchanges of one slot that are simulated first: the deepest minima of the
 /// prediction over the lag.
 const MINIMA: usize = 7;
+
+/// Only those are simulated whose prediction is below this share of the best ε.
+const PROMISING: f64 = 1.01;
 
 /// Then these far around the best of them.
 const AROUND: [i32; 6] = [-1, 1, -2, 2, -4, 4];
@@ -33,13 +37,19 @@ fn descend(
         let before = best.value;
         let delays = evaluator.problem().regression.layout.delays(&best.point);
         evaluator.problem_mut().regression.tabulate(&delays.ticks);
-        let Some(linearised) = evaluator.problem().linearise(&delays) else {
+        let Some(mut linearised) = evaluator.problem().linearise(&delays) else {
             return Ok(best);
         };
         let slots = Exchange::new(&evaluator.problem().regression, &delays.ticks).slots(&delays);
         for slot in slots {
             let delays = evaluator.problem().regression.layout.delays(&best.point);
-            let minima = predicted_minima(evaluator.problem(), &linearised, &delays, slot);
+            let minima = predicted_minima(
+                evaluator.problem(),
+                &mut linearised,
+                &delays,
+                slot,
+                best.value * PROMISING,
+            );
             *screened += usize::from(evaluator.problem().regression.layout.longest_lag);
             let trials: Vec<Point> = minima
                 .iter()
@@ -118,14 +128,17 @@ fn lag_in(delays: &Delays, slot: Slot) -> u16 {
     list.get(slot.index).copied().unwrap_or(1)
 }
 
-/// The deepest minima of the predicted ε over the lag in a slot.
+/// The deepest minima of the predicted ε over the lag in a slot, as far as they
+/// are below a value.
 fn predicted_minima(
     problem: &FreeRun,
-    linearised: &Linearised,
+    linearised: &mut Linearised,
     delays: &Delays,
     slot: Slot,
+    below: f64,
 ) -> Vec<u16> {
     let layout = &problem.regression.layout;
+    linearised.include(layout, delays);
     let mut trial = delays.clone();
     let predicted: Vec<f64> = (1..=layout.longest_lag)
         .map(|lag| {
@@ -137,9 +150,10 @@ fn predicted_minima(
     // Even and odd lags can form two curves: compare with the second neighbours too.
     let mut minima: Vec<(f64, u16)> = (0..predicted.len())
         .filter(|&i| {
-            [i.wrapping_sub(1), i + 1, i.wrapping_sub(2), i + 2]
-                .iter()
-                .all(|j| at(i) <= at(*j))
+            at(i) < below * below
+                && [i.wrapping_sub(1), i + 1, i.wrapping_sub(2), i + 2]
+                    .iter()
+                    .all(|j| at(i) <= at(*j))
         })
         .map(|i| (at(i), i as u16 + 1))
         .collect();
@@ -174,14 +188,39 @@ impl SearchStep<FreeRun> for PredictedStep {
     }
 }
 
-/// Search step: walks the input delays, with everything else as it is.
+/// How far an input delay is moved in one step, samples.
+const INPUT_MOVES: [f64; 9] = [0.02, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0, 6.0, 12.0];
+
+/// Walks the input delays as long as that helps, with everything else as it is.
+fn walk_inputs(
+    evaluator: &mut Evaluator<'_, FreeRun>,
+    mut best: Success,
+) -> Result<Success, StopReason> {
+    let layout = &evaluator.problem().regression.layout;
+    let bounds = layout.input_bounds();
+    let first = layout.variables.len() - bounds.len();
+    let per_sample = evaluator.problem().regression.signals.ticks_per_sample();
+    let mut moved = true;
+    while moved && !bounds.is_empty() {
+        let mut trials: Vec<Point> = Vec::new();
+        for (input, (low, high)) in bounds.iter().enumerate() {
+            for shift in INPUT_MOVES.iter().flat_map(|m| [-m, *m]) {
+                let mut trial = best.point.clone();
+                let ticks = (shift * per_sample).round() as i64;
+                trial[first + input] = (trial[first + input] + ticks).clamp(*low, *high);
+                trials.push(trial);
+            }
+        }
+        moved = best_of(evaluator, &trials, &mut best)?.is_some();
+    }
+    Ok(best)
+}
+
+/// Search step: walks the input delays.
 #[derive(Default)]
 pub(crate) struct InputStep {
     settled_at: Option<Point>,
 }
-
-/// How far an input delay is moved in one step, samples.
-const INPUT_MOVES: [f64; 9] = [0.02, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0, 6.0, 12.0];
 
 impl SearchStep<FreeRun> for InputStep {
     fn search(
@@ -192,44 +231,46 @@ impl SearchStep<FreeRun> for InputStep {
         if self.settled_at.as_deref() == Some(around.point) {
             return Ok(None);
         }
-        let layout = &evaluator.problem().regression.layout;
-        let bounds = layout.input_bounds();
-        let first = layout.variables.len() - bounds.len();
-        let per_sample = evaluator.problem().regression.signals.ticks_per_sample();
-        let mut best = Success {
+        let start = Success {
             point: around.point.to_vec(),
             value: around.value,
         };
-        let mut moved = true;
-        while moved && !bounds.is_empty() {
-            let mut trials: Vec<Point> = Vec::new();
-            for (input, (low, high)) in bounds.iter().enumerate() {
-                for shift in INPUT_MOVES.iter().flat_map(|m| [-m, *m]) {
-                    let mut trial = best.point.clone();
-                    let ticks = (shift * per_sample).round() as i64;
-                    trial[first + input] = (trial[first + input] + ticks).clamp(*low, *high);
-                    trials.push(trial);
-                }
-            }
-            moved = best_of(evaluator, &trials, &mut best)?.is_some();
-        }
+        let best = walk_inputs(evaluator, start)?;
         self.settled_at = Some(best.point.clone());
         Ok((best.value < around.value).then_some(best))
     }
 }
 
-/// Search step: from a local optimum, replaces a few lags at random and descends
-/// again. Gives up after `patience` fruitless kicks or `most` kicks in all.
+/// Lags that a kick replaces.
+const KICKED_LAGS: usize = 2;
+
+/// A lag is kicked further than this, samples: less is the descent's own reach.
+const KICK_DISTANCE: u16 = 4;
+
+/// Share of the kicks that move the input delays too, and how far at most, samples.
+const INPUT_KICKS: f64 = 0.3;
+const INPUT_KICK_REACH: f64 = 5.0;
+
+/// The input delays are walked where a descent comes this close to the incumbent.
+const CLOSE: f64 = 1.01;
+
+/// A descent after a kick is given up when its n-th sweep ends more than this
+/// share over n above the incumbent.
+const HOPELESS: f64 = 0.05;
+
+/// Search step: a variable neighbourhood search whose kicks are informed. From a
+/// local optimum a few lags go to other minima of the prediction, so that most
+/// kicks lead to models that do not diverge, and a descent follows. Gives up
+/// after `patience` fruitless kicks or `most` kicks in all.
 pub(crate) struct FreeKickStep {
     patience: usize,
     most: usize,
     fruitless: usize,
     kicks: usize,
     screened: usize,
+    /// The incumbent's linearisation, for all kicks from it.
+    linearised: Option<(Point, Linearised)>,
 }
-
-/// Kicks tried until one gives a model that does not diverge.
-const KICK_TRIES: usize = 8;
 
 impl FreeKickStep {
     pub(crate) fn new(patience: usize, most: usize) -> Self {
@@ -239,7 +280,50 @@ impl FreeKickStep {
             fruitless: 0,
             kicks: 0,
             screened: 0,
+            linearised: None,
         }
+    }
+
+    /// A point some lags away from the incumbent.
+    fn kick(
+        &mut self,
+        evaluator: &mut Evaluator<'_, FreeRun>,
+        around: &mut Around<'_>,
+    ) -> Option<Point> {
+        let layout = &evaluator.problem().regression.layout;
+        let mut delays = layout.delays(around.point);
+        if self
+            .linearised
+            .as_ref()
+            .is_none_or(|(at, _)| at != around.point)
+        {
+            evaluator.problem_mut().regression.tabulate(&delays.ticks);
+            let linearised = evaluator.problem().linearise(&delays)?;
+            self.linearised = Some((around.point.to_vec(), linearised));
+        }
+        let (_, linearised) = self.linearised.as_mut()?;
+        let problem = evaluator.problem();
+        let slots = Exchange::new(&problem.regression, &delays.ticks).slots(&delays);
+        for _ in 0..KICKED_LAGS.min(slots.len()) {
+            let slot = slots[around.rng.random_range(0..slots.len())];
+            let now = lag_in(&delays, slot);
+            let mut others = predicted_minima(problem, linearised, &delays, slot, f64::INFINITY);
+            self.screened += usize::from(problem.regression.layout.longest_lag);
+            others.retain(|lag| lag.abs_diff(now) > KICK_DISTANCE);
+            if !others.is_empty() {
+                let lag = others[around.rng.random_range(0..others.len())];
+                set(&mut delays, slot, lag);
+            }
+        }
+        if around.rng.random_bool(INPUT_KICKS) {
+            let per_sample = problem.regression.signals.ticks_per_sample();
+            let bounds = problem.regression.layout.input_bounds();
+            for (tick, (low, high)) in delays.ticks.iter_mut().zip(bounds) {
+                let shift = around.rng.random_range(-INPUT_KICK_REACH..INPUT_KICK_REACH);
+                *tick = (*tick + (shift * per_sample).round() as i64).clamp(low, high);
+            }
+        }
+        Some(problem.regression.layout.point(&delays))
     }
 }
 
@@ -254,28 +338,23 @@ impl SearchStep<FreeRun> for FreeKickStep {
         }
         self.kicks += 1;
         self.fruitless += 1;
-        for _ in 0..KICK_TRIES {
-            let regression = &evaluator.problem().regression;
-            let mut delays = regression.layout.delays(around.point);
-            kick(regression, &mut delays, 2 + self.kicks % 3, around.rng);
-            let point = regression.layout.point(&delays);
-            let value = evaluator.value(&point)?;
-            if value >= 0.5 * DIVERGED_VALUE {
-                continue;
-            }
-            let hopeless =
-                |sweep: usize, value: f64| value > around.value * (1.0 + 0.15 / sweep as f64);
-            let end = descend(
-                evaluator,
-                Success { point, value },
-                &mut self.screened,
-                hopeless,
-            )?;
-            if end.value < around.value {
-                self.fruitless = 0;
-                return Ok(Some(end));
-            }
-            break;
+        let Some(point) = self.kick(evaluator, around) else {
+            return Ok(None);
+        };
+        let value = evaluator.value(&point)?;
+        if value >= 0.5 * DIVERGED_VALUE {
+            return Ok(None);
+        }
+        let start = Success { point, value };
+        let hopeless =
+            |sweep: usize, value: f64| value > around.value * (1.0 + HOPELESS / sweep as f64);
+        let mut end = descend(evaluator, start, &mut self.screened, hopeless)?;
+        if end.value < CLOSE * around.value {
+            end = walk_inputs(evaluator, end)?;
+        }
+        if end.value < around.value {
+            self.fruitless = 0;
+            return Ok(Some(end));
         }
         Ok(None)
     }

@@ -67,16 +67,18 @@ impl Terms {
     fn add_far(&self, past: &[f64], at: usize, sums: &mut [f64]) {
         for &(behind, weight) in &self.far {
             let from = &past[at - behind..][..sums.len()];
-            sums.iter_mut().zip(from).for_each(|(s, y)| *s += weight * y);
+            sums.iter_mut()
+                .zip(from)
+                .for_each(|(s, y)| *s += weight * y);
         }
     }
 
     /// The short lags' terms of the value that follows place `at`.
     #[inline(always)]
     fn near(&self, outputs: &[f64], at: usize) -> f64 {
-        self.near
-            .iter()
-            .fold(0.0, |sum, (behind, weight)| sum + weight * outputs[at - behind])
+        self.near.iter().fold(0.0, |sum, (behind, weight)| {
+            sum + weight * outputs[at - behind]
+        })
     }
 }
 

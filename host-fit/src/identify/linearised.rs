@@ -23,9 +23,6 @@ const STRIDE: usize = 41;
 /// Sensitivities run side by side.
 const LANES: usize = 16;
 
-/// Sampled rows multiplied at a time.
-const BLOCK_ROWS: usize = 512;
-
 /// One record of the run that is linearised.
 struct Run<'a> {
     padded: &'a [f32],
@@ -46,7 +43,9 @@ struct Filter<'a> {
     first: usize,
     /// What the recursion puts out; zeros for as long as the longest lag go before.
     outputs: &'a mut [[f32; LANES]],
+    /// The first of the columns to fill, and the distance to the next.
     sampled: &'a mut [f64],
+    spacing: usize,
 }
 
 impl pulp::NullaryFnOnce for Filter<'_> {
@@ -64,15 +63,13 @@ impl pulp::NullaryFnOnce for Filter<'_> {
         let reach = self.lags + 1;
         let samples = self.outputs.len() - reach;
         let gate = self.block.checked_sub(1).and_then(|l| arrived.get(l));
-        let count = rows.len();
         let mut rows = rows.iter().enumerate().peekable();
         for k in 0..samples {
             // Lane 0 is the constant 1 if it starts the block, then lags ascend.
             if let Some((at, _)) = rows.next_if(|(_, row)| **row == k) {
-                let place = self.block * (1 + self.lags) + self.first;
                 let lanes = self.outputs[reach + k - 1];
                 for (i, value) in lanes.iter().enumerate().take(1 + self.lags - self.first) {
-                    self.sampled[(place + i) * count + at] = f64::from(*value);
+                    self.sampled[i * self.spacing + at] = f64::from(*value);
                 }
             }
             let mut next = [0.0f32; LANES];
@@ -115,9 +112,15 @@ fn add_lanes(sums: &mut [f32; LANES], past: &[f32; LANES], weight: f32) {
 /// The free run linearised at an incumbent.
 #[derive(Debug)]
 pub(crate) struct Linearised {
+    /// Columns: one for each regressor and, last, the incumbent's error.
     size: usize,
-    /// Products of the sensitivities and, last, of the incumbent's error.
-    products: Vec<f64>,
+    rows: usize,
+    /// The sensitivities at the sampled rows of all records, column by column.
+    sampled: Vec<f64>,
+    /// Products of a column with all others, where they were asked for.
+    products: Vec<Option<Vec<f64>>>,
+    /// Squared lengths of the columns.
+    squared: Vec<f64>,
     incumbent: Vec<(usize, f64)>,
     lags: usize,
     first_element: usize,
@@ -135,9 +138,14 @@ impl Linearised {
         let lags = usize::from(layout.longest_lag);
         let inputs = delays.ticks.len();
         let size = (1 + inputs) * (1 + lags) + 1;
+        let sampled_rows = |measured: &Vec<f64>| (signals.skipped..measured.len()).step_by(STRIDE);
+        let all_rows = signals.y.iter().map(|y| sampled_rows(y).len()).sum();
         let mut linearised = Self {
             size,
-            products: vec![0.0; size * size],
+            rows: all_rows,
+            sampled: vec![0.0; size * all_rows],
+            products: vec![None; size],
+            squared: Vec::new(),
             incumbent: Vec::new(),
             lags,
             first_element: layout.element(1),
@@ -168,14 +176,14 @@ impl Linearised {
                     .collect()
             })
             .collect();
+        let mut first_row = 0;
         for (record, measured) in signals.y.iter().enumerate() {
             let simulated = &trajectory.simulated[record];
             let arrived: Vec<Vec<f32>> = trajectory.arrived[record]
                 .iter()
                 .map(|d| d.iter().map(|d| *d as f32).collect())
                 .collect();
-            let rows: Vec<usize> = (signals.skipped..measured.len()).step_by(STRIDE).collect();
-            let mut sampled = vec![0.0; rows.len() * size];
+            let rows: Vec<usize> = sampled_rows(measured).collect();
             // Zeros before the record and room for lanes beyond the longest lag.
             let mut padded = vec![0.0f32; lags + 1 + LANES];
             padded.extend(simulated.iter().map(|y| *y as f32));
@@ -190,6 +198,7 @@ impl Linearised {
             let mut outputs = vec![[0.0f32; LANES]; lags + 1 + measured.len()];
             for block in 0..=inputs {
                 for first in (0..=lags).step_by(LANES) {
+                    let column = block * (1 + lags) + first;
                     pulp::Arch::new().dispatch(Filter {
                         run: &run,
                         lags,
@@ -197,17 +206,61 @@ impl Linearised {
                         block,
                         first,
                         outputs: &mut outputs,
-                        sampled: &mut sampled,
+                        sampled: &mut linearised.sampled[column * all_rows + first_row..],
+                        spacing: all_rows,
                     });
                 }
             }
-            let error = &mut sampled[(size - 1) * rows.len()..];
+            let error = &mut linearised.sampled[(size - 1) * all_rows + first_row..];
             for (e, k) in error.iter_mut().zip(&rows) {
                 *e = measured[*k] - simulated[*k];
             }
-            linearised.add_products(&sampled, rows.len());
+            first_row += rows.len();
         }
+        linearised.squared = linearised
+            .sampled
+            .chunks_exact(all_rows.max(1))
+            .map(|column| column.iter().map(|s| s * s).sum())
+            .collect();
+        linearised.multiply(
+            (0..columns.len())
+                .map(|i| linearised.incumbent[i].0)
+                .chain([size - 1])
+                .collect(),
+        );
         linearised
+    }
+
+    /// Forms the products of these columns with all others, once.
+    fn multiply(&mut self, mut columns: Vec<usize>) {
+        columns.retain(|i| self.products[*i].is_none());
+        let chosen: Vec<f64> = columns
+            .iter()
+            .flat_map(|i| &self.sampled[i * self.rows..(i + 1) * self.rows])
+            .copied()
+            .collect();
+        let products = linalg::cross_products(&self.sampled, &chosen, self.rows);
+        for (i, products) in columns.iter().zip(products.chunks_exact(self.size)) {
+            self.products[*i] = Some(products.to_vec());
+        }
+    }
+
+    fn product(&self, i: usize, j: usize) -> f64 {
+        match (&self.products[i], &self.products[j]) {
+            (Some(products), _) => products[j],
+            (None, Some(products)) => products[i],
+            (None, None) if i == j => self.squared[i],
+            (None, None) => {
+                let column = |i: usize| &self.sampled[i * self.rows..(i + 1) * self.rows];
+                column(i).iter().zip(column(j)).map(|(x, y)| x * y).sum()
+            }
+        }
+    }
+
+    /// Makes predictions for neighbours of a candidate cheap.
+    pub(crate) fn include(&mut self, layout: &Layout, delays: &Delays) {
+        let columns = layout.columns(delays);
+        self.multiply(columns.iter().map(|c| self.index(c)).collect());
     }
 
     /// Place of a regressor's sensitivity.
@@ -218,16 +271,6 @@ impl Linearised {
             column.element + 1 - self.first_element
         };
         column.input * (1 + self.lags) + within
-    }
-
-    fn add_products(&mut self, sampled: &[f64], rows: usize) {
-        for start in (0..rows).step_by(BLOCK_ROWS) {
-            let count = BLOCK_ROWS.min(rows - start);
-            let block: Vec<f64> = (0..self.size)
-                .flat_map(|column| sampled[column * rows + start..][..count].iter().copied())
-                .collect();
-            linalg::add_cross_products(&mut self.products, &block, &block, count, self.size);
-        }
     }
 
     /// Predicted ε² of a candidate with the incumbent's input delays.
@@ -246,10 +289,9 @@ impl Linearised {
         change.push((self.size - 1, 1.0));
         let mut sum = 0.0;
         for (n, (i, x)) in change.iter().enumerate() {
-            let row = &self.products[i * self.size..(i + 1) * self.size];
-            let mut part = 0.5 * row[*i] * x;
+            let mut part = 0.5 * self.product(*i, *i) * x;
             for (j, y) in &change[..n] {
-                part += row[*j] * y;
+                part += self.product(*j, *i) * y;
             }
             sum += 2.0 * x * part;
         }

@@ -11,8 +11,8 @@ use thiserror::Error;
 
 use super::arrival::factor;
 use super::free_run::{Coefficients, DIVERGED_VALUE, FreeRun};
-use super::free_runner::FreeRunner;
 use super::free_run_steps::{FreeKickStep, InputStep, PredictedStep};
+use super::free_runner::FreeRunner;
 use super::layout::Delays;
 use super::one_step::{ExchangeStep, KickStep, OneStep, PairStep};
 use super::regression::Regression;
@@ -191,8 +191,8 @@ pub enum IdentifyError {
     NotConverged(#[from] linalg::NotConverged),
 }
 
-/// Restarts of a free-run search are at most this many more than the patience.
-const MORE_KICKS: usize = 2;
+/// Fruitless kicks of a free-run search per unit of patience, and kicks in all.
+const FREE_KICKS: (usize, usize) = (8, 12);
 
 /// Identifies a model from the identify records of `data`; validate records only
 /// judge the refinement.
@@ -389,8 +389,8 @@ fn search(
         Box::new(InputStep::default()),
         Box::new(Speculative::default()),
         Box::new(FreeKickStep::new(
-            options.patience,
-            MORE_KICKS + options.patience,
+            FREE_KICKS.0 * options.patience,
+            FREE_KICKS.1 * options.patience,
         )),
     ];
     let mut free = minimise(

@@ -48,6 +48,9 @@ pub(crate) struct Request {
     /// Law h = P0 + P1·exp(−P2·ỹ), in samples, in place of a measured one; implies `--delay state-dependent`.
     #[arg(long, value_name = "P0,P1,P2", allow_hyphen_values = true)]
     pub(crate) delay_law: Option<LawArgument>,
+    /// Factors f of the delay law, one per input, in place of searching them.
+    #[arg(long, value_name = "F1,F2,…", value_delimiter = ',')]
+    pub(crate) factors: Vec<f64>,
     /// Identify the model of the moving averages, eqs. (14) and (15).
     #[arg(long)]
     pub(crate) averaged: bool,
@@ -135,6 +138,7 @@ impl Default for Request {
         Self {
             delay: DelayKind::Fixed,
             delay_law: None,
+            factors: Vec::new(),
             averaged: false,
             n1: None,
             n2: None,
@@ -218,13 +222,24 @@ impl Request {
                 Start::Measured
             },
         };
+        if self.factors.iter().any(|f| !(f.is_finite() && *f >= 0.0)) {
+            bail!("--factors takes finite numbers that are not below 0, as in --factors 1");
+        }
         let law = match (self.delay_law, self.delay) {
+            (None, DelayKind::Fixed) if !self.factors.is_empty() => {
+                bail!(
+                    "--factors multiplies a delay law: add --delay state-dependent or --delay-law"
+                )
+            }
             (Some(LawArgument(law)), _) => Some(law),
             (None, DelayKind::Fixed) => None,
             (None, DelayKind::StateDependent) => Some(measured_law(set, &learning, &mut remarks)?),
         };
         if let Some(law) = law {
-            structure.delay = InputDelay::StateDependent { law, factors: None };
+            structure.delay = InputDelay::StateDependent {
+                law,
+                factors: (!self.factors.is_empty()).then(|| self.factors.clone()),
+            };
         }
         let options = IdentifyOptions {
             structure,

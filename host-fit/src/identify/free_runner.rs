@@ -345,7 +345,7 @@ impl pulp::NullaryFnOnce for Run<'_> {
                 // Until the past is recorded the run follows the measurement.
                 let follow = next.iter_mut().zip(known).take(unjudged);
                 follow.for_each(|(n, y)| *n = *y);
-                if next.iter().any(|y| !(y.abs() <= *bound)) {
+                if next.iter().any(|y| y.abs() > *bound || y.is_nan()) {
                     return Outcome::Diverged((done + k) as f64 / *all_samples as f64);
                 }
                 for (s, y) in next.iter().zip(known).skip(unjudged) {

@@ -7,6 +7,8 @@
 
 mod arrival;
 mod cholesky;
+mod delay_search;
+mod error;
 mod exchange;
 mod free_run;
 mod free_run_steps;
@@ -15,9 +17,14 @@ mod lagged_products;
 mod layout;
 mod linearised;
 mod one_step;
+mod options;
+mod refinement;
 mod regression;
 mod run;
 mod structure;
 
-pub use run::{Identified, IdentifyError, IdentifyOptions, Objective, Refinement, identify};
+pub use error::IdentifyError;
+pub use options::{IdentifyOptions, Objective};
+pub use refinement::Refinement;
+pub use run::{Identified, identify};
 pub use structure::{DelayLaw, InputDelay, Structure, WINDOW};

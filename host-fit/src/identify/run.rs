@@ -5,85 +5,20 @@ use std::time::{Duration, Instant};
 
 use model_core::model::Averaging;
 use model_core::recursion::Grading;
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use thiserror::Error;
 
 use super::arrival::factor;
-use super::free_run::{Coefficients, DIVERGED_VALUE, FreeRun};
-use super::free_run_steps::{FreeKickStep, InputStep, PredictedStep};
-use super::free_runner::FreeRunner;
+use super::delay_search::search;
+use super::error::{IdentifyError, check};
+use super::free_run::{Coefficients, DIVERGED_VALUE};
 use super::layout::Delays;
-use super::one_step::{ExchangeStep, KickStep, OneStep, PairStep};
+use super::options::{IdentifyOptions, Objective};
+use super::refinement::{Refinement, refine};
 use super::regression::Regression;
-use super::structure::{InputDelay, Series, Structure, WINDOW};
+use super::structure::{InputDelay, Series, WINDOW};
 use crate::data::{Record, Use};
-use crate::fit::{FitOptions, fit};
 use crate::linalg;
 use crate::model::{Delay, Model, Training};
-use crate::search::{
-    Point, Progress, Report, SearchStep, Settings, Speculative, StopReason, minimise,
-};
-
-/// What the search of the delays minimises.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Objective {
-    /// Norm of the one-step prediction errors.
-    OneStep,
-    /// ε of the free run, eq. (9), with one-step least-squares coefficients: the paper's.
-    #[default]
-    FreeRun,
-}
-
-impl Objective {
-    /// Name on the command line and in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::OneStep => "one-step",
-            Self::FreeRun => "free-run",
-        }
-    }
-}
-
-/// How to identify.
-#[derive(Debug, Clone, PartialEq)]
-pub struct IdentifyOptions {
-    /// Sizes and conventions of the model.
-    pub structure: Structure,
-    /// What the search minimises.
-    pub objective: Objective,
-    /// Budget, seed and threads of the search.
-    pub search: Settings,
-    /// Fruitless restarts after which the search ends; 0 for a single descent.
-    pub patience: usize,
-    /// Whether the coefficients are refined on the free run after a search with
-    /// [`Objective::FreeRun`].
-    pub refine: bool,
-}
-
-impl Default for IdentifyOptions {
-    fn default() -> Self {
-        Self {
-            structure: Structure::default(),
-            objective: Objective::default(),
-            search: Settings::default(),
-            patience: 3,
-            refine: true,
-        }
-    }
-}
-
-/// Output-error refinement of the coefficients, delays unchanged.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Refinement {
-    /// ε over the identify records before and after.
-    pub identify: (f64, f64),
-    /// ε over the validate records before and after, if there are any.
-    pub validate: Option<(f64, f64)>,
-    /// Whether the refined coefficients are those of the returned model: the
-    /// held-out ε fell or, without held-out records, the one fitted.
-    pub kept: bool,
-}
+use crate::search::{Progress, StopReason};
 
 /// Result of an identification.
 #[derive(Debug, Clone)]
@@ -113,86 +48,6 @@ pub struct Identified {
     /// Largest pole magnitude of the recursion under steady blowing.
     pub pole_on: f64,
 }
-
-/// Why an identification could not be made.
-#[derive(Debug, Clone, Error, PartialEq)]
-#[non_exhaustive]
-pub enum IdentifyError {
-    /// Nothing to fit.
-    #[error(
-        "the data set has no record with use \"identify\". Mark at least one record so in dataset.toml."
-    )]
-    NoRecords,
-    /// A structure that makes no sense.
-    #[error("{what}. {remedy}")]
-    Structure {
-        /// What is wrong.
-        what: String,
-        /// What to do.
-        remedy: String,
-    },
-    /// A record shorter than the lags.
-    #[error(
-        "record `{record}` has {samples} samples, too few for lags up to {longest}. \
-         Give a smaller --max-lag or a longer record."
-    )]
-    TooShort {
-        /// The record.
-        record: String,
-        /// Its samples.
-        samples: usize,
-        /// Longest lag asked for.
-        longest: usize,
-    },
-    /// Fewer rows than coefficients.
-    #[error(
-        "the records give {rows} equations for {coefficients} coefficients. \
-         Give longer records, or fewer lags with --n1 and --n2."
-    )]
-    TooFewSamples {
-        /// Equations.
-        rows: usize,
-        /// Coefficients.
-        coefficients: usize,
-    },
-    /// A signal of unequal length or with a value that is no number.
-    #[error(
-        "record `{record}`: signal `{signal}` has the wrong length or a value that is not finite. Clean the CSV file."
-    )]
-    BadSignal {
-        /// The record.
-        record: String,
-        /// `u` or `y`.
-        signal: &'static str,
-    },
-    /// The input never changes.
-    #[error(
-        "the command u never changes in the identify records, so no input delay can be found. \
-         Add a record with switching, or use --n3 0."
-    )]
-    ConstantInput,
-    /// No candidate had a bounded free run.
-    #[error(
-        "every candidate model diverges in free run ({stop}). \
-         Use fewer lags, or --objective one-step and a refinement."
-    )]
-    NoStableModel {
-        /// How the search ended.
-        stop: StopReason,
-    },
-    /// The search was stopped before its first result.
-    #[error("{stop}, before there was any result. Run again with more evaluations.")]
-    NoResult {
-        /// How the search ended.
-        stop: StopReason,
-    },
-    /// The final least squares failed.
-    #[error(transparent)]
-    NotConverged(#[from] linalg::NotConverged),
-}
-
-/// Fruitless kicks of a free-run search per unit of patience, and kicks in all.
-const FREE_KICKS: (usize, usize) = (8, 12);
 
 /// Identifies a model from the identify records of `data`; validate records only
 /// judge the refinement.
@@ -246,164 +101,6 @@ pub fn identify(
         pole_off,
         pole_on,
     })
-}
-
-fn check(records: &[&Record], structure: &Structure) -> Result<(), IdentifyError> {
-    let refuse = |what: String, remedy: &str| {
-        Err(IdentifyError::Structure {
-            what,
-            remedy: remedy.to_owned(),
-        })
-    };
-    if records.is_empty() {
-        return Err(IdentifyError::NoRecords);
-    }
-    let longest = usize::from(structure.longest_lag);
-    if structure.state_lags == 0 || longest == 0 {
-        return refuse(
-            "a model needs at least one state lag".to_owned(),
-            "Give --n1 and --max-lag of 1 or more.",
-        );
-    }
-    if structure.state_lags.max(structure.product_lags) > longest {
-        return refuse(
-            format!(
-                "{} lags do not fit into 1 … {longest}",
-                structure.state_lags.max(structure.product_lags)
-            ),
-            "Give a larger --max-lag, or fewer lags with --n1 and --n2.",
-        );
-    }
-    if let Some(given) = structure.given_ticks()
-        && given.len() != structure.inputs
-    {
-        return refuse(
-            format!(
-                "{} input delays are given for {} inputs",
-                given.len(),
-                structure.inputs
-            ),
-            "Give one delay or factor per input, or --n3 with their number.",
-        );
-    }
-    if let InputDelay::StateDependent { law, .. } = &structure.delay
-        && !(law.floor.is_finite()
-            && law.rise.is_finite()
-            && law.rate.is_finite()
-            && law.floor >= 0.0)
-    {
-        return refuse(
-            "the delay law has a negative or non-finite parameter".to_owned(),
-            "Give --delay-law P0,P1,P2 with P0 ≥ 0.",
-        );
-    }
-    for record in records {
-        for (signal, values) in [("u", &record.u), ("y", &record.y)] {
-            if values.len() != record.y.len() || values.iter().any(|v| !v.is_finite()) {
-                return Err(IdentifyError::BadSignal {
-                    record: record.name.clone(),
-                    signal,
-                });
-            }
-        }
-        if record.y.len() <= longest + 1 + structure.skipped() {
-            return Err(IdentifyError::TooShort {
-                record: record.name.clone(),
-                samples: record.y.len(),
-                longest,
-            });
-        }
-    }
-    let rows: usize = records
-        .iter()
-        .map(|r| r.y.len() - 1 - structure.skipped())
-        .sum();
-    let coefficients = structure.state_lags + structure.inputs * (1 + structure.product_lags);
-    if rows <= coefficients {
-        return Err(IdentifyError::TooFewSamples { rows, coefficients });
-    }
-    let constant = |r: &&Record| r.u.iter().all(|u| Some(u) == r.u.first());
-    let same = records.iter().all(|r| r.u.first() == records[0].u.first());
-    // From rest, a command that is on from the start is a step.
-    let rises = structure.skipped() == 0
-        && records
-            .iter()
-            .any(|r| r.u.first().is_some_and(|u| *u != 0.0));
-    if structure.inputs > 0 && same && !rises && records.iter().all(constant) {
-        return Err(IdentifyError::ConstantInput);
-    }
-    Ok(())
-}
-
-/// Runs the search that the options ask for.
-fn search(
-    regression: Regression,
-    options: &IdentifyOptions,
-    progress: &dyn Progress,
-    interrupt: &AtomicBool,
-) -> (Regression, Report) {
-    let mut rng = ChaCha8Rng::seed_from_u64(options.search.seed);
-    let mut draw = || -> Point {
-        regression
-            .layout
-            .variables
-            .iter()
-            .map(|v| rng.random_range(v.lower..=v.upper.max(v.lower)))
-            .collect()
-    };
-    let starts: Vec<Point> = vec![draw()];
-    let mut one_step = OneStep { regression };
-    let kicks = match options.objective {
-        Objective::OneStep => 6 * options.patience,
-        // Only a starting point is needed.
-        Objective::FreeRun => options.patience,
-    };
-    let mut steps: Vec<Box<dyn SearchStep<OneStep>>> = vec![
-        Box::new(ExchangeStep::default()),
-        Box::new(Speculative::default()),
-        Box::new(PairStep::default()),
-        Box::new(KickStep::new(kicks)),
-    ];
-    let report = minimise(
-        &mut one_step,
-        &starts,
-        &mut steps,
-        &options.search,
-        progress,
-        interrupt,
-    );
-    if options.objective == Objective::OneStep {
-        return (one_step.regression, report);
-    }
-    let starts: Vec<Point> = report
-        .best
-        .iter()
-        .map(|b| b.point.clone())
-        .chain(starts)
-        .collect();
-    let regression = one_step.regression;
-    let runner = FreeRunner::new(&regression.signals, &options.structure);
-    let mut free_run = FreeRun { regression, runner };
-    let mut steps: Vec<Box<dyn SearchStep<FreeRun>>> = vec![
-        Box::new(PredictedStep::default()),
-        Box::new(InputStep::default()),
-        Box::new(Speculative::default()),
-        Box::new(FreeKickStep::new(
-            FREE_KICKS.0 * options.patience,
-            FREE_KICKS.1 * options.patience,
-        )),
-    ];
-    let mut free = minimise(
-        &mut free_run,
-        &starts,
-        &mut steps,
-        &options.search,
-        progress,
-        interrupt,
-    );
-    free.evaluations += report.evaluations;
-    free.screened += report.screened;
-    (free_run.regression, free)
 }
 
 fn model(
@@ -463,59 +160,6 @@ fn model(
     }
 }
 
-/// Refines the coefficients on the identify records; keeps them in `model` if
-/// the held-out ε falls. `None` if the free run cannot be judged.
-fn refine(model: &mut Model, data: &[Record]) -> Option<Refinement> {
-    // The model of averaged signals runs on averaged records, which `fit` does not see.
-    if model.averaging.averaged_model {
-        return None;
-    }
-    let (identify, validate): (Vec<&Record>, Vec<&Record>) =
-        data.iter().partition(|r| r.role == Use::Identify);
-    let options = FitOptions {
-        constant: model.constant != 0.0,
-        ..FitOptions::default()
-    };
-    let refined = fit(model, &identify, &options).ok()?.model;
-    let before = epsilon(model, &identify)?;
-    let after = epsilon(&refined, &identify)?;
-    let held_out = match validate.is_empty() {
-        true => None,
-        // A model that diverges on held-out records is no improvement.
-        false => Some((
-            epsilon(model, &validate).unwrap_or(f64::INFINITY),
-            epsilon(&refined, &validate).unwrap_or(f64::INFINITY),
-        )),
-    };
-    let (from, to) = held_out.unwrap_or((before, after));
-    let kept = to < from;
-    if kept {
-        *model = refined;
-    }
-    Some(Refinement {
-        identify: (before, after),
-        validate: held_out,
-        kept,
-    })
-}
-
-/// ε over records, eq. (9); `None` if a run diverges.
-fn epsilon(model: &Model, records: &[&Record]) -> Option<f64> {
-    let warm_up = model.warm_up();
-    let mut sum = 0.0;
-    for record in records {
-        let simulated = model.free_run(record).ok()?;
-        sum += record
-            .y
-            .iter()
-            .zip(simulated)
-            .skip(warm_up)
-            .map(|(y, s)| (y - s).powi(2))
-            .sum::<f64>();
-    }
-    Some(sum.sqrt())
-}
-
 /// Largest pole magnitude with all inputs off or all on.
 fn pole(model: &Model, on: bool) -> Result<f64, linalg::NotConverged> {
     let mut weights = vec![0.0; model.longest_lag() + 1];
@@ -545,8 +189,10 @@ fn pole(model: &Model, on: bool) -> Result<f64, linalg::NotConverged> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::refinement::epsilon;
+    use super::super::structure::Structure;
     use super::*;
-    use crate::search::{PollKind, Snapshot};
+    use crate::search::{PollKind, Settings, Snapshot};
     use model_core::recursion::LagConvention;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -668,18 +314,31 @@ mod tests {
             rise: 12.0,
             rate: 4.0,
         };
-        for delay in [
-            InputDelay::Fixed { delays: None },
-            InputDelay::StateDependent { law, factors: None },
+        let law = InputDelay::StateDependent { law, factors: None };
+        let fixed = InputDelay::Fixed { delays: None };
+        for (delay, inputs, averaged) in [
+            (fixed.clone(), 1, false),
+            (fixed.clone(), 2, false),
+            (fixed, 1, true),
+            (law.clone(), 1, false),
+            (law.clone(), 2, false),
+            (law, 1, true),
         ] {
             let mut options = options(Objective::FreeRun, delay);
             options.refine = false;
+            options.patience = 1;
+            options.structure.inputs = inputs;
+            options.structure.averaged = averaged;
             let found = run(&data(), &options).expect("identifies");
-            let data = data();
+            let data = found.model.targets(&data());
             let identify: Vec<&Record> = data.iter().take(2).collect();
             let epsilon = epsilon(&found.model, &identify).expect("stable");
             let relative = (epsilon - found.objective_value).abs() / epsilon;
-            assert!(relative < 1e-6, "{epsilon} {}", found.objective_value);
+            assert!(
+                relative < 1e-6,
+                "{inputs} {averaged}: {epsilon} {}",
+                found.objective_value
+            );
         }
     }
 

@@ -1,0 +1,88 @@
+//! The search of the delays: which steps, in which order, how many restarts.
+
+use std::sync::atomic::AtomicBool;
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::free_run::FreeRun;
+use super::free_run_steps::{FreeKickStep, InputStep, PredictedStep};
+use super::free_runner::FreeRunner;
+use super::one_step::{ExchangeStep, KickStep, OneStep, PairStep};
+use super::options::{IdentifyOptions, Objective};
+use super::regression::Regression;
+use crate::search::{Point, Progress, Report, SearchStep, Speculative, minimise};
+
+/// Fruitless kicks of a free-run search per unit of patience, and kicks in all.
+const FREE_KICKS: (usize, usize) = (8, 12);
+
+/// Runs the search that the options ask for.
+pub(crate) fn search(
+    regression: Regression,
+    options: &IdentifyOptions,
+    progress: &dyn Progress,
+    interrupt: &AtomicBool,
+) -> (Regression, Report) {
+    let mut rng = ChaCha8Rng::seed_from_u64(options.search.seed);
+    let mut draw = || -> Point {
+        regression
+            .layout
+            .variables
+            .iter()
+            .map(|v| rng.random_range(v.lower..=v.upper.max(v.lower)))
+            .collect()
+    };
+    let starts: Vec<Point> = vec![draw()];
+    let mut one_step = OneStep { regression };
+    let kicks = match options.objective {
+        Objective::OneStep => 6 * options.patience,
+        // Only a starting point is needed.
+        Objective::FreeRun => options.patience,
+    };
+    let mut steps: Vec<Box<dyn SearchStep<OneStep>>> = vec![
+        Box::new(ExchangeStep::default()),
+        Box::new(Speculative::default()),
+        Box::new(PairStep::default()),
+        Box::new(KickStep::new(kicks)),
+    ];
+    let report = minimise(
+        &mut one_step,
+        &starts,
+        &mut steps,
+        &options.search,
+        progress,
+        interrupt,
+    );
+    if options.objective == Objective::OneStep {
+        return (one_step.regression, report);
+    }
+    let starts: Vec<Point> = report
+        .best
+        .iter()
+        .map(|b| b.point.clone())
+        .chain(starts)
+        .collect();
+    let regression = one_step.regression;
+    let runner = FreeRunner::new(&regression.signals, &options.structure);
+    let mut free_run = FreeRun { regression, runner };
+    let mut steps: Vec<Box<dyn SearchStep<FreeRun>>> = vec![
+        Box::new(PredictedStep::default()),
+        Box::new(InputStep::default()),
+        Box::new(Speculative::default()),
+        Box::new(FreeKickStep::new(
+            FREE_KICKS.0 * options.patience,
+            FREE_KICKS.1 * options.patience,
+        )),
+    ];
+    let mut free = minimise(
+        &mut free_run,
+        &starts,
+        &mut steps,
+        &options.search,
+        progress,
+        interrupt,
+    );
+    free.evaluations += report.evaluations;
+    free.screened += report.screened;
+    (free_run.regression, free)
+}

@@ -1,0 +1,52 @@
+//! What an identification is asked for.
+
+use super::structure::Structure;
+use crate::search::Settings;
+
+/// What the search of the delays minimises.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Objective {
+    /// Norm of the one-step prediction errors.
+    OneStep,
+    /// ε of the free run, eq. (9), with one-step least-squares coefficients: the paper's.
+    #[default]
+    FreeRun,
+}
+
+impl Objective {
+    /// Name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OneStep => "one-step",
+            Self::FreeRun => "free-run",
+        }
+    }
+}
+
+/// How to identify.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IdentifyOptions {
+    /// Sizes and conventions of the model.
+    pub structure: Structure,
+    /// What the search minimises.
+    pub objective: Objective,
+    /// Budget, seed and threads of the search.
+    pub search: Settings,
+    /// Fruitless restarts after which the search ends; 0 for a single descent.
+    pub patience: usize,
+    /// Whether the coefficients are refined on the free run after a search with
+    /// [`Objective::FreeRun`].
+    pub refine: bool,
+}
+
+impl Default for IdentifyOptions {
+    fn default() -> Self {
+        Self {
+            structure: Structure::default(),
+            objective: Objective::default(),
+            search: Settings::default(),
+            patience: 3,
+            refine: true,
+        }
+    }
+}

@@ -23,7 +23,7 @@ fn own_step(state: &mut full::IdentifiedState, on: bool) -> f32 {
         command: if on { 1.0 } else { 0.0 },
         channels: &[],
     };
-    step(&full::MODEL, state, &input).measured
+    step(&full::model(), state, &input).measured
 }
 
 #[entry]
@@ -31,7 +31,7 @@ fn main() -> ! {
     if let Some(core) = cortex_m::Peripherals::take() {
         let mut uart = Uart::new(core.ITM);
         let mut ticks = Ticks::new(core.SYST);
-        let mut state = full::state(&full::MODEL);
+        let mut state = full::state(&full::model());
         let (mut own, mut peer, mut apart) = (0_u32, 0_u32, 0.0_f32);
         for k in 0..STEPS {
             let on = command(k);

@@ -193,12 +193,6 @@ where
         }
     }
 
-    /// ỹ_k of eq. (1): the W − 1 outputs before y_k, divided by W.
-    #[inline]
-    pub fn averaged_output(&self, window: u32) -> T {
-        self.average.value() / T::from_count(window)
-    }
-
     /// Makes `flow` the newest output s_{k+1}: what [`step`] does with its own
     /// prediction, or a measurement takes the place of.
     #[inline]
@@ -383,7 +377,8 @@ impl<T: Real, L: DelayLaw<T>, J: Memory<T>> Arriving<'_, T, L, J> {
         }
     }
 
-    /// Asks the delay law, which follows the averaged output.
+    /// Asks the delay law, which follows ỹ_k of eq. (1): the W − 1 outputs before
+    /// y_k, divided by W; an averaged model's output itself.
     #[inline(always)]
     fn evaluate(&mut self) -> T {
         let follows = if self.averaging.averaged_model {

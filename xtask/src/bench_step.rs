@@ -65,7 +65,7 @@ fn bench_step(_arguments: &[String]) -> Result<()> {
         .stdout(Stdio::piped())
         .spawn()
         .context("could not start qemu-system-arm; run `cargo xtask setup`")?;
-    let mut bytes = [0; 16];
+    let mut bytes = [0; 24];
     let received = process
         .stdout
         .take()
@@ -78,14 +78,16 @@ fn bench_step(_arguments: &[String]) -> Result<()> {
         .chunks_exact(4)
         .filter_map(|word| Some(f64::from(u32::from_le_bytes(word.try_into().ok()?))))
         .collect();
-    let [steps, own, peer, apart] = words[..] else {
+    let [steps, own, peer, own_most, peer_most, apart] = words[..] else {
         bail!("the program sent something else");
     };
     let instructions = |ticks: f64| ticks * 1.25 / steps;
     println!(
-        "ours: {:.1}\nC: {:.1}\nratio: {:.3}\nlargest difference of y: {:.1e}",
+        "ours: {:.1}, at most {:.0}\nC: {:.1}, at most {:.0}\nratio: {:.3}\nlargest difference of y: {:.1e}",
         instructions(own),
+        own_most * 1.25,
         instructions(peer),
+        peer_most * 1.25,
         own / peer,
         apart * 1e-9
     );

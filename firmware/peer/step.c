@@ -1,6 +1,5 @@
-/* The peer: Table II's step in plain C, as for a product. Constant tables, the
-   same doubled ring for the outputs as ours (a ring with a mask for every lag
-   takes 17 instructions more), one running sum, newlib's expf. */
+/* The peer: Table II's step in plain C, as for a product. Constant tables,
+   rings with a mask, one running sum, newlib's expf. */
 #include <math.h>
 #include <stdint.h>
 
@@ -16,9 +15,9 @@ static const uint16_t product_lag[N2] = {0, 72, 241, 263, 298, 334, 413, 476, 49
 static const float c[N2] = {-0.0228f, 0.0138f, 0.0621f, -0.0286f, -0.0186f,
                             -0.0121f, -0.0035f, -0.0056f, 0.0189f, -0.0049f};
 
-static float y[2 * RING];  /* every sample twice: constant lags are constant offsets */
+static float y[RING];
 static uint8_t u[INPUTS];
-static unsigned newest, k;
+static unsigned k;
 static float sum;
 
 float peer_step(int command) {
@@ -27,19 +26,16 @@ float peer_step(int command) {
     if (average < 0.0f) average = 0.0f;
     int delay = (int)roundf(47.35f + 12.69f * expf(-20.18f * average));
     if (delay > INPUTS - 1) delay = INPUTS - 1;
-    const float *past = y + newest + RING;
-    float now = past[0];
+    float now = y[k % RING];
     float next = 0.0f;
-    for (int i = 0; i < N1; i++) next += a[i] * past[-state_lag[i]];
+    for (int i = 0; i < N1; i++) next += a[i] * y[(k - state_lag[i]) % RING];
     if (u[(k - delay) % INPUTS]) {
         float gain = 0.008f;
-        for (int j = 0; j < N2; j++) gain += c[j] * past[-product_lag[j]];
+        for (int j = 0; j < N2; j++) gain += c[j] * y[(k - product_lag[j]) % RING];
         next += gain;
     }
-    sum += now - past[-(WINDOW - 1)];
+    sum += now - y[(k - (WINDOW - 1)) % RING];
     k++;
-    newest = (newest + 1) % RING;
-    y[newest] = next;
-    y[newest + RING] = next;
+    y[k % RING] = next;
     return now;
 }

@@ -206,7 +206,7 @@ mod tests {
     };
 
     fn controller() -> Controller<Law> {
-        let model = full::model();
+        let model = full::MODEL;
         let relay = Relay::new(
             model,
             full::state(&model),

@@ -5,7 +5,6 @@ mod bench_search;
 mod bench_step;
 mod budgets;
 mod ci;
-mod elf;
 mod faults;
 mod firmware;
 mod hidden_effects;
@@ -13,7 +12,6 @@ mod identified;
 mod pil;
 mod setup;
 mod shell;
-mod size;
 
 use std::process::ExitCode;
 
@@ -35,7 +33,6 @@ const TASKS: &[Task] = &[
     identified::TASK,
     pil::TASK,
     setup::TASK,
-    size::TASK,
 ];
 
 fn main() -> ExitCode {

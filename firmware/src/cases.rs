@@ -8,8 +8,6 @@ use crate::sensor::{Calibration, Range};
 use crate::tracking::Track;
 use identified::{averaged, effects, full};
 use model_core::average::MovingAverage;
-use model_core::control::budget::Budget;
-use model_core::control::{HoldTimes, Reachable, Tracking};
 use model_core::history::{BitHistory, DelayLine};
 
 /// How many cases there are.
@@ -56,31 +54,6 @@ pub fn step<L: Law>(controller: &mut Controller<L>, counts: u16) -> (f32, bool) 
 
 const _: () = assert!(BATCH <= 32, "decisions of a batch fit in 32 bits");
 
-/// The tracking law of the lockstep run: Table II held at 0.5, 20 ms hold times.
-const TRACKING: Tracking<f32> = Tracking {
-    reference: 0.5,
-    reachable: Reachable {
-        low: 0.0,
-        high: 1.0667,
-    },
-    slope: 0.0,
-    hold: HoldTimes { on: 20, off: 20 },
-    budget: Budget {
-        switches: None,
-        air: None,
-    },
-    lead: 47,
-    opening: 0,
-    closing: 0,
-    observer: 0.1,
-    bias_rate: 0.005,
-    integral_rate: 0.0,
-    correction_limit: 0.3,
-    residual_limit: 0.15,
-};
-/// Look-ahead of the law: longest delay and half a hold time.
-const AHEAD: usize = 96;
-
 type FullOutputs = DelayLine<f32, { full::OUTPUTS }>;
 type FullJets = BitHistory<{ full::WORDS }>;
 type Full = Relay<full::Identified, FullOutputs, FullJets, Direct>;
@@ -96,7 +69,7 @@ type Effects = Relay<
     DelayLine<f32, { effects::JETS }>,
     Direct,
 >;
-type Tracked = Track<full::Identified, FullOutputs, FullJets, AHEAD>;
+type Tracked = Track<full::Identified, FullOutputs, FullJets, { full::LOOK_AHEAD }>;
 
 /// All cases, each from rest when it is started.
 pub struct Rigs {
@@ -125,7 +98,7 @@ fn effects_rig() -> Controller<Effects> {
 
 fn law_rig() -> Controller<Tracked> {
     let model = full::model();
-    armed(Track::new(TRACKING, model, full::state(&model)))
+    armed(Track::new(full::LAW, model, full::state(&model)))
 }
 
 impl Rigs {

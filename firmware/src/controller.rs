@@ -206,7 +206,7 @@ mod tests {
     };
 
     fn controller() -> Controller<Law> {
-        let model = full::MODEL;
+        let model = full::model();
         let relay = Relay::new(
             model,
             full::state(&model),

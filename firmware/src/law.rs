@@ -165,7 +165,7 @@ mod tests {
             min_on: 15,
             min_off: 10,
         };
-        let model = full::MODEL;
+        let model = full::model();
         let mut relay = Relay::new(model, full::state(&model), Direct, settings);
         let mut seed = 7_u32;
         let (mut open, mut held, mut switches) = (false, u32::MAX, 0);

@@ -16,6 +16,7 @@ pub mod controller;
 pub mod fault;
 pub mod law;
 pub mod link;
+pub mod on_board;
 pub mod queue;
 pub mod rig;
 pub mod sensor;

@@ -84,3 +84,70 @@ where
         tick
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cases::{RELAY, SETTINGS};
+    use crate::fault::Fault;
+    use crate::law::{Direct, Relay};
+    use core::cell::Cell;
+    use core::convert::Infallible;
+    use embedded_hal::digital::ErrorType;
+    use identified::full;
+
+    struct Flicker(bool);
+    impl Sensor for Flicker {
+        fn counts(&mut self) -> f32 {
+            self.0 = !self.0;
+            SETTINGS.calibration.zero + if self.0 { 1.0 } else { 0.0 }
+        }
+    }
+
+    impl Clock for &Cell<u32> {
+        fn periods(&self) -> u32 {
+            self.get()
+        }
+    }
+
+    struct Pin<'a>(&'a Cell<bool>);
+    impl ErrorType for Pin<'_> {
+        type Error = Infallible;
+    }
+    impl OutputPin for Pin<'_> {
+        fn set_low(&mut self) -> Result<(), Infallible> {
+            self.0.set(false);
+            Ok(())
+        }
+        fn set_high(&mut self) -> Result<(), Infallible> {
+            self.0.set(true);
+            Ok(())
+        }
+    }
+
+    /// The board's clock has 32 bits: 49 days at 1 kHz.
+    #[test]
+    fn the_clock_wraps_and_a_missed_sample_is_seen_across_it() {
+        for (missed, expected) in [(0, Mode::Armed), (1, Mode::Faulted(Fault::Overrun))] {
+            let clock = Cell::new(u32::MAX - 100);
+            let (valve, lamp) = (Cell::new(true), Cell::new(true));
+            let model = full::model();
+            let relay = Relay::new(model, full::state(&model), Direct, RELAY);
+            let controller = Controller::new(SETTINGS, relay);
+            let mut rig = Rig::new(controller, Flicker(false), &clock, Pin(&valve), Pin(&lamp));
+            assert_eq!((valve.get(), lamp.get()), (false, false));
+            rig.controller().arm();
+            for _ in 0..100 {
+                clock.set(clock.get().wrapping_add(1));
+                assert!(rig.sample().open);
+                assert_eq!((valve.get(), lamp.get()), (true, true));
+            }
+            clock.set(clock.get().wrapping_add(1 + missed));
+            let tick = rig.sample();
+            assert_eq!(clock.get(), missed);
+            assert_eq!((tick.mode, tick.open), (expected, missed == 0));
+            assert_eq!((valve.get(), lamp.get()), (tick.open, tick.open));
+            assert_eq!(rig.controller().samples(), 101 + u64::from(missed));
+        }
+    }
+}

@@ -4,7 +4,7 @@ use crate::law::{Action, Law};
 use model_core::control::{Tracking, TrackingState};
 use model_core::history::Memory;
 use model_core::model::StateOf;
-use model_core::{Effect, Input, Parts, step};
+use model_core::{Input, Parts, step};
 
 /// The tracking law with its model and a look-ahead memory of `A` samples.
 #[derive(Clone)]
@@ -12,6 +12,9 @@ pub struct Track<M: Parts<f32>, Y, J, const A: usize> {
     law: Tracking<f32>,
     model: M,
     state: TrackingState<f32, StateOf<f32, M, Y, J>, A>,
+    /// The model left to itself. The law's own follows the sensor, also one that
+    /// is ill.
+    alone: StateOf<f32, M, Y, J>,
     /// Whether the law has been idle: its memory is of another time.
     stale: bool,
 }
@@ -21,14 +24,31 @@ where
     M: Parts<f32>,
     Y: Memory<f32>,
     J: Memory<f32>,
+    StateOf<f32, M, Y, J>: Clone,
 {
     /// The law at rest with the model in `state`.
     pub fn new(law: Tracking<f32>, model: M, state: StateOf<f32, M, Y, J>) -> Self {
         Self {
-            state: law.start(state),
+            state: law.start(state.clone()),
             law,
             model,
+            alone: state,
             stale: false,
+        }
+    }
+
+    /// What the model by itself says of a sample, and how far `y` is from it.
+    #[inline]
+    fn issue(&mut self, open: bool, y: f32) -> Action {
+        let input = Input {
+            command: if open { 1.0 } else { 0.0 },
+            channels: &[],
+        };
+        let predicted = step(&self.model, &mut self.alone, &input).measured;
+        Action {
+            open,
+            predicted,
+            residual: y - predicted,
         }
     }
 }
@@ -36,37 +56,23 @@ where
 impl<M, Y, J, const A: usize> Law for Track<M, Y, J, A>
 where
     M: Parts<f32>,
-    Y: Memory<f32> + Clone,
-    J: Memory<f32> + Clone,
-    <M::Delay as model_core::delay::DelayLaw<f32>>::State: Clone,
-    <M::Effects as Effect<f32>>::State: Clone,
+    Y: Memory<f32>,
+    J: Memory<f32>,
+    StateOf<f32, M, Y, J>: Clone,
 {
     #[inline]
     fn act(&mut self, y: f32) -> Action {
         if self.stale {
             self.stale = false;
-            self.state = self.law.start(self.state.model.clone());
+            self.state = self.law.start(self.alone.clone());
         }
         let decision = self.law.step(&self.model, &mut self.state, Some(y), &[]);
-        Action {
-            open: decision.on,
-            predicted: decision.estimate,
-            residual: decision.residual,
-        }
+        self.issue(decision.on, y)
     }
 
     #[inline]
     fn idle(&mut self, y: f32) -> Action {
         self.stale = true;
-        let input = Input {
-            command: 0.0,
-            channels: &[],
-        };
-        let predicted = step(&self.model, &mut self.state.model, &input).measured;
-        Action {
-            open: false,
-            predicted,
-            residual: y - predicted,
-        }
+        self.issue(false, y)
     }
 }

@@ -66,6 +66,13 @@ impl<T: Real> WindowSum<T> {
         }
     }
 
+    /// Moves the window on by one sample for a look ahead: cheaper than
+    /// [`slide`](Self::slide), and good for less than a window's length.
+    #[inline]
+    pub(crate) fn lean(&mut self, entering: T, leaving: T) {
+        self.running.low = self.running.low + (entering - leaving);
+    }
+
     /// The sum over the window.
     #[inline]
     #[must_use]

@@ -69,6 +69,13 @@ pub trait DelayLaw<T: Real> {
         T::ZERO
     }
 
+    /// The shortest and the longest tap of input `l` for outputs that are
+    /// numbers ≥ 0, where all its taps are on samples and that is known.
+    #[inline]
+    fn range(&self, _l: usize) -> Option<(usize, usize)> {
+        None
+    }
+
     /// The tap of input `l`, from what [`evaluate`](Self::evaluate) gave.
     fn tap(&self, l: usize, evaluated: T) -> Tap<T>;
 }

@@ -11,9 +11,15 @@ pub trait Past<T> {
 }
 
 /// A past that grows by one sample at a time.
-pub trait Memory<T>: Past<T> {
+pub trait Memory<T>: Past<T> + Clone {
     /// Makes `value` the newest sample.
     fn push(&mut self, value: T);
+    /// The value of all samples from lag `from` to lag `to` where they are known,
+    /// at little cost, to be equal.
+    #[inline]
+    fn steady(&self, _from: usize, _to: usize) -> Option<T> {
+        None
+    }
     /// How many samples are kept: `back` reaches lags below this.
     fn capacity(&self) -> usize;
     /// Mean of `window` samples, the newest of them `lag` back: eq. (13) for a
@@ -31,9 +37,13 @@ pub trait Memory<T>: Past<T> {
 }
 
 /// Ring buffer of the last `LEN` samples.
+///
+/// Every sample is kept twice, `LEN` apart, so that the past lies in one piece
+/// behind the newest sample and a constant lag is a constant offset: no index to
+/// wrap for each of the twenty lags that a step reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DelayLine<T, const LEN: usize> {
-    samples: [T; LEN],
+    samples: [[T; LEN]; 2],
     newest: usize,
 }
 
@@ -43,7 +53,7 @@ impl<T: Real, const LEN: usize> DelayLine<T, LEN> {
     pub const fn new() -> Self {
         const { assert!(LEN > 0, "a delay line holds at least one sample") };
         Self {
-            samples: [T::ZERO; LEN],
+            samples: [[T::ZERO; LEN]; 2],
             newest: 0,
         }
     }
@@ -61,15 +71,10 @@ impl<T: Real, const LEN: usize> Past<T> for DelayLine<T, LEN> {
         if lag >= LEN {
             return T::ZERO;
         }
-        // One mask where the length allows: the step reads some twenty lags.
-        let index = if LEN.is_power_of_two() {
-            self.newest.wrapping_sub(lag) & (LEN - 1)
-        } else if lag <= self.newest {
-            self.newest - lag
-        } else {
-            self.newest + LEN - lag
-        };
-        self.samples.get(index).copied().unwrap_or(T::ZERO)
+        // `newest` is below LEN; said once more, the check of the bounds goes.
+        let index = self.newest.min(LEN - 1) + LEN - lag;
+        let samples = self.samples.as_flattened();
+        samples.get(index).copied().unwrap_or(T::ZERO)
     }
 }
 
@@ -81,8 +86,10 @@ impl<T: Real, const LEN: usize> Memory<T> for DelayLine<T, LEN> {
         } else {
             0
         };
-        if let Some(slot) = self.samples.get_mut(self.newest) {
-            *slot = value;
+        for half in &mut self.samples {
+            if let Some(slot) = half.get_mut(self.newest) {
+                *slot = value;
+            }
         }
     }
     #[inline]
@@ -93,16 +100,18 @@ impl<T: Real, const LEN: usize> Memory<T> for DelayLine<T, LEN> {
 
 /// On/off history, one bit per sample: 32·`WORDS` samples.
 ///
-/// The 6 411-sample input delay of the paper's Table IV needs 201 words.
+/// Up to 64 samples are a shift register, the newest the lowest bit; more are a
+/// ring. The 6 411-sample input delay of the paper's Table IV needs 201 words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BitHistory<const WORDS: usize> {
     words: [u32; WORDS],
-    /// Position of the newest bit.
+    /// Position of the newest bit of a ring.
     newest: usize,
 }
 
 impl<const WORDS: usize> BitHistory<WORDS> {
     const BITS: usize = WORDS * 32;
+    const SHIFTS: bool = WORDS <= 2;
 
     /// A command that has always been off.
     #[must_use]
@@ -140,8 +149,11 @@ impl<const WORDS: usize> BitHistory<WORDS> {
         if lag >= Self::BITS {
             return 0;
         }
-        // Newest first, a word at a time: bits at and below `position`.
         let mut left = (window as usize).min(Self::BITS - lag);
+        if Self::SHIFTS {
+            return (lag..lag + left).filter(|lag| self.is_on(*lag)).count() as u32;
+        }
+        // Newest first, a word at a time: bits at and below `position`.
         let mut position = self.position(lag);
         let mut count = 0;
         while left > 0 {
@@ -163,7 +175,9 @@ impl<const WORDS: usize> BitHistory<WORDS> {
 
     #[inline]
     fn position(&self, lag: usize) -> usize {
-        if lag <= self.newest {
+        if Self::SHIFTS {
+            lag
+        } else if lag <= self.newest {
             self.newest - lag
         } else {
             self.newest + Self::BITS - lag
@@ -173,6 +187,15 @@ impl<const WORDS: usize> BitHistory<WORDS> {
     /// Makes `on` the newest sample.
     #[inline]
     pub fn record(&mut self, on: bool) {
+        if Self::SHIFTS {
+            let mut entering = u32::from(on);
+            for word in &mut self.words {
+                let leaving = *word >> 31;
+                *word = *word << 1 | entering;
+                entering = leaving;
+            }
+            return;
+        }
         self.newest = if self.newest + 1 < Self::BITS {
             self.newest + 1
         } else {
@@ -205,7 +228,21 @@ impl<T: Real, const WORDS: usize> Past<T> for BitHistory<WORDS> {
 impl<T: Real, const WORDS: usize> Memory<T> for BitHistory<WORDS> {
     #[inline]
     fn push(&mut self, value: T) {
-        self.record(value.value() > 0.5);
+        self.record(value > T::from_f64(0.5));
+    }
+    #[inline]
+    fn steady(&self, from: usize, to: usize) -> Option<T> {
+        if !Self::SHIFTS || from > to || to >= Self::BITS {
+            return None;
+        }
+        let words = self.words.iter().rev();
+        let all = words.fold(0_u64, |all, word| all << 32 | u64::from(*word));
+        let mask = u64::MAX >> (63 - (to - from));
+        match all >> from & mask {
+            0 => Some(T::ZERO),
+            part if part == mask => Some(T::ONE),
+            _ => None,
+        }
     }
     #[inline]
     fn capacity(&self) -> usize {
@@ -219,20 +256,6 @@ impl<T: Real, const WORDS: usize> Memory<T> for BitHistory<WORDS> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_line_whose_length_is_a_power_of_two_is_no_different() {
-        let mut masked = DelayLine::<f32, 8>::new();
-        let mut long = DelayLine::<f32, 9>::new();
-        for k in 1..=40 {
-            masked.push(k as f32);
-            long.push(k as f32);
-            for lag in 0..8 {
-                assert_eq!(masked.back(lag), long.back(lag), "{k} {lag}");
-            }
-            assert_eq!(masked.back(8), 0.0);
-        }
-    }
 
     #[test]
     fn a_line_remembers_its_length_and_no_more() {
@@ -250,8 +273,13 @@ mod tests {
 
     #[test]
     fn bits_agree_with_a_line_of_numbers() {
-        let mut bits = BitHistory::<3>::new();
-        let mut line = DelayLine::<f64, 96>::new();
+        bits_agree::<3, 96>();
+        bits_agree::<2, 64>();
+    }
+
+    fn bits_agree<const WORDS: usize, const BITS: usize>() {
+        let mut bits = BitHistory::<WORDS>::new();
+        let mut line = DelayLine::<f64, BITS>::new();
         let mut seed = 1_u32;
         for _ in 0..500 {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -260,6 +288,11 @@ mod tests {
             line.push(f64::from(u8::from(on)));
             for lag in [0, 1, 31, 32, 33, 63, 64, 95, 96, 200] {
                 assert_eq!(Past::<f64>::back(&bits, lag), line.back(lag), "lag {lag}");
+                for to in lag..(lag + 6).min(BITS) {
+                    let equal = (lag..=to).all(|i| line.back(i) == line.back(lag));
+                    let expected = (equal && BITS <= 64).then(|| line.back(lag));
+                    assert_eq!(Memory::<f64>::steady(&bits, lag, to), expected);
+                }
                 for window in [1, 2, 31, 32, 33, 64, 90, 96] {
                     let direct: f64 = (0..window as usize).map(|i| line.back(lag + i)).sum();
                     assert_eq!(

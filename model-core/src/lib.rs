@@ -21,6 +21,7 @@ pub mod control;
 pub mod delay;
 pub mod effect;
 pub mod effects;
+pub mod frozen;
 pub mod history;
 pub mod model;
 pub mod real;

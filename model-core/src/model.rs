@@ -3,9 +3,9 @@
 use crate::average::WindowSum;
 use crate::delay::DelayLaw;
 use crate::effect::{Effect, Flow, Instant};
-use crate::history::{BitHistory, DelayLine, Memory};
+use crate::history::{BitHistory, DelayLine, Memory, Past};
 use crate::real::Real;
-use crate::recursion::{Bilinear, Grading, LagConvention};
+use crate::recursion::{Bilinear, Grading, Known, LagConvention};
 use nalgebra::{ArrayStorage, SMatrix, SVector};
 
 /// How outputs and inputs are averaged.
@@ -129,7 +129,8 @@ where
     }
 }
 
-/// How often a state-dependent delay had to be clamped (counts saturate).
+/// How often a state-dependent delay that was asked had to be clamped (counts
+/// saturate).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clamps {
     /// The averaged output was below 0 and was taken as 0.
@@ -192,12 +193,6 @@ where
         }
     }
 
-    /// ỹ_k of eq. (1): the W − 1 outputs before y_k, divided by W.
-    #[inline]
-    pub fn averaged_output(&self, window: u32) -> T {
-        self.average.value() / T::from_count(window)
-    }
-
     /// Makes `flow` the newest output s_{k+1}: what [`step`] does with its own
     /// prediction, or a measurement takes the place of.
     #[inline]
@@ -237,7 +232,7 @@ pub struct Output<T> {
 ///
 /// Call [`State::advance`] afterwards, with `next` for a free run or with a
 /// measurement for one-step prediction.
-#[inline]
+#[inline(always)]
 pub fn observe<T, M, Y, J>(
     model: &M,
     state: &mut StateOf<T, M, Y, J>,
@@ -247,6 +242,28 @@ where
     T: Real,
     M: Parts<T>,
     Y: Memory<T>,
+    J: Memory<T>,
+{
+    observe_delay(model, state, input, 0, (&Known::NOTHING, usize::MAX)).0
+}
+
+/// [`observe`], and the shortest of the input delays. The delay may come out too
+/// short where it is longer than `within`: where the command has not changed for
+/// as long as delays differ, the same is read whichever it is, and the delay law
+/// is not asked. Of the recursion's terms those that are known are given, with
+/// the lag from which on they are.
+#[inline(always)]
+pub(crate) fn observe_delay<T, M, Y, J>(
+    model: &M,
+    state: &mut StateOf<T, M, Y, J>,
+    input: &Input<'_, T>,
+    within: usize,
+    (known, horizon): (&Known<T>, usize),
+) -> (Output<T>, usize)
+where
+    T: Real,
+    M: Parts<T>,
+    Y: Past<T>,
     J: Memory<T>,
 {
     let (law, effects, averaging) = (model.delay(), model.effects(), model.averaging());
@@ -262,49 +279,25 @@ where
     let jet = effects.jet(&mut state.effects, command, &at);
     state.jets.push(jet);
 
-    let follows = if averaging.averaged_model {
-        flow
-    } else {
-        state.averaged_output(averaging.window)
-    };
-    if follows < T::ZERO {
-        state.clamps.below_zero = state.clamps.below_zero.saturating_add(1);
-    }
-    let evaluated = law.evaluate(follows.at_least(T::ZERO));
-    let jets = &state.jets;
-    let farthest = jets
-        .capacity()
-        .saturating_sub(1 + usize::from(M::Delay::INTERPOLATES));
-    let mut beyond = false;
-    // What drives the flow until the next sample, and what is there now: the
-    // newest jet of a tap between samples arrives only on the way.
-    let mut both = |l: usize| {
-        let tap = law.tap(l, evaluated);
-        beyond |= tap.whole > farthest;
-        let whole = tap.whole.min(farthest);
-        let read = |lag| {
-            if averaging.averaged_model {
-                jets.mean_back(lag, averaging.window)
-            } else {
-                jets.back(lag)
-            }
-        };
-        let newer = read(whole);
-        if M::Delay::INTERPOLATES && tap.fraction > T::ZERO {
-            let older = read(whole + 1);
-            (newer + tap.fraction * (older - newer), older)
-        } else {
-            (newer, newer)
-        }
+    let mut arriving = Arriving {
+        law,
+        jets: &state.jets,
+        averaging,
+        flow,
+        average: &state.average,
+        within,
+        evaluated: None,
+        nearest: usize::MAX,
+        below_zero: false,
+        beyond: false,
     };
 
-    (at.arrived, at.present) = both(0);
-    let mut arriving = |l: usize| both(l).0;
+    (at.arrived, at.present) = arriving.jet(0);
     let measured = effects.sense(&mut state.effects, flow, &at);
     let recursion = model.recursion();
     let first = at.arrived;
-    let mut strength = |l: usize| if l == 0 { first } else { arriving(l) };
-    let mut next = recursion.next(&state.outputs, &mut strength);
+    let mut strength = |l: usize| if l == 0 { first } else { arriving.jet(l).0 };
+    let mut next = recursion.next_from(known, horizon, &state.outputs, &mut strength);
     if effects.drives() {
         let flow = Flow {
             now: flow,
@@ -314,14 +307,98 @@ where
         };
         next = next + effects.drive(&mut state.effects, &flow, &at);
     }
+    let nearest = arriving.nearest;
+    let (below_zero, beyond) = (arriving.below_zero, arriving.beyond);
+    if below_zero {
+        state.clamps.below_zero = state.clamps.below_zero.saturating_add(1);
+    }
     if beyond {
         state.clamps.beyond_memory = state.clamps.beyond_memory.saturating_add(1);
     }
-    Output {
+    let output = Output {
         measured,
         flow,
         next,
         arrived: at.arrived,
+    };
+    (output, nearest)
+}
+
+/// What arrives at the flow through the input delays at a sample.
+struct Arriving<'a, T, L, J> {
+    law: &'a L,
+    jets: &'a J,
+    averaging: Averaging,
+    flow: T,
+    average: &'a WindowSum<T>,
+    /// Delays need only be exact up to this one.
+    within: usize,
+    /// What the delay law says, once it was asked.
+    evaluated: Option<T>,
+    /// The shortest delay met.
+    nearest: usize,
+    /// Whether the delay law followed a negative output.
+    below_zero: bool,
+    /// Whether a delay reached beyond the memory.
+    beyond: bool,
+}
+
+impl<T: Real, L: DelayLaw<T>, J: Memory<T>> Arriving<'_, T, L, J> {
+    /// What drives the flow until the next sample through input delay `l`, and
+    /// what is there now: the newest jet of a tap between samples arrives only on
+    /// the way.
+    #[inline(always)]
+    fn jet(&mut self, l: usize) -> (T, T) {
+        let kept = self.jets.capacity();
+        let farthest = kept.saturating_sub(1 + usize::from(L::INTERPOLATES));
+        if !self.averaging.averaged_model
+            && let Some((shortest, longest)) = self.law.range(l)
+            && shortest > self.within
+            && longest <= farthest
+            && let Some(level) = self.jets.steady(shortest, longest)
+        {
+            self.nearest = self.nearest.min(shortest);
+            return (level, level);
+        }
+        let evaluated = match self.evaluated {
+            Some(evaluated) => evaluated,
+            None => self.evaluate(),
+        };
+        let tap = self.law.tap(l, evaluated);
+        self.beyond |= tap.whole > farthest;
+        let whole = tap.whole.min(farthest);
+        self.nearest = self.nearest.min(whole);
+        let newer = self.read(whole);
+        if L::INTERPOLATES && tap.fraction > T::ZERO {
+            let older = self.read(whole + 1);
+            (newer + tap.fraction * (older - newer), older)
+        } else {
+            (newer, newer)
+        }
+    }
+
+    /// Asks the delay law, which follows ỹ_k of eq. (1): the W − 1 outputs before
+    /// y_k, divided by W; an averaged model's output itself.
+    #[inline(always)]
+    fn evaluate(&mut self) -> T {
+        let follows = if self.averaging.averaged_model {
+            self.flow
+        } else {
+            self.average.value() / T::from_count(self.averaging.window)
+        };
+        self.below_zero = follows < T::ZERO;
+        let evaluated = self.law.evaluate(follows.at_least(T::ZERO));
+        self.evaluated = Some(evaluated);
+        evaluated
+    }
+
+    #[inline(always)]
+    fn read(&self, lag: usize) -> T {
+        if self.averaging.averaged_model {
+            self.jets.mean_back(lag, self.averaging.window)
+        } else {
+            self.jets.back(lag)
+        }
     }
 }
 

@@ -88,41 +88,119 @@ pub struct Bilinear<'a, T> {
     pub c: &'a [T],
 }
 
+/// Sums over terms of [`Bilinear::next`] that are known before the others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Known<T> {
+    /// Of the a_i y_{k−τ_i}.
+    pub free: T,
+    /// Of the c_j1 y_{k−τ̄_j}, the first input's.
+    pub gain: T,
+}
+
+impl<T: Real> Known<T> {
+    /// No term is known.
+    pub const NOTHING: Self = Self {
+        free: T::ZERO,
+        gain: T::ZERO,
+    };
+}
+
 impl<T: Real> Bilinear<'_, T> {
+    /// The terms with lags of `horizon` samples and more, `ahead` samples from
+    /// now (less than `horizon`): they read what has happened already.
+    #[inline(always)]
+    pub fn known(&self, y: &impl Past<T>, horizon: usize, ahead: usize) -> Known<T> {
+        let mut known = Known::NOTHING;
+        for (a, lag) in self.a.iter().zip(self.state_lags) {
+            let lag = self.convention.behind_newest(*lag);
+            if lag >= horizon {
+                known.free = known.free + *a * y.back(lag - ahead);
+            }
+        }
+        for (c, lag) in self.column(0).iter().zip(self.product_lags) {
+            let lag = self.convention.behind_newest(*lag);
+            if lag >= horizon {
+                known.gain = known.gain + *c * y.back(lag - ahead);
+            }
+        }
+        known
+    }
+
     /// y_{k+1}; `y` reads y_k at lag 0 and `arriving(l)` is j_l.
     ///
     /// The terms are added in the order in which they are written in eq. (3).
-    #[inline]
-    pub fn next(&self, y: &impl Past<T>, mut arriving: impl FnMut(usize) -> T) -> T {
-        let mut next = self.constant;
+    #[inline(always)]
+    pub fn next(&self, y: &impl Past<T>, arriving: impl FnMut(usize) -> T) -> T {
+        self.next_from(&Known::NOTHING, usize::MAX, y, arriving)
+    }
+
+    /// [`next`](Self::next) where the terms with lags of `horizon` samples and more
+    /// are `known`; they are added first.
+    #[inline(always)]
+    pub fn next_from(
+        &self,
+        known: &Known<T>,
+        horizon: usize,
+        y: &impl Past<T>,
+        mut arriving: impl FnMut(usize) -> T,
+    ) -> T {
+        let mut next = self.constant + known.free;
         for (a, lag) in self.a.iter().zip(self.state_lags) {
-            next = next + *a * y.back(self.convention.behind_newest(*lag));
+            let lag = self.convention.behind_newest(*lag);
+            if lag < horizon {
+                next = next + *a * y.back(lag);
+            }
         }
         if self.grading != Grading::Proportional {
-            return self.graded(next, y, arriving);
+            return self.graded(next, known, horizon, y, arriving);
         }
-        let mut c = self.c;
-        for (l, b) in self.b.iter().enumerate() {
-            let (column, rest) = c
-                .split_at_checked(self.product_lags.len())
-                .unwrap_or((c, &[]));
-            c = rest;
+        for l in 0..self.b.len() {
             let jet = arriving(l);
             // An exact zero, value and derivatives, adds nothing.
             if jet == T::ZERO {
                 continue;
             }
-            let mut gain = *b;
-            for (c, lag) in column.iter().zip(self.product_lags) {
-                gain = gain + *c * y.back(self.convention.behind_newest(*lag));
-            }
+            let drive = self.b.get(l).copied().unwrap_or(T::ZERO);
+            let gain = self.products(l, drive, known, horizon, y);
             next = next + gain * jet;
         }
         next
     }
 
+    /// `start` + Σ_j c_jl y_{k−τ̄_j}.
+    #[inline(always)]
+    fn products(
+        &self,
+        l: usize,
+        start: T,
+        known: &Known<T>,
+        horizon: usize,
+        y: &impl Past<T>,
+    ) -> T {
+        // Only the first input's sums are known.
+        let (mut gain, horizon) = if l == 0 {
+            (start + known.gain, horizon)
+        } else {
+            (start, usize::MAX)
+        };
+        for (c, lag) in self.column(l).iter().zip(self.product_lags) {
+            let lag = self.convention.behind_newest(*lag);
+            if lag < horizon {
+                gain = gain + *c * y.back(lag);
+            }
+        }
+        gain
+    }
+
     /// The inputs' part of [`next`](Self::next) where it is not proportional.
-    fn graded(&self, free: T, y: &impl Past<T>, mut arriving: impl FnMut(usize) -> T) -> T {
+    fn graded(
+        &self,
+        free: T,
+        known: &Known<T>,
+        horizon: usize,
+        y: &impl Past<T>,
+        mut arriving: impl FnMut(usize) -> T,
+    ) -> T {
         let rate = self.relaxation(&mut arriving);
         let mut next = free;
         for (l, b) in self.b.iter().enumerate() {
@@ -130,12 +208,11 @@ impl<T: Real> Bilinear<'_, T> {
             if jet == T::ZERO {
                 continue;
             }
-            let mut gain = T::ZERO;
-            let mut full = self.state_relaxation();
-            for (c, lag) in self.column(l).zip(self.product_lags) {
-                gain = gain + *c * y.back(self.convention.behind_newest(*lag));
-                full = full - *c;
-            }
+            let gain = self.products(l, T::ZERO, known, horizon, y);
+            let full = self
+                .column(l)
+                .iter()
+                .fold(self.state_relaxation(), |full, c| full - *c);
             next = next + gain * self.grading.share(jet) + *b * jet * rate / full;
         }
         next
@@ -161,8 +238,9 @@ impl<T: Real> Bilinear<'_, T> {
     }
 
     /// c_jl for input l.
-    fn column(&self, l: usize) -> impl Iterator<Item = &T> {
+    #[inline]
+    fn column(&self, l: usize) -> &[T] {
         let lags = self.product_lags.len();
-        self.c.iter().skip(l * lags).take(lags)
+        self.c.get(l * lags..(l + 1) * lags).unwrap_or(&[])
     }
 }

@@ -1,9 +1,10 @@
 //! Builds the programs for the boards.
 
 use crate::Task;
+use crate::elf::{Elf, Section};
 use crate::setup::{TARGETS, cross_cargo};
 use crate::shell::{command, firmware_target, root, run};
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -81,33 +82,10 @@ pub(crate) struct Size {
 
 /// Flash and RAM of an ELF file, from its section headers.
 pub(crate) fn size(elf: &Path) -> Result<Size> {
-    let bytes = std::fs::read(elf).with_context(|| format!("could not read {}", elf.display()))?;
-    sections(&bytes).with_context(|| format!("{} is no 32-bit ELF file", elf.display()))
-}
-
-fn sections(elf: &[u8]) -> Option<Size> {
-    let half = |at: usize| Some(u16::from_le_bytes(elf.get(at..at + 2)?.try_into().ok()?));
-    let word = |at: usize| Some(u32::from_le_bytes(elf.get(at..at + 4)?.try_into().ok()?));
-    if elf.get(..5)? != b"\x7fELF\x01" {
-        return None;
-    }
-    let (table, entry, count) = (word(0x20)? as usize, half(0x2E)?, half(0x30)?);
-    let mut size = Size { flash: 0, ram: 0 };
-    for i in 0..usize::from(count) {
-        let at = table + i * usize::from(entry);
-        let (kind, flags, bytes) = (word(at + 4)?, word(at + 8)?, u64::from(word(at + 20)?));
-        const ALLOCATED: u32 = 2;
-        const WRITABLE: u32 = 1;
-        const WITHOUT_BYTES: u32 = 8;
-        if flags & ALLOCATED == 0 {
-            continue;
-        }
-        if kind != WITHOUT_BYTES {
-            size.flash += bytes;
-        }
-        if flags & WRITABLE != 0 {
-            size.ram += bytes;
-        }
-    }
-    Some(size)
+    let sections = Elf::read(elf)?.sections;
+    let sum = |of: fn(&Section) -> bool| sections.iter().filter(|s| of(s)).map(|s| s.size).sum();
+    Ok(Size {
+        flash: sum(|section| section.stored),
+        ram: sum(|section| section.writable),
+    })
 }

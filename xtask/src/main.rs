@@ -5,6 +5,7 @@ mod bench_search;
 mod bench_step;
 mod budgets;
 mod ci;
+mod elf;
 mod faults;
 mod firmware;
 mod hidden_effects;
@@ -12,6 +13,7 @@ mod identified;
 mod pil;
 mod setup;
 mod shell;
+mod size;
 
 use std::process::ExitCode;
 
@@ -33,6 +35,7 @@ const TASKS: &[Task] = &[
     identified::TASK,
     pil::TASK,
     setup::TASK,
+    size::TASK,
 ];
 
 fn main() -> ExitCode {

@@ -7,14 +7,15 @@
 use model_core::checks;
 use model_core::control::{HoldTimes, PulseTrain};
 use model_core::delay::FixedDelay;
+use model_core::frozen::{self, Frozen};
 use model_core::model::{Averaging, OnOffState, Params, Parts, matrix, vector};
 use model_core::recursion::{Grading, LagConvention};
 use model_core::self_test::Golden;
 
 /// Sample period, s.
 pub const SAMPLE_PERIOD_S: f32 = 0.001;
-/// Outputs kept: more than the longest lag and the averaging window; a power of two.
-pub const OUTPUTS: usize = 512;
+/// Outputs kept: more than the longest lag, and no less than the averaging window.
+pub const OUTPUTS: usize = 307;
 /// Commands kept, in words of 32: more than the longest input delay.
 pub const WORDS: usize = 21;
 /// Measured channels that the effects need, in the order in which they are passed.
@@ -26,8 +27,10 @@ pub const REFERENCES: [f32; 0] = [];
 pub type Delay = FixedDelay<[u16; 2]>;
 /// The effects, in the order of the physics.
 pub type Effects = ();
-/// The model: N1, N2, N3 as identified.
-pub type Identified = Params<f32, 2, 2, 2, Delay, Effects>;
+/// Structure, coefficients and delay law: N1, N2, N3 as identified.
+pub type Base = Params<f32, 2, 2, 2, Delay, ()>;
+/// The model: its constants are part of the code.
+pub type Identified = Frozen<Constants, Effects>;
 /// What the model remembers.
 pub type IdentifiedState = OnOffState<f32, OUTPUTS, WORDS, Identified>;
 
@@ -83,8 +86,8 @@ const _: () = {
     );
 };
 
-/// The model.
-pub const MODEL: Identified = Params {
+/// Structure, coefficients and delay law.
+pub const BASE: Base = Params {
     convention: CONVENTION,
     grading: GRADING,
     averaging: Averaging {
@@ -101,10 +104,19 @@ pub const MODEL: Identified = Params {
     effects: (),
 };
 
+/// Where the model finds its constants.
+#[derive(Clone, Copy, Debug)]
+pub struct Constants;
+
+impl frozen::Constants<f32> for Constants {
+    type Base = Base;
+    const BASE: &'static Base = &BASE;
+}
+
 /// The model.
 #[must_use]
 pub const fn model() -> Identified {
-    MODEL
+    Frozen::new(())
 }
 
 /// The state at rest.

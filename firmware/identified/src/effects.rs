@@ -14,16 +14,17 @@ use model_core::effects::AmplitudeSaturation;
 use model_core::effects::HotFilmNonlinearity;
 use model_core::effects::StateDependentDelay;
 use model_core::effects::ValveLag;
+use model_core::frozen::{self, Frozen};
 use model_core::model::{Averaging, GradedState, Params, Parts, matrix, vector};
 use model_core::recursion::{Grading, LagConvention};
 use model_core::self_test::Golden;
 
 /// Sample period, s.
 pub const SAMPLE_PERIOD_S: f32 = 0.001;
-/// Outputs kept: more than the longest lag and the averaging window; a power of two.
-pub const OUTPUTS: usize = 512;
-/// Jet strengths kept: more than the longest input delay; a power of two.
-pub const JETS: usize = 64;
+/// Outputs kept: more than the longest lag, and no less than the averaging window.
+pub const OUTPUTS: usize = 500;
+/// Jet strengths kept: more than the longest input delay.
+pub const JETS: usize = 63;
 /// Measured channels that the effects need, in the order in which they are passed.
 pub const CHANNELS: [&str; 0] = [];
 /// Usual values of the channels, in their units.
@@ -39,8 +40,10 @@ pub type Effect3 = HotFilmNonlinearity<f32>;
 pub type Delay = StateDependentDelay<f32, [f32; 1]>;
 /// The effects, in the order of the physics.
 pub type Effects = (Effect1, (Effect2, (Effect3, ())));
-/// The model: N1, N2, N3 as identified.
-pub type Identified = Params<f32, 5, 10, 1, Delay, Effects>;
+/// Structure, coefficients and delay law: N1, N2, N3 as identified.
+pub type Base = Params<f32, 5, 10, 1, Delay, ()>;
+/// The model: its constants are part of the code.
+pub type Identified = Frozen<Constants, Effects>;
 /// What the model remembers.
 pub type IdentifiedState = GradedState<f32, OUTPUTS, JETS, Identified>;
 
@@ -107,30 +110,42 @@ const _: () = {
     );
 };
 
+/// Structure, coefficients and delay law.
+pub const BASE: Base = Params {
+    convention: CONVENTION,
+    grading: GRADING,
+    averaging: Averaging {
+        window: WINDOW,
+        averaged_model: false,
+    },
+    constant: CONSTANT,
+    state_lags: STATE_LAGS,
+    a: vector(A),
+    product_lags: PRODUCT_LAGS,
+    b: vector(B),
+    c: matrix([C1]),
+    delay: StateDependentDelay {
+        floor: DELAY_FLOOR,
+        rise: DELAY_RISE,
+        rate: DELAY_RATE,
+        factors: DELAY_FACTORS,
+    },
+    effects: (),
+};
+
+/// Where the model finds its constants.
+#[derive(Clone, Copy, Debug)]
+pub struct Constants;
+
+impl frozen::Constants<f32> for Constants {
+    type Base = Base;
+    const BASE: &'static Base = &BASE;
+}
+
 /// The model, its effects prepared for the sample period.
 #[must_use]
 pub fn model() -> Identified {
-    Params {
-        convention: CONVENTION,
-        grading: GRADING,
-        averaging: Averaging {
-            window: WINDOW,
-            averaged_model: false,
-        },
-        constant: CONSTANT,
-        state_lags: STATE_LAGS,
-        a: vector(A),
-        product_lags: PRODUCT_LAGS,
-        b: vector(B),
-        c: matrix([C1]),
-        delay: StateDependentDelay {
-            floor: DELAY_FLOOR,
-            rise: DELAY_RISE,
-            rate: DELAY_RATE,
-            factors: DELAY_FACTORS,
-        },
-        effects: effects(),
-    }
+    Frozen::new(effects())
 }
 
 const SETTING: Setting<f32> = Setting {
@@ -197,7 +212,7 @@ pub const GOLDEN: Golden<32> = Golden {
 pub const FIRST_ARRIVAL: usize =
     (checks::smallest(&DELAY_FACTORS) * (DELAY_FLOOR + DELAY_RISE.max(0.0)) + 0.5) as usize;
 /// Samples that the law looks ahead at most.
-pub const LOOK_AHEAD: usize = 78;
+pub const LOOK_AHEAD: usize = 82;
 /// The law: it holds the friction at its reference.
 pub const LAW: Tracking<f32> = Tracking {
     reference: 0.6,
@@ -206,7 +221,7 @@ pub const LAW: Tracking<f32> = Tracking {
         high: 0.9139403,
     },
     slope: 0.002,
-    hold: HoldTimes { on: 18, off: 15 },
+    hold: HoldTimes { on: 10, off: 25 },
     budget: Budget {
         switches: Some(Switches {
             samples_per_switch: 25,
@@ -220,11 +235,11 @@ pub const LAW: Tracking<f32> = Tracking {
     lead: 47,
     opening: 2,
     closing: 6,
-    observer: 0.0056497175,
-    bias_rate: 0.0006382979,
+    observer: 0.03,
+    bias_rate: 0.0021276595,
     integral_rate: 0.0008510638,
     correction_limit: 0.27418208,
-    residual_limit: 0.9139403,
+    residual_limit: 0.22848508,
 };
 /// What the law remembers, its model included.
 pub type LawState = TrackingState<f32, IdentifiedState, LOOK_AHEAD>;
@@ -249,5 +264,5 @@ pub fn law_state(model: &Identified) -> LawState {
 /// What the law decides in its golden run, bit for bit, as the host computed it.
 pub const LAW_GOLDEN: GoldenLaw = GoldenLaw {
     samples: 4096,
-    expected: 0x634e_7712,
+    expected: 0x9100_0b9e,
 };

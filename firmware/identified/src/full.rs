@@ -10,14 +10,15 @@ use model_core::control::budget::Budget;
 use model_core::control::golden::GoldenLaw;
 use model_core::control::{HoldTimes, Reachable, Tracking, TrackingState};
 use model_core::effects::StateDependentDelay;
+use model_core::frozen::{self, Frozen};
 use model_core::model::{Averaging, OnOffState, Params, Parts, matrix, vector};
 use model_core::recursion::{Grading, LagConvention};
 use model_core::self_test::Golden;
 
 /// Sample period, s.
 pub const SAMPLE_PERIOD_S: f32 = 0.001;
-/// Outputs kept: more than the longest lag and the averaging window; a power of two.
-pub const OUTPUTS: usize = 512;
+/// Outputs kept: more than the longest lag, and no less than the averaging window.
+pub const OUTPUTS: usize = 500;
 /// Commands kept, in words of 32: more than the longest input delay.
 pub const WORDS: usize = 2;
 /// Measured channels that the effects need, in the order in which they are passed.
@@ -29,8 +30,10 @@ pub const REFERENCES: [f32; 0] = [];
 pub type Delay = StateDependentDelay<f32, [f32; 1]>;
 /// The effects, in the order of the physics.
 pub type Effects = ();
-/// The model: N1, N2, N3 as identified.
-pub type Identified = Params<f32, 5, 10, 1, Delay, Effects>;
+/// Structure, coefficients and delay law: N1, N2, N3 as identified.
+pub type Base = Params<f32, 5, 10, 1, Delay, ()>;
+/// The model: its constants are part of the code.
+pub type Identified = Frozen<Constants, Effects>;
 /// What the model remembers.
 pub type IdentifiedState = OnOffState<f32, OUTPUTS, WORDS, Identified>;
 
@@ -91,8 +94,8 @@ const _: () = {
     );
 };
 
-/// The model.
-pub const MODEL: Identified = Params {
+/// Structure, coefficients and delay law.
+pub const BASE: Base = Params {
     convention: CONVENTION,
     grading: GRADING,
     averaging: Averaging {
@@ -114,10 +117,19 @@ pub const MODEL: Identified = Params {
     effects: (),
 };
 
+/// Where the model finds its constants.
+#[derive(Clone, Copy, Debug)]
+pub struct Constants;
+
+impl frozen::Constants<f32> for Constants {
+    type Base = Base;
+    const BASE: &'static Base = &BASE;
+}
+
 /// The model.
 #[must_use]
 pub const fn model() -> Identified {
-    MODEL
+    Frozen::new(())
 }
 
 /// The state at rest.
@@ -188,11 +200,11 @@ pub const LAW: Tracking<f32> = Tracking {
     lead: 47,
     opening: 0,
     closing: 0,
-    observer: 0.0054054055,
-    bias_rate: 0.0006382979,
+    observer: 0.03,
+    bias_rate: 0.0021276595,
     integral_rate: 0.0008510638,
     correction_limit: 0.31998372,
-    residual_limit: 1.0666124,
+    residual_limit: 0.2666531,
 };
 /// What the law remembers, its model included.
 pub type LawState = TrackingState<f32, IdentifiedState, LOOK_AHEAD>;
@@ -217,5 +229,5 @@ pub fn law_state(model: &Identified) -> LawState {
 /// What the law decides in its golden run, bit for bit, as the host computed it.
 pub const LAW_GOLDEN: GoldenLaw = GoldenLaw {
     samples: 4096,
-    expected: 0x40bb_d25d,
+    expected: 0x13d0_2268,
 };

@@ -8,16 +8,17 @@
 use model_core::checks;
 use model_core::effect::Setting;
 use model_core::effects::StateDependentDelay;
+use model_core::frozen::{self, Frozen};
 use model_core::model::{Averaging, GradedState, Params, Parts, matrix, vector};
 use model_core::recursion::{Grading, LagConvention};
 use model_core::self_test::Golden;
 
 /// Sample period, s.
 pub const SAMPLE_PERIOD_S: f32 = 0.001;
-/// Outputs kept: more than the longest lag and the averaging window; a power of two.
-pub const OUTPUTS: usize = 512;
-/// Jet strengths kept: more than the longest input delay; a power of two.
-pub const JETS: usize = 64;
+/// Outputs kept: more than the longest lag, and no less than the averaging window.
+pub const OUTPUTS: usize = 500;
+/// Jet strengths kept: more than the longest input delay.
+pub const JETS: usize = 63;
 /// Measured channels that the effects need, in the order in which they are passed.
 pub const CHANNELS: [&str; 1] = ["temperature"];
 /// Usual values of the channels, in their units.
@@ -33,8 +34,10 @@ pub type Effect3 = user_warm_film::WarmFilm;
 pub type Delay = StateDependentDelay<f32, [f32; 1]>;
 /// The effects, in the order of the physics.
 pub type Effects = (Effect1, (Effect2, (Effect3, ())));
-/// The model: N1, N2, N3 as identified.
-pub type Identified = Params<f32, 5, 10, 1, Delay, Effects>;
+/// Structure, coefficients and delay law: N1, N2, N3 as identified.
+pub type Base = Params<f32, 5, 10, 1, Delay, ()>;
+/// The model: its constants are part of the code.
+pub type Identified = Frozen<Constants, Effects>;
 /// What the model remembers.
 pub type IdentifiedState = GradedState<f32, OUTPUTS, JETS, Identified>;
 
@@ -101,30 +104,42 @@ const _: () = {
     );
 };
 
+/// Structure, coefficients and delay law.
+pub const BASE: Base = Params {
+    convention: CONVENTION,
+    grading: GRADING,
+    averaging: Averaging {
+        window: WINDOW,
+        averaged_model: false,
+    },
+    constant: CONSTANT,
+    state_lags: STATE_LAGS,
+    a: vector(A),
+    product_lags: PRODUCT_LAGS,
+    b: vector(B),
+    c: matrix([C1]),
+    delay: StateDependentDelay {
+        floor: DELAY_FLOOR,
+        rise: DELAY_RISE,
+        rate: DELAY_RATE,
+        factors: DELAY_FACTORS,
+    },
+    effects: (),
+};
+
+/// Where the model finds its constants.
+#[derive(Clone, Copy, Debug)]
+pub struct Constants;
+
+impl frozen::Constants<f32> for Constants {
+    type Base = Base;
+    const BASE: &'static Base = &BASE;
+}
+
 /// The model, its effects prepared for the sample period.
 #[must_use]
 pub fn model() -> Identified {
-    Params {
-        convention: CONVENTION,
-        grading: GRADING,
-        averaging: Averaging {
-            window: WINDOW,
-            averaged_model: false,
-        },
-        constant: CONSTANT,
-        state_lags: STATE_LAGS,
-        a: vector(A),
-        product_lags: PRODUCT_LAGS,
-        b: vector(B),
-        c: matrix([C1]),
-        delay: StateDependentDelay {
-            floor: DELAY_FLOOR,
-            rise: DELAY_RISE,
-            rate: DELAY_RATE,
-            factors: DELAY_FACTORS,
-        },
-        effects: effects(),
-    }
+    Frozen::new(effects())
 }
 
 const SETTING: Setting<f32> = Setting {

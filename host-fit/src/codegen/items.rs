@@ -46,6 +46,9 @@ pub(super) fn imports(out: &mut String, model: &Model, graded: bool) {
             .iter()
             .map(|name| format!("use model_core::effects::{name};")),
     );
+    if is_frozen(model) {
+        lines.push("use model_core::frozen::{self, Frozen};".to_owned());
+    }
     let state = if graded { "GradedState" } else { "OnOffState" };
     lines.push(format!(
         "use model_core::model::{{Averaging, {state}, Params, Parts, matrix, vector}};"
@@ -59,13 +62,19 @@ pub(super) fn imports(out: &mut String, model: &Model, graded: bool) {
     }
 }
 
+/// Whether the constants are part of the code: those of edge delays are computed
+/// where they are used, for the sample period.
+fn is_frozen(model: &Model) -> bool {
+    !matches!(model.delay, Delay::EdgeDependent { .. })
+}
+
 pub(super) fn sizes(out: &mut String, model: &Model, graded: bool) {
     let _ = write!(
         out,
         "
 /// Sample period, s.
 pub const SAMPLE_PERIOD_S: f32 = {};
-/// Outputs kept: more than the longest lag and the averaging window; a power of two.
+/// Outputs kept: more than the longest lag, and no less than the averaging window.
 pub const OUTPUTS: usize = {};
 ",
         number(model.sample_period_s),
@@ -74,10 +83,10 @@ pub const OUTPUTS: usize = {};
     if graded {
         let _ = write!(
             out,
-            "/// Jet strengths kept: more than the longest input delay; a power of two.
+            "/// Jet strengths kept: more than the longest input delay.
 pub const JETS: usize = {};
 ",
-            jets(model).next_power_of_two()
+            jets(model)
         );
     } else {
         let _ = write!(
@@ -141,6 +150,22 @@ pub(super) fn types(out: &mut String, model: &Model, graded: bool) -> Result<(),
         );
     }
     let chain = nested(model.effects.len(), "Effect");
+    let sizes = format!("{}, {}", model.a.len(), model.product_lags.len());
+    let identified = if is_frozen(model) {
+        format!(
+            "/// Structure, coefficients and delay law: N1, N2, N3 as identified.
+pub type Base = Params<f32, {sizes}, {inputs}, Delay, ()>;
+/// The model: its constants are part of the code.
+pub type Identified = Frozen<Constants, Effects>;
+"
+        )
+    } else {
+        format!(
+            "/// The model: N1, N2, N3 as identified.
+pub type Identified = Params<f32, {sizes}, {inputs}, Delay, Effects>;
+"
+        )
+    };
     let state = if graded {
         "GradedState<f32, OUTPUTS, JETS, Identified>"
     } else {
@@ -152,13 +177,9 @@ pub(super) fn types(out: &mut String, model: &Model, graded: bool) -> Result<(),
 pub type Delay = {delay};
 /// The effects, in the order of the physics.
 pub type Effects = {chain};
-/// The model: N1, N2, N3 as identified.
-pub type Identified = Params<f32, {}, {}, {inputs}, Delay, Effects>;
-/// What the model remembers.
+{identified}/// What the model remembers.
 pub type IdentifiedState = {state};
-",
-        model.a.len(),
-        model.product_lags.len(),
+"
     );
     Ok(())
 }
@@ -364,7 +385,7 @@ const _: () = {{
 }
 
 pub(super) fn constructors(out: &mut String, model: &Model, graded: bool) {
-    let constant = model.effects.is_empty() && !matches!(model.delay, Delay::EdgeDependent { .. });
+    let frozen = is_frozen(model);
     let delay = match &model.delay {
         Delay::Fixed { .. } => "FixedDelay { delays: DELAYS }".to_owned(),
         Delay::StateDependent { .. } => "StateDependentDelay {
@@ -381,6 +402,7 @@ pub(super) fn constructors(out: &mut String, model: &Model, graded: bool) {
     } else {
         "effects()"
     };
+    let base_effects = if frozen { "()" } else { effects };
     let columns: Vec<String> = (1..=model.b.len()).map(|l| format!("C{l}")).collect();
     let params = format!(
         "Params {{
@@ -397,39 +419,50 @@ pub(super) fn constructors(out: &mut String, model: &Model, graded: bool) {
     b: vector(B),
     c: matrix([{}]),
     delay: {delay},
-    effects: {effects},
+    effects: {base_effects},
 }}",
         model.averaging.averaged_model,
         columns.join(", "),
     );
-    if constant {
+    if frozen {
         let _ = write!(
             out,
             "
-/// The model.
-pub const MODEL: Identified = {params};
+/// Structure, coefficients and delay law.
+pub const BASE: Base = {params};
 
-/// The model.
-#[must_use]
-pub const fn model() -> Identified {{
-    MODEL
+/// Where the model finds its constants.
+#[derive(Clone, Copy, Debug)]
+pub struct Constants;
+
+impl frozen::Constants<f32> for Constants {{
+    type Base = Base;
+    const BASE: &'static Base = &BASE;
 }}
 "
         );
-    } else {
-        let _ = write!(
-            out,
-            "
-/// The model, its effects prepared for the sample period.
-#[must_use]
-pub fn model() -> Identified {{
-    {}
-}}
-",
-            params.replace('\n', "\n    ")
-        );
     }
-    if !constant {
+    let body = if frozen {
+        format!("Frozen::new({effects})")
+    } else {
+        params.replace('\n', "\n    ")
+    };
+    let (prepared, constant) = if model.effects.is_empty() && frozen {
+        ("", "const ")
+    } else {
+        (", its effects prepared for the sample period", "")
+    };
+    let _ = write!(
+        out,
+        "
+/// The model{prepared}.
+#[must_use]
+pub {constant}fn model() -> Identified {{
+    {body}
+}}
+"
+    );
+    if !model.effects.is_empty() || !frozen {
         out.push_str(
             "
 const SETTING: Setting<f32> = Setting {

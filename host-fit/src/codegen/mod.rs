@@ -138,10 +138,10 @@ fn needs_graded_jets(model: &Model) -> bool {
     matches!(model.delay, Delay::EdgeDependent { .. }) || model.effects.iter().any(shapes_jet)
 }
 
-/// Outputs to keep. A power of two: the ring's index then wraps with a mask.
+/// Outputs to keep.
 fn outputs(model: &Model) -> usize {
     let needed = (model.longest_lag() + 1).max(model.averaging.window as usize);
-    needed.max(2).next_power_of_two()
+    needed.max(2)
 }
 
 /// Jet strengths to keep: the delay, a sample to interpolate to, one for what

@@ -11,6 +11,14 @@ use thiserror::Error;
 
 /// How many starting points are followed to the end.
 const FOLLOWED: usize = 2;
+/// How many are tried with each response to jets of part strength.
+const REGRADED: usize = 4;
+/// The responses to jets of part strength.
+const GRADINGS: [Grading; 3] = [
+    Grading::Proportional,
+    Grading::Interpolated,
+    Grading::Switched,
+];
 /// Most starting points that are tried.
 const MOST_STARTS: usize = 12;
 
@@ -58,44 +66,42 @@ pub fn fit_with_effect(
         ..*options
     };
     let scale = Scale::of(records);
-    // How the flow takes jets of part strength shows only once there are some.
-    let gradings: &[Grading] = match spec.place {
-        Place::Jet => &[
-            Grading::Proportional,
-            Grading::Interpolated,
-            Grading::Switched,
-        ],
-        Place::Delay | Place::Flow | Place::Sensor => &[base.grading],
-    };
-    let starts = starts(base, spec, &scale, records);
-    let with = |base: &Model, parameters: &[f64], grading: Grading| {
+    let with = |base: &Model, parameters: &[f64]| {
         let mut model = base.clone();
-        model.grading = grading;
         model.add(spec, parameters, reference);
         model
     };
-    let mut models: Vec<Model> = starts
+    let mut models: Vec<Model> = starts(base, spec, &scale, records)
         .iter()
-        .flat_map(|parameters| {
-            gradings
-                .iter()
-                .map(|grading| with(base, parameters, *grading))
-        })
+        .map(|parameters| with(base, parameters))
         .collect();
     if spec.parameters.is_empty() {
         // Nothing leads from a base that never saw the effect to one that has it.
-        models.extend(
-            fresh_starts(base, records)
-                .iter()
-                .map(|b| with(b, &[], b.grading)),
-        );
+        let fresh = fresh_starts(base, records);
+        models.extend(fresh.iter().map(|base| with(base, &[])));
     }
-    let tried: Vec<Option<Fit>> = models
-        .par_iter()
-        .map(|model| fit(model, records, &brief).ok())
-        .collect();
-    let mut tried: Vec<Fit> = tried.into_iter().flatten().collect();
-    tried.sort_by(|a, b| a.mean_square().total_cmp(&b.mean_square()));
+    let attempt = |models: Vec<Model>| -> Vec<Fit> {
+        let fits: Vec<Option<Fit>> = models
+            .par_iter()
+            .map(|model| fit(model, records, &brief).ok())
+            .collect();
+        fits.into_iter().flatten().collect()
+    };
+    let best_first = |a: &Fit, b: &Fit| a.mean_square().total_cmp(&b.mean_square());
+    let mut tried = attempt(models);
+    tried.sort_by(best_first);
+    if spec.place == Place::Jet {
+        // How the flow takes jets of part strength shows only once there are some.
+        let regraded = tried.iter().take(REGRADED).flat_map(|fit| {
+            let others = GRADINGS.into_iter().filter(|g| *g != base.grading);
+            others.map(|grading| Model {
+                grading,
+                ..fit.model.clone()
+            })
+        });
+        tried.extend(attempt(regraded.collect()));
+        tried.sort_by(best_first);
+    }
     tried.truncate(FOLLOWED);
     let finished: Vec<Option<Fit>> = tried
         .par_iter()
@@ -114,7 +120,7 @@ pub fn fit_with_effect(
     finished
         .into_iter()
         .flatten()
-        .min_by(|a, b| a.mean_square().total_cmp(&b.mean_square()))
+        .min_by(best_first)
         .ok_or_else(|| CandidateError::Unstable {
             effect: spec.name.to_owned(),
         })

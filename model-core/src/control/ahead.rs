@@ -1,111 +1,215 @@
 //! Looking ahead: the model run on from the present, without copying its past.
 
 use crate::history::{Memory, Past};
-use crate::model::{Clamps, State};
+use crate::model::{Clamps, Input, Output, Parts, State, StateOf, observe_delay};
 use crate::real::Real;
-use core::cell::Cell;
+use crate::recursion::{Bilinear, Known};
 
-/// A signal's past with samples that have not happened yet in front of it.
-///
-/// Reads cost the same as from the past alone; the past is borrowed, not copied.
+/// Lags of at least this many samples read the past even this far ahead, and
+/// what they give is summed once instead of at every look.
+const NEAR: usize = 64;
+
+/// A signal's past with up to `A` samples that have not happened yet in front.
 #[derive(Debug)]
-pub struct Ahead<'a, T, P> {
+pub struct Ahead<'a, T, P, const A: usize> {
     past: &'a P,
-    ahead: &'a mut [T],
+    ahead: &'a mut [T; A],
+    newest: T,
     filled: usize,
-    consulted: Cell<bool>,
 }
 
-impl<'a, T: Real, P: Past<T>> Ahead<'a, T, P> {
-    /// Nothing ahead yet; room for as many samples as `ahead` is long. What is
-    /// pushed beyond is dropped.
-    pub fn new(past: &'a P, ahead: &'a mut [T]) -> Self {
-        Self {
-            past,
-            ahead,
-            filled: 0,
-            consulted: Cell::new(false),
-        }
-    }
-
-    /// Whether any sample ahead was read so far.
-    #[inline]
-    #[must_use]
-    pub fn was_consulted(&self) -> bool {
-        self.consulted.get()
-    }
-}
-
-impl<T: Real, P: Past<T>> Past<T> for Ahead<'_, T, P> {
-    #[inline]
-    fn back(&self, lag: usize) -> T {
-        match lag.checked_sub(self.filled) {
-            Some(behind) => self.past.back(behind),
-            None => {
-                self.consulted.set(true);
-                // 0 ≤ filled − 1 − lag < filled ≤ length.
-                let index = self.filled - 1 - lag;
-                self.ahead.get(index).copied().unwrap_or(T::ZERO)
-            }
-        }
-    }
-}
-
-impl<T: Real, P: Memory<T>> Memory<T> for Ahead<'_, T, P> {
-    #[inline]
+impl<T: Real, P: Past<T>, const A: usize> Ahead<'_, T, P, A> {
+    /// Puts another sample in front; beyond the room for them it is dropped.
+    #[inline(always)]
     fn push(&mut self, value: T) {
         if let Some(slot) = self.ahead.get_mut(self.filled) {
             *slot = value;
+            self.newest = value;
             self.filled += 1;
         }
     }
-    #[inline]
-    fn capacity(&self) -> usize {
-        self.past.capacity()
-    }
-    fn mean_back(&self, lag: usize, window: u32) -> T {
-        // The part ahead sample by sample, the rest as the past does it best.
-        let new = self.filled.saturating_sub(lag).min(window as usize);
-        let mut sum = T::ZERO;
-        for i in 0..new {
-            sum = sum + self.back(lag + i);
+}
+
+impl<T: Real, P: Past<T>, const A: usize> Past<T> for Ahead<'_, T, P, A> {
+    #[inline(always)]
+    fn back(&self, lag: usize) -> T {
+        // Where the lag is a constant all but one of these are gone.
+        if lag == 0 {
+            self.newest
+        } else if lag >= A || lag >= self.filled {
+            self.past.back(lag.wrapping_sub(self.filled))
+        } else {
+            let index = self.filled.wrapping_sub(1 + lag);
+            self.ahead.get(index).copied().unwrap_or(T::ZERO)
         }
-        let old = window - new as u32;
-        if old > 0 {
-            let behind = lag.saturating_sub(self.filled);
-            sum = sum + self.past.mean_back(behind, old) * T::from_count(old);
-        }
-        sum / T::from_count(window.max(1))
     }
 }
 
-/// The state of a model run ahead of one with memories `Y` and `J`.
-pub type AheadOf<'a, T, Y, J, D, E> = State<T, Ahead<'a, T, Y>, Ahead<'a, T, J>, D, E>;
+/// What is known of the samples ahead: for each of the next [`NEAR`] the terms
+/// whose lags are at least as long. One of them is summed anew at each sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Foreknown<T> {
+    terms: [Known<T>; NEAR],
+    /// Where the present sample's are.
+    present: usize,
+    complete: bool,
+}
 
-impl<T, Y, J, D, E> State<T, Y, J, D, E>
-where
+impl<T: Real> Foreknown<T> {
+    /// Nothing is known yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            terms: [Known::NOTHING; NEAR],
+            present: 0,
+            complete: false,
+        }
+    }
+
+    /// Moves on to a new present sample, whose past is `outputs`.
+    #[inline]
+    fn advance(&mut self, recursion: &Bilinear<'_, T>, outputs: &impl Past<T>) {
+        self.present = (self.present + 1) % NEAR;
+        let from = if self.complete { NEAR - 1 } else { 0 };
+        for ahead in from..NEAR {
+            if let Some(slot) = self.terms.get_mut((self.present + ahead) % NEAR) {
+                *slot = recursion.known(outputs, NEAR, ahead);
+            }
+        }
+        self.complete = true;
+    }
+}
+
+impl<T: Real> Default for Foreknown<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Runs `model` on from `state` under `input` until `enough` says so, and for at
+/// most as many samples as there is `room` for.
+///
+/// `enough` is shown each sample ahead: its number from 0 on, what the model says,
+/// and whether an input issued from now on has arrived. `foreknown` belongs to `state`
+/// and is to be moved on by this function at every sample. What is foreseen is what
+/// [`step`](crate::step) would do, but for the last digits.
+/// Costs at most a model step for each sample ahead; of the past nothing but the jets is copied.
+#[inline(always)]
+pub fn run<T, M, Y, J, const A: usize>(
+    model: &M,
+    state: &StateOf<T, M, Y, J>,
+    foreknown: &mut Foreknown<T>,
+    room: &mut [T; A],
+    input: &Input<'_, T>,
+    mut enough: impl FnMut(usize, &Output<T>, bool) -> bool,
+) where
     T: Real,
+    M: Parts<T>,
     Y: Memory<T>,
     J: Memory<T>,
-    D: Clone,
-    E: Clone,
 {
-    /// A state to run ahead with [`step`](crate::step) for as many samples as
-    /// the two slices are long; this one stays as it is.
-    ///
-    /// Copies the state of effects and averages, not the past.
-    pub fn ahead<'a>(
-        &'a self,
-        outputs: &'a mut [T],
-        jets: &'a mut [T],
-    ) -> AheadOf<'a, T, Y, J, D, E> {
-        State {
-            outputs: Ahead::new(&self.outputs, outputs),
-            jets: Ahead::new(&self.jets, jets),
-            clamps: Clamps::default(),
-            average: self.average,
-            delay: self.delay.clone(),
-            effects: self.effects.clone(),
+    let recursion = model.recursion();
+    foreknown.advance(&recursion, &state.outputs);
+    let mut ahead: StateOf<T, M, Ahead<'_, T, Y, A>, J> = State {
+        outputs: Ahead {
+            past: &state.outputs,
+            ahead: room,
+            newest: state.outputs.back(0),
+            filled: 0,
+        },
+        jets: state.jets.clone(),
+        clamps: Clamps::default(),
+        average: state.average,
+        delay: state.delay.clone(),
+        effects: state.effects.clone(),
+    };
+    let terms = model.averaging().window.saturating_sub(1).max(1) as usize;
+    let mut arrived = false;
+    for i in 0..A {
+        let known = match foreknown.terms.get((foreknown.present + i) % NEAR) {
+            Some(known) if i < NEAR => *known,
+            _ => recursion.known(&ahead.outputs, NEAR, 0),
+        };
+        // i + 1 inputs have been issued ahead: a delay of up to i meets one.
+        let within = if arrived { 0 } else { i };
+        let (output, delay) = observe_delay(model, &mut ahead, input, within, (&known, NEAR));
+        arrived |= delay <= i;
+        let leaving = ahead.outputs.back(terms);
+        ahead.average.lean(output.flow, leaving);
+        ahead.outputs.push(output.next);
+        if enough(i, &output, arrived) {
+            break;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::{Physics, Setting};
+    use crate::effects::{PlenumDroop, StateDependentDelay, ValveLag};
+    use crate::model::{Averaging, Params, matrix, step, vector};
+    use crate::recursion::{Grading, LagConvention};
+
+    /// With effects that remember, a delay that moves, lags on either side of
+    /// what is known, and looks farther ahead than that.
+    #[test]
+    fn it_foresees_what_the_model_does() {
+        let setting = Setting {
+            period: 0.001,
+            channel: 0,
+            reference: 1.0,
+        };
+        let model = Params::<f64, 2, 1, 1, _, _> {
+            convention: LagConvention::OneStep,
+            averaging: Averaging {
+                window: 50,
+                averaged_model: false,
+            },
+            grading: Grading::Interpolated,
+            constant: 0.0,
+            state_lags: [1, 80],
+            a: vector([0.97, 0.01]),
+            product_lags: [70],
+            b: vector([0.03]),
+            c: matrix([[-0.01]]),
+            delay: StateDependentDelay::<f64, [f64; 1]> {
+                floor: 20.0,
+                rise: 15.0,
+                rate: 5.0,
+                factors: [1.0],
+            },
+            effects: (
+                ValveLag::new(&[0.004, 0.008], &setting),
+                PlenumDroop::new(&[0.5, 1.0], &setting),
+            ),
+        };
+        let mut state = model.graded_state::<90, 40>();
+        let (mut foreknown, mut room) = (Foreknown::new(), [0.0; 100]);
+        for k in 0..700_u32 {
+            let input = Input {
+                command: f64::from(u8::from(k / 90 % 2 == 0)),
+                channels: &[],
+            };
+            let other = Input {
+                command: 1.0 - input.command,
+                channels: &[],
+            };
+            let mut copy = state;
+            run(
+                &model,
+                &state,
+                &mut foreknown,
+                &mut room,
+                &other,
+                |i, output, _| {
+                    let stepped = step(&model, &mut copy, &other);
+                    assert!((stepped.next - output.next).abs() < 1e-12, "{k} {i}");
+                    i + 1 == k as usize % 100
+                },
+            );
+            step(&model, &mut state, &input);
+            assert!(state.outputs.back(0).is_finite());
         }
     }
 }

@@ -14,7 +14,6 @@ pub mod reference;
 pub mod sliding;
 pub mod tracking;
 
-pub use ahead::Ahead;
 pub use budget::{Air, Switches};
 pub use hold::{Hold, HoldTimes};
 pub use pulses::PulseTrain;

@@ -14,12 +14,13 @@
 //! a delay ago, low-pass filtered, is added to those made now (Smith's
 //! correction); and a slow integral removes what remains.
 
+use crate::control::ahead::{self, Foreknown};
 use crate::control::budget::{Budget, Purse};
 use crate::control::hold::{Hold, HoldTimes};
 use crate::control::reference::{Reachable, Unreachable, ramp};
 use crate::effect::Effect;
 use crate::history::{DelayLine, Memory, Past};
-use crate::model::{Input, Parts, StateOf, observe, step};
+use crate::model::{Input, Parts, StateOf, observe};
 use crate::real::Real;
 use core::fmt;
 
@@ -92,10 +93,11 @@ impl core::error::Error for Unusable {}
 /// What the law remembers: the model's state `S` and look-ahead memory for `A` samples.
 #[derive(Clone, Copy, Debug)]
 pub struct TrackingState<T, S, const A: usize> {
-    /// The model at the estimate of the present.
+    /// The model at the estimate of the present; to be read, not to be changed.
     pub model: S,
-    outputs: [T; A],
-    jets: [T; A],
+    /// Room to look ahead.
+    ahead: [T; A],
+    foreknown: Foreknown<T>,
     /// Predictions `lead` ahead, the newest made last.
     predictions: DelayLine<T, A>,
     hold: Hold,
@@ -122,7 +124,8 @@ pub struct Decision<T> {
     pub delay: u16,
     /// The estimate of the present friction.
     pub estimate: T,
-    /// Reading minus what the model says the sensor shows; 0 without a reading.
+    /// Reading minus what the model says the sensor shows, within the residual
+    /// limit; 0 without a reading.
     pub residual: T,
     /// Filtered error of past predictions.
     pub bias: T,
@@ -181,8 +184,8 @@ impl<T: Real> Tracking<T> {
         const { assert!(A > 1, "the law looks ahead at least one sample") };
         TrackingState {
             model: model_state,
-            outputs: [T::ZERO; A],
-            jets: [T::ZERO; A],
+            ahead: [T::ZERO; A],
+            foreknown: Foreknown::new(),
             predictions: DelayLine::new(),
             hold: Hold::closed(),
             purse: self.budget.full(),
@@ -247,7 +250,7 @@ impl<T: Real> Tracking<T> {
         };
         let output = observe(model, &mut state.model, &input);
         let residual = measured
-            .filter(|y| y.abs().value() < f64::MAX)
+            .filter(|y| y.abs() < T::from_f64(f64::MAX))
             .map(|y| limited(y - output.measured, self.residual_limit));
         self.correct(state, output.flow, residual, look.at_lead);
         let next = output.next + self.observer * residual.unwrap_or(T::ZERO);
@@ -286,37 +289,42 @@ impl<T: Real> Tracking<T> {
             command: if on { T::ONE } else { T::ZERO },
             channels,
         };
-        let mut ahead = state.model.ahead(&mut state.outputs, &mut state.jets);
+        let flow = state.model.outputs.back(0);
         let mut look = Look {
-            foreseen: ahead.outputs.back(0),
-            at_lead: ahead.outputs.back(0),
+            foreseen: flow,
+            at_lead: flow,
             delay: 0,
         };
+        let lead = usize::from(self.lead);
         let mut arrived_for = 0;
-        for i in 0..A {
-            let before = ahead.outputs.back(0);
-            let next = step(model, &mut ahead, &input).next;
-            if i + 1 == usize::from(self.lead) {
-                look.at_lead = next;
-            }
-            if ahead.jets.was_consulted() {
-                arrived_for += 1;
-            } else {
-                look.delay = (i + 1) as u16;
-            }
-            if arrived_for <= near {
-                look.foreseen = next;
-            }
-            if near == 0 && arrived_for == 1 {
-                look.foreseen = before;
-            }
-            if arrived_for >= far && i + 1 >= usize::from(self.lead) {
-                if far > near {
-                    look.foreseen = (look.foreseen + next) / (T::ONE + T::ONE);
+        ahead::run(
+            model,
+            &state.model,
+            &mut state.foreknown,
+            &mut state.ahead,
+            &input,
+            |i, output, arrived| {
+                if i + 1 == lead {
+                    look.at_lead = output.next;
                 }
-                break;
-            }
-        }
+                if !arrived {
+                    look.foreseen = output.next;
+                    look.delay = (i + 1) as u16;
+                    return false;
+                }
+                arrived_for += 1;
+                if arrived_for <= near {
+                    look.foreseen = output.next;
+                } else if near == 0 && arrived_for == 1 {
+                    look.foreseen = output.flow;
+                }
+                let enough = arrived_for >= far && i + 1 >= lead;
+                if enough && far > near {
+                    look.foreseen = (look.foreseen + output.next) / (T::ONE + T::ONE);
+                }
+                enough
+            },
+        );
         look
     }
 
@@ -376,6 +384,7 @@ mod tests {
     use crate::effects::StateDependentDelay;
     use crate::model::{Averaging, Params};
     use crate::recursion::LagConvention;
+    use crate::step;
     use nalgebra::{SMatrix, SVector};
 
     type TableTwo<T> = Params<T, 5, 10, 1, StateDependentDelay<T>, ()>;

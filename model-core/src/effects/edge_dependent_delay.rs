@@ -48,7 +48,7 @@ impl<T: Real> DelayLaw<T> for EdgeDependentDelay<T> {
 
     #[inline]
     fn command(&self, run: &mut Run, command: T) -> T {
-        let on = command.value() > 0.5;
+        let on = command > T::from_f64(0.5);
         if on == run.on {
             run.samples = run.samples.saturating_add(1);
         } else {

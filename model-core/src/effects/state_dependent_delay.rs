@@ -34,6 +34,17 @@ impl<T: Real, F: AsRef<[T]> + Clone, const ROUNDED: bool> DelayLaw<T>
     fn evaluate(&self, output: T) -> T {
         self.floor + self.rise * (-self.rate * output).exp()
     }
+    /// The exponential lies between 0 and 1, and every operation after it keeps
+    /// the order, roundings included: the ends are the bounds.
+    #[inline]
+    fn range(&self, l: usize) -> Option<(usize, usize)> {
+        if !ROUNDED || self.rate < T::ZERO {
+            return None;
+        }
+        let attached = self.tap(l, self.floor).whole;
+        let separated = self.tap(l, self.floor + self.rise).whole;
+        Some((attached.min(separated), attached.max(separated)))
+    }
     #[inline]
     fn tap(&self, l: usize, evaluated: T) -> Tap<T> {
         let factor = self.factors.as_ref().get(l).copied().unwrap_or(T::ONE);
@@ -108,6 +119,25 @@ mod tests {
         };
         let tap = law.tap(0, law.evaluate(0.3));
         assert_eq!((tap.whole, tap.fraction), (30, 0.25));
+    }
+
+    #[test]
+    fn its_range_holds_all_its_taps_and_no_more() {
+        for (rise, factor) in [(12.69, 1.0), (-12.69, 1.0), (12.69, 0.37), (12.69, 3.1)] {
+            let law = StateDependentDelay::<f32> {
+                floor: 47.35,
+                rise,
+                rate: 20.18,
+                factors: [factor],
+            };
+            let (low, high) = law.range(0).unwrap();
+            let mut met = (usize::MAX, 0);
+            for bits in (0..0x4080_0000_u32).step_by(10_007) {
+                let tap = law.tap(0, law.evaluate(f32::from_bits(bits))).whole;
+                met = (met.0.min(tap), met.1.max(tap));
+            }
+            assert_eq!(met, (low, high));
+        }
     }
 
     #[test]

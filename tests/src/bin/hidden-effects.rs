@@ -5,8 +5,17 @@
 use scenarios::campaign;
 use std::process::ExitCode;
 
+const USAGE: &str =
+    "usage: hidden-effects [--draws N] [--nulls N] [--pairs N] [--seed N] [--only TEXT]";
+
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let known = ["--draws", "--nulls", "--pairs", "--seed", "--only"];
+    let names = arguments.iter().step_by(2);
+    if arguments.len() % 2 != 0 || !names.clone().all(|name| known.contains(&name.as_str())) {
+        eprintln!("{USAGE}");
+        return ExitCode::from(2);
+    }
     let value = |name: &str| {
         let at = arguments.iter().position(|argument| argument == name)?;
         arguments.get(at + 1).cloned()

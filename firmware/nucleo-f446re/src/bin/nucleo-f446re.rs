@@ -5,13 +5,9 @@
 
 use board::stack;
 use cortex_m_rt::{entry, exception};
-use firmware::cases::{RELAY, SETTINGS};
 use firmware::console::Operator;
-use firmware::controller::Controller;
-use firmware::law::{Direct, Relay};
 use firmware::rig::Rig;
-use firmware::start;
-use identified::on_board as model;
+use firmware::{on_board, start};
 use nucleo_f446re::sampler::{Periods, Sampler, periods};
 use nucleo_f446re::uart::Uart;
 use nucleo_f446re::{clocks, valve};
@@ -35,17 +31,8 @@ fn main() -> ! {
     clocks::start(&rcc, &chip.FLASH);
     let button = chip.GPIOC.split(&mut rcc).pc13;
 
-    let identified = model::model();
-    let law = Relay::new(identified, model::state(&identified), Direct, RELAY);
-    let mut controller = Controller::new(SETTINGS, law);
-    let tested = start::self_test(
-        &identified,
-        model::state(&identified),
-        &model::REFERENCES,
-        model::CHECKSUM,
-        &model::GOLDEN,
-    );
-    start::latch(&mut controller, tested, by_watchdog);
+    let mut controller = on_board::controller();
+    start::latch(&mut controller, on_board::self_test(), by_watchdog);
 
     let mut uart = Uart::new(chip.USART2, a.pa2, a.pa3, &mut rcc);
     let mut watchdog = IndependentWatchdog::new(chip.IWDG);

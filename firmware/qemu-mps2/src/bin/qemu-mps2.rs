@@ -4,8 +4,8 @@
 //! Lines: `arm`, `disarm`, `status`; and for the fault-injection run a digit:
 //! `0` a healthy sensor, `1` no number, `2` at the rail, `3` stuck, `4` away
 //! from the model, `5` a sample that takes longer than a period, `6` a loop that
-//! hangs, `7` and `8` a restart with a damaged coefficient and a damaged delay
-//! law, `9` a restart with nothing damaged.
+//! hangs, `7` and `8` a restart with a damaged coefficient and a damaged golden
+//! trajectory, `9` a restart with nothing damaged.
 #![no_std]
 #![no_main]
 
@@ -15,15 +15,14 @@ use core::mem::MaybeUninit;
 use core::ptr::{addr_of, addr_of_mut};
 use cortex_m_rt::entry;
 use embedded_hal::digital::{ErrorType, OutputPin};
-use firmware::cases::{RELAY, SETTINGS};
 use firmware::console::Operator;
-use firmware::controller::Controller;
-use firmware::law::{Direct, Relay};
+use firmware::on_board::SETTINGS;
 use firmware::rig::{Clock, Rig, Sensor};
-use firmware::start;
+use firmware::{on_board, start};
 use identified::on_board as model;
-use model_core::model::vector;
-use model_core::{Input, step};
+use model_core::model::Averaging;
+use model_core::recursion::Bilinear;
+use model_core::{Input, Parts, step};
 use qemu_mps2::clock::Ticks;
 use qemu_mps2::uart::Uart;
 use qemu_mps2::watchdog::{Watchdog, restarted};
@@ -39,7 +38,7 @@ const PATIENCE: u32 = 10 * TICKS_PER_SAMPLE;
 #[unsafe(link_section = ".uninit.damage")]
 static mut DAMAGE: MaybeUninit<u32> = MaybeUninit::uninit();
 const COEFFICIENT: u32 = 0xDA_0001;
-const DELAY_LAW: u32 = 0xDA_0002;
+const TRAJECTORY: u32 = 0xDA_0002;
 
 /// The flow, played by the model, and the sensor's illness.
 struct Played {
@@ -107,17 +106,8 @@ fn main() -> ! {
     let mut uart = Uart::new(core.ITM);
     let mut ticks = Ticks::new(core.SYST);
     let identified = model::model();
-    let law = Relay::new(identified, model::state(&identified), Direct, RELAY);
-    let mut controller = Controller::new(SETTINGS, law);
-    let tested = damaged(identified);
-    let tested = start::self_test(
-        &tested,
-        model::state(&tested),
-        &model::REFERENCES,
-        model::CHECKSUM,
-        &model::GOLDEN,
-    );
-    start::latch(&mut controller, tested, by_watchdog);
+    let mut controller = on_board::controller();
+    start::latch(&mut controller, self_test(identified), by_watchdog);
     let sensor = Played {
         model: identified,
         state: model::state(&identified),
@@ -147,7 +137,7 @@ fn main() -> ! {
                     cortex_m::asm::nop();
                 },
                 b'7' => restart(COEFFICIENT),
-                b'8' => restart(DELAY_LAW),
+                b'8' => restart(TRAJECTORY),
                 b'9' => restart(0),
                 _ => {
                     if let Some(line) = operator.receive(byte, rig.controller()) {
@@ -159,21 +149,54 @@ fn main() -> ! {
     }
 }
 
-/// The model as the self-test is to find it.
-fn damaged(mut model: model::Identified) -> model::Identified {
+/// The self-test, with what was to be damaged.
+fn self_test(model: model::Identified) -> Result<(), start::Failure> {
     // SAFETY: the word is in RAM, any bits are a u32, and nothing runs beside.
-    match unsafe { addr_of!(DAMAGE).cast::<u32>().read_volatile() } {
-        COEFFICIENT => model.a = vector(model::A.map(|a| f32::from_bits(a.to_bits() ^ 1))),
-        DELAY_LAW => model.delay.floor += 1.0,
-        _ => {}
+    let damage = unsafe { addr_of!(DAMAGE).cast::<u32>().read_volatile() };
+    let (state, references) = (model::state(&model), &model::REFERENCES);
+    let mut golden = model::GOLDEN;
+    match damage {
+        COEFFICIENT => {
+            start::self_test(&Damaged(model), state, references, model::CHECKSUM, &golden)
+        }
+        TRAJECTORY => {
+            if let Some(last) = golden.expected.last_mut() {
+                *last ^= 1;
+            }
+            start::self_test(&model, state, references, model::CHECKSUM, &golden)
+        }
+        _ => on_board::self_test(),
     }
-    model
+}
+
+/// The model with another constant.
+struct Damaged<M>(M);
+
+impl<M: Parts<f32>> Parts<f32> for Damaged<M> {
+    type Delay = M::Delay;
+    type Effects = M::Effects;
+    fn recursion(&self) -> Bilinear<'_, f32> {
+        let recursion = self.0.recursion();
+        Bilinear {
+            constant: recursion.constant + 1e-6,
+            ..recursion
+        }
+    }
+    fn delay(&self) -> &M::Delay {
+        self.0.delay()
+    }
+    fn effects(&self) -> &M::Effects {
+        self.0.effects()
+    }
+    fn averaging(&self) -> Averaging {
+        self.0.averaging()
+    }
 }
 
 /// Restarts by command, which is not the watchdog's doing.
 fn restart(damage: u32) {
     let _ = restarted();
-    // SAFETY: as in `damaged`.
+    // SAFETY: as in `self_test`.
     unsafe { addr_of_mut!(DAMAGE).cast::<u32>().write_volatile(damage) };
     cortex_m::peripheral::SCB::sys_reset();
 }

@@ -51,6 +51,9 @@ const STEPS: &[Step] = &[
             "clippy",
             "--release",
             "--all-targets",
+            "--package=firmware",
+            "--package=identified",
+            "--package=log-reader",
             "--",
             "-Dwarnings",
         ]))

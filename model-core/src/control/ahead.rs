@@ -45,7 +45,7 @@ impl<T: Real, P: Past<T>, const A: usize> Past<T> for Ahead<'_, T, P, A> {
     }
 }
 
-/// What is known of the samples ahead: for each of the next [`NEAR`] the terms
+/// What is known of the samples ahead: for each of the next 64 the terms
 /// whose lags are at least as long. One of them is summed anew at each sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Foreknown<T> {

@@ -212,7 +212,7 @@ pub const GOLDEN: Golden<32> = Golden {
 pub const FIRST_ARRIVAL: usize =
     (checks::smallest(&DELAY_FACTORS) * (DELAY_FLOOR + DELAY_RISE.max(0.0)) + 0.5) as usize;
 /// Samples that the law looks ahead at most.
-pub const LOOK_AHEAD: usize = 82;
+pub const LOOK_AHEAD: usize = 78;
 /// The law: it holds the friction at its reference.
 pub const LAW: Tracking<f32> = Tracking {
     reference: 0.6,
@@ -221,7 +221,7 @@ pub const LAW: Tracking<f32> = Tracking {
         high: 0.9139403,
     },
     slope: 0.002,
-    hold: HoldTimes { on: 10, off: 25 },
+    hold: HoldTimes { on: 18, off: 15 },
     budget: Budget {
         switches: Some(Switches {
             samples_per_switch: 25,
@@ -235,11 +235,11 @@ pub const LAW: Tracking<f32> = Tracking {
     lead: 47,
     opening: 2,
     closing: 6,
-    observer: 0.03,
-    bias_rate: 0.0021276595,
+    observer: 0.0056497175,
+    bias_rate: 0.0006382979,
     integral_rate: 0.0008510638,
     correction_limit: 0.27418208,
-    residual_limit: 0.22848508,
+    residual_limit: 0.9139403,
 };
 /// What the law remembers, its model included.
 pub type LawState = TrackingState<f32, IdentifiedState, LOOK_AHEAD>;
@@ -264,5 +264,5 @@ pub fn law_state(model: &Identified) -> LawState {
 /// What the law decides in its golden run, bit for bit, as the host computed it.
 pub const LAW_GOLDEN: GoldenLaw = GoldenLaw {
     samples: 4096,
-    expected: 0x9100_0b9e,
+    expected: 0xccfd_f767,
 };

@@ -200,11 +200,11 @@ pub const LAW: Tracking<f32> = Tracking {
     lead: 47,
     opening: 0,
     closing: 0,
-    observer: 0.03,
-    bias_rate: 0.0021276595,
+    observer: 0.0054054055,
+    bias_rate: 0.0006382979,
     integral_rate: 0.0008510638,
     correction_limit: 0.31998372,
-    residual_limit: 0.2666531,
+    residual_limit: 1.0666124,
 };
 /// What the law remembers, its model included.
 pub type LawState = TrackingState<f32, IdentifiedState, LOOK_AHEAD>;
@@ -229,5 +229,5 @@ pub fn law_state(model: &Identified) -> LawState {
 /// What the law decides in its golden run, bit for bit, as the host computed it.
 pub const LAW_GOLDEN: GoldenLaw = GoldenLaw {
     samples: 4096,
-    expected: 0x13d0_2268,
+    expected: 0xe05b_eb6b,
 };

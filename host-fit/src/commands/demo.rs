@@ -105,6 +105,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
             switches_per_s: None,
             air: None,
             ramp_per_s: None,
+            least_air: false,
         },
     )?
     .law;

@@ -50,6 +50,9 @@ pub(crate) struct Args {
     /// Fastest change of the reference, in y per second (tracking; a step otherwise).
     #[arg(long, value_name = "Y_PER_S", value_parser = positive)]
     ramp: Option<f64>,
+    /// Switch at the rate that takes the least air on the model, not as fast as the valve can (tracking).
+    #[arg(long)]
+    least_air: bool,
     /// What steady blowing costs, in y: mean friction minus price times duty is maximised.
     #[arg(long, value_name = "Y", default_value_t = 0.0, value_parser = not_negative)]
     air_price: f64,
@@ -285,6 +288,7 @@ fn request(args: &Args) -> TrackRequest {
         switches_per_s: args.max_switches,
         air: args.max_air,
         ramp_per_s: args.ramp,
+        least_air: args.least_air,
     }
 }
 

@@ -2,8 +2,11 @@
 
 use super::DesignError;
 use super::bench::Bench;
+use super::physical::time_constants;
 use super::steady::{Steady, steady};
 use crate::model::{Delay, Hold, Model, Start, Track};
+use firmware_sim::closed_loop::{Figures, Law, ModelFlow, run};
+use model_core::control::budget::Budget;
 use model_core::control::tracking::Unusable;
 use model_core::control::{Reachable, Tracking};
 
@@ -22,6 +25,9 @@ pub struct TrackRequest {
     pub air: Option<f64>,
     /// Fastest change of the reference, y/s; `None` follows steps.
     pub ramp_per_s: Option<f64>,
+    /// Choose the switching rate that takes the least air on the model, instead of
+    /// the fastest one, which ripples least.
+    pub least_air: bool,
 }
 
 /// A tracking law and what the design rests on.
@@ -120,19 +126,6 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
             hold.on, hold.off
         ));
     }
-    let mut switches = None;
-    if let Some(rate) = request.switches_per_s {
-        // The cycle is as long as two switches may take; the shorter of its two
-        // parts is held for what belongs to it.
-        let cycle = 2000.0 / rate;
-        let duty = equivalent_duty.clamp(0.02, 0.98);
-        if duty > 0.5 {
-            hold.off = hold.off.max(((1.0 - duty) * cycle).ceil() as u32);
-        } else {
-            hold.on = hold.on.max((duty * cycle).ceil() as u32);
-        }
-        switches = Some([(1000.0 / rate).ceil() as u32, 10]);
-    }
     let air = request
         .air
         .map(|share| [(share * 1000.0).round().clamp(0.0, 1000.0) as u32, 1000]);
@@ -148,14 +141,16 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
 
     let lead = shortest.max(1);
     let half_hold = hold.on.max(hold.off).div_ceil(2).min(10_000) as u16;
-    let law = Track {
+    let range = reachable.high - reachable.low;
+    let observer = observer(&time_constants(model, natural.friction, blown.friction));
+    let mut law = Track {
         reference: request.target,
         reachable: [reachable.low, reachable.high],
         slope: request
             .ramp_per_s
             .map_or(0.0, |slope| slope * model.sample_period_s),
         hold,
-        switches,
+        switches: None,
         air,
         lead,
         opening,
@@ -164,17 +159,37 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
             .saturating_add(opening.max(closing))
             .saturating_add(half_hold)
             .saturating_add(3),
+        observer,
         // Slow against the delay, so that neither noise nor a wrong delay turns
         // the corrections into an oscillation.
-        observer: 0.03,
-        bias_rate: 0.1 / f64::from(lead.max(10)),
+        bias_rate: 0.03 / f64::from(lead.max(10)),
         integral_rate: 0.04 / f64::from(lead.max(20)),
-        correction_limit: 0.3 * (reachable.high - reachable.low),
-        residual_limit: 0.25 * (reachable.high - reachable.low),
+        correction_limit: 0.3 * range,
+        // A wild reading moves the estimate by the observer's share of the whole range.
+        residual_limit: range,
     };
-    let tracking: Tracking<f64> = law.tracking();
-    tracking.validate::<_, { firmware_sim::closed_loop::AHEAD }>(&bench.prepared, longest)?;
-    let duty = duty_on_model(&bench, tracking);
+    let duty_of = |law: &Track| {
+        let tracking: Tracking<f64> = law.tracking();
+        tracking.validate::<_, { firmware_sim::closed_loop::AHEAD }>(&bench.prepared, longest)?;
+        Ok::<_, DesignError>(on_model(&bench, tracking))
+    };
+    let figures = duty_of(&law)?;
+    let mut duty = figures.air;
+    if let Some(rate) = request.switches_per_s {
+        law = paced(&law, rate, duty);
+        duty = duty_of(&law)?.air;
+    }
+    if request.least_air {
+        let fastest = request.switches_per_s.unwrap_or(f64::INFINITY);
+        for rate in PACES.into_iter().filter(|rate| *rate < fastest) {
+            let slower = paced(&law, rate, duty);
+            // What the look-ahead cannot hold or the model cannot follow is no choice.
+            let Ok(figures) = duty_of(&slower) else { break };
+            if figures.air < 0.99 * duty && figures.offset.abs() < 0.005 * range {
+                (law, duty) = (slower, figures.air);
+            }
+        }
+    }
     if let Some(allowed) = request.air
         && duty > allowed + 0.02
     {
@@ -201,11 +216,52 @@ fn equivalent_duty(model: &Model, reference: f64) -> f64 {
     (alpha * reference - model.constant) / gain
 }
 
-/// The duty on the model itself, 5 s after the start and over 10 s, without budgets.
-fn duty_on_model(bench: &Bench<f64>, tracking: Tracking<f64>) -> f64 {
-    use firmware_sim::closed_loop::{Figures, Law, ModelFlow, run};
+/// Switches that may be saved up: with less than two pulses' worth a valve that has
+/// been open for long would have to wait closed for leave to open again.
+const SAVED_SWITCHES: u32 = 10;
+
+/// Paces that a law may choose to save air, switches per second.
+const PACES: [f64; 6] = [40.0, 20.0, 10.0, 6.0, 4.0, 3.0];
+
+/// The share of each residual that corrects the estimate: the observer is to be
+/// twice as fast as the flow itself. Slower, and the estimate is the model's alone;
+/// faster, and it follows the sensor's noise instead of the flow, which cannot
+/// move so fast.
+fn observer(time_constants_s: &[f64; 2]) -> f64 {
+    let fastest = time_constants_s[0].min(time_constants_s[1]);
+    (2.0 * 0.001 / fastest).min(0.1)
+}
+
+/// `law` with no more than `rate` switches per second, for a flow that takes `duty`.
+///
+/// The time between two openings is kept by the budget, whatever duty the flow
+/// really takes. The shorter part of the cycle is held a little less long than its share, so
+/// that the law knows its swing and yet the budget binds.
+fn paced(law: &Track, rate: f64, duty: f64) -> Track {
+    let cycle = 2000.0 / rate;
+    let duty = duty.clamp(0.02, 0.98);
+    let mut paced = law.clone();
+    let share = |of: f64| (0.8 * of * cycle).round() as u32;
+    if duty > 0.5 {
+        paced.hold.off = law.hold.off.max(share(1.0 - duty));
+    } else {
+        paced.hold.on = law.hold.on.max(share(duty));
+    }
+    let half = |hold: Hold| hold.on.max(hold.off).div_ceil(2).min(10_000) as u16;
+    paced.look_ahead = law
+        .look_ahead
+        .saturating_add(half(paced.hold) - half(law.hold));
+    paced.switches = Some([(1000.0 / rate).ceil() as u32, SAVED_SWITCHES]);
+    paced
+}
+
+/// The law on the model itself, 5 s after the start and over 10 s, without the air budget.
+fn on_model(bench: &Bench<f64>, tracking: Tracking<f64>) -> Figures {
     let free = Tracking {
-        budget: Default::default(),
+        budget: Budget {
+            air: None,
+            ..tracking.budget
+        },
         ..tracking
     };
     let mut law = Law::new(
@@ -220,7 +276,7 @@ fn duty_on_model(bench: &Bench<f64>, tracking: Tracking<f64>) -> f64 {
         &mut flow,
         std::iter::repeat_n(tracking.reference, 15_000),
     );
-    Figures::of(&trace, 5000).air
+    Figures::of(&trace, 5000)
 }
 
 /// Seconds to samples at 1 kHz, rounded up, at least 1.
@@ -323,6 +379,7 @@ pub(super) mod tests {
             switches_per_s: None,
             air: None,
             ramp_per_s: None,
+            least_air: false,
         }
     }
 
@@ -370,8 +427,10 @@ pub(super) mod tests {
             ..request(0.8)
         };
         let design = track(&model, &calm).unwrap();
-        // A cycle of 100 ms, 28.7 % of it closed.
-        assert_eq!(design.law.hold, Hold { on: 10, off: 29 });
+        // A cycle of 100 ms, 28.7 % of it closed, held for most of that.
+        assert_eq!(design.law.hold.on, 10);
+        assert!((20..=25).contains(&design.law.hold.off), "{design:?}");
+        assert_eq!(design.law.switches, Some([50, 10]));
     }
 
     #[test]

@@ -95,7 +95,7 @@ impl<L: Law> Controller<L> {
     /// not cleared: damaged constants drive nothing.
     pub fn disarm(&mut self) {
         self.open = false;
-        if self.mode == Mode::Faulted(Fault::SelfTest) {
+        if matches!(self.mode, Mode::Disarmed | Mode::Faulted(Fault::SelfTest)) {
             return;
         }
         self.mode = Mode::Disarmed;

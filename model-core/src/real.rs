@@ -5,8 +5,9 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A real number the model can be run in.
 ///
-/// Elementary functions come from `libm` in every build, so that a host and a
-/// board compute the same bits. Products and sums are written out, never fused.
+/// Elementary functions come from `libm` in every build (the exponential in `f32`
+/// from here), so that a host and a board compute the same bits. Products and
+/// sums are written out, never fused.
 pub trait Real:
     nalgebra::Scalar
     + Copy

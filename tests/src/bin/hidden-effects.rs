@@ -12,7 +12,9 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let known = ["--draws", "--nulls", "--pairs", "--seed", "--only"];
     let names = arguments.iter().step_by(2);
-    if arguments.len() % 2 != 0 || !names.clone().all(|name| known.contains(&name.as_str())) {
+    if !arguments.len().is_multiple_of(2)
+        || !names.clone().all(|name| known.contains(&name.as_str()))
+    {
         eprintln!("{USAGE}");
         return ExitCode::from(2);
     }

@@ -1,20 +1,27 @@
-"""What other optimisers make of the same delay problem: NOMAD and a genetic search.
+"""One delay problem, several optimisers: host-fit, NOMAD and a genetic search.
 
-Usage: search_peers.py DATASET SEEDS EVALUATIONS SECONDS
+Usage: search_peers.py --dataset DIR --host-fit PROGRAM --seeds N --evaluations N --seconds N [--ours]
 DATASET is a folder with dataset.toml. Prints one line per run:
-method,problem,seed,evaluations,value,CPU seconds,stopped
-where stopped says whether the method ended by itself ("itself"), at EVALUATIONS
-("evaluations") or after SECONDS of processor time ("time").
+method,problem,seed,evaluations,value,CPU seconds,end
+where end says whether the method ended by "itself", at the number of "evaluations"
+or at the "time" it was allowed. CPU seconds of the peers leave out loading and tables;
+those of host-fit are of its whole process.
 
 The model is the paper's (N1 = 5, N2 = 10, N3 = 1, lags 1..500 as printed, law (2)
-given, f = 1). The objective is written here from the equations, and made fast so
+given, f = 1). The peers' objective is written here from the equations, and made fast so
 that the comparison is of the searches: lagged products are tabulated once, so the
 least squares are look-ups and a 16 x 16 solve, and the free run is compiled.
 """
 
+import argparse
+import concurrent.futures
 import csv
+import json
+import os
 import pathlib
+import subprocess
 import sys
+import tempfile
 import time
 import tomllib
 
@@ -151,16 +158,24 @@ class BudgetSpent(Exception):
 class Problem:
     """The objective, with a memory of what was evaluated: duplicates are free."""
 
-    def __init__(self, tables, free_run, evaluations, seconds):
+    def __init__(self, tables, free_run, evaluations, seconds, report):
         self.u, self.y, self.plain, self.on = tables
         self.free_run = free_run
         self.known = {}
+        self.best = DIVERGED
         self.allowed = evaluations, seconds
+        self.report = report
         self.started = time.process_time()
-        self.stopped = "itself"
 
     def spent(self):
         return time.process_time() - self.started
+
+    def ended(self):
+        evaluations, seconds = self.allowed
+        # NOMAD counts a few duplicates that are free here.
+        if len(self.known) >= 0.99 * evaluations:
+            return "evaluations"
+        return "time" if self.spent() >= 0.99 * seconds else "itself"
 
     def __call__(self, x):
         x = np.rint(np.asarray(x)).astype(np.int64)
@@ -169,17 +184,17 @@ class Problem:
         if key in self.known:
             return self.known[key]
         evaluations, seconds = self.allowed
-        if len(self.known) >= evaluations:
-            self.stopped = "evaluations"
-        elif self.spent() >= seconds:
-            self.stopped = "time"
-        if self.stopped != "itself":
+        if len(self.known) >= evaluations or self.spent() >= seconds:
             raise BudgetSpent
         theta, residual = least_squares(self.plain, self.on, state, product)
         if self.free_run:
             residual = simulate(self.u, self.y, state, product, theta)
         value = float(np.sqrt(max(residual, 0.0))) if np.isfinite(residual) else DIVERGED
         self.known[key] = value
+        if value < self.best:
+            self.best = value
+            # Should the method have to be ended from outside, this is its result.
+            self.report(self, "time")
         return value
 
 
@@ -196,26 +211,23 @@ def nomad(problem, seed, options):
     import PyNomad
 
     n = N1 + N2
+    start = first_point(problem, seed)
 
     def blackbox(x):
         try:
-            x.setBBO(str(problem([x.get_coord(i) for i in range(n)])).encode())
+            value = problem([x.get_coord(i) for i in range(n)])
         except BudgetSpent:
-            # NOMAD cannot be left by an exception: it ends on its own limit.
-            x.setBBO(str(DIVERGED).encode())
-            return 0
+            # NOMAD cannot be left by an exception.
+            problem.report(problem, problem.ended())
+            os._exit(0)
+        x.setBBO(str(value).encode())
         return 1
 
-    evaluations, seconds = problem.allowed
     PyNomad.optimize(
-        blackbox, first_point(problem, seed), [1] * n, [LONGEST] * n,
-        ["BB_OUTPUT_TYPE OBJ", "BB_INPUT_TYPE (" + " I" * n + " )", f"MAX_BB_EVAL {evaluations}",
-         f"MAX_TIME {int(seconds)}", "DISPLAY_DEGREE 0", f"SEED {seed}"] + options,
+        blackbox, start, [1] * n, [LONGEST] * n,
+        ["BB_OUTPUT_TYPE OBJ", "BB_INPUT_TYPE (" + " I" * n + " )", "DISPLAY_DEGREE 0",
+         f"MAX_BB_EVAL {problem.allowed[0]}", f"SEED {seed}"] + options,
     )
-    if len(problem.known) >= evaluations:
-        problem.stopped = "evaluations"
-    elif problem.spent() >= 0.98 * seconds:
-        problem.stopped = "time"
 
 
 def genetic(problem, seed):
@@ -228,30 +240,90 @@ def genetic(problem, seed):
         pass
 
 
-METHODS = {
+PEERS = {
     "NOMAD 4.6 defaults": lambda p, s: nomad(p, s, []),
     "NOMAD 4.6 poll only": lambda p, s: nomad(
         p, s, ["QUAD_MODEL_SEARCH no", "NM_SEARCH no", "DIRECTION_TYPE ORTHO 2N"]),
     "differential evolution": genetic,
 }
+OURS = "host-fit"
 
 
-def main():
-    folder, seeds, evaluations, seconds = sys.argv[1:5]
-    u, y = load(folder)
+def line(method, objective, seed, evaluations, value, seconds, end):
+    return f"{method},{objective},{seed},{evaluations},{value:.6f},{seconds:.2f},{end}"
+
+
+def run_peer(arguments):
+    """One run of one peer, in this process."""
+    u, y = load(arguments.dataset)
     everywhere = np.ones((y.shape[0], y.shape[1] - 1))
     on = np.array([arrived(u, y)[:-1] for u, y in zip(u, y)])
     tables = u, y, lagged_products(y, everywhere), lagged_products(y, on)
-    Problem(tables, True, 1, 1e9)(range(1, 16))  # compiles
-    chosen = sys.argv[5:] or METHODS
-    for free_run in (False, True):
-        for name in chosen:
-            for seed in range(int(seeds)):
-                problem = Problem(tables, free_run, int(evaluations), float(seconds))
-                METHODS[name](problem, seed)
-                label = "free-run" if free_run else "one-step"
-                print(f"{name},{label},{seed},{len(problem.known)},{min(problem.known.values()):.6f},"
-                      f"{problem.spent():.2f},{problem.stopped}", flush=True)
+    Problem(tables, True, 1, 1e9, lambda *_: None)(range(1, 16))  # compiles
+    method, objective, seed = arguments.one.split(",")
+
+    def report(problem, end):
+        print(line(method, objective, seed, len(problem.known), problem.best, problem.spent(), end),
+              flush=True)
+
+    problem = Problem(
+        tables, objective == "free-run", arguments.evaluations, arguments.seconds, report)
+    PEERS[method](problem, int(seed))
+    report(problem, problem.ended())
+
+
+def run_ours(arguments, objective, seed):
+    with tempfile.TemporaryDirectory() as folder:
+        command = [
+            arguments.host_fit, "identify", arguments.dataset, "-o", folder + "/model.toml", "--json",
+            "--seed", str(seed), "--objective", objective, "--lags", "literal",
+            "--delay-law", "47.35,12.69,20.18", "--factors", "1",
+        ]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        found = json.loads(process.stdout.read())
+        _, _, used = os.wait4(process.pid, 0)
+    return line(OURS, objective, seed, found["evaluations"], found["objective_value"],
+                used.ru_utime + used.ru_stime, "itself")
+
+
+def run_one(arguments, method, objective, seed):
+    """One run in a process of its own: NOMAD can end its process, or not end at all."""
+    if method == OURS:
+        return run_ours(arguments, objective, seed)
+    command = [sys.executable, __file__, *sys.argv[1:], "--one", f"{method},{objective},{seed}"]
+    try:
+        # Processor time is what is allowed; on a busy machine it takes longer.
+        lines = subprocess.run(
+            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+            timeout=60 + 3 * arguments.seconds).stdout
+    except subprocess.TimeoutExpired as expired:
+        lines = (expired.stdout or b"").decode()
+    results = [text for text in lines.splitlines() if text.startswith(method + ",")]
+    return results[-1] if results else line(method, objective, seed, 0, DIVERGED, 0.0, "failed")
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--dataset", required=True)
+    parser.add_argument("--host-fit", required=True)
+    parser.add_argument("--seeds", type=int, required=True)
+    parser.add_argument("--evaluations", type=int, required=True)
+    parser.add_argument("--seconds", type=float, required=True)
+    parser.add_argument("--ours", action="store_true")
+    parser.add_argument("--one")
+    arguments = parser.parse_args()
+    if arguments.one:
+        run_peer(arguments)
+        return
+    runs = [
+        (method, objective, seed)
+        for objective in ("one-step", "free-run")
+        for method in ([OURS] if arguments.ours else [OURS, *PEERS])
+        for seed in range(arguments.seeds)
+    ]
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        for result in pool.map(lambda run: run_one(arguments, *run), runs):
+            print(result, flush=True)
 
 
 if __name__ == "__main__":

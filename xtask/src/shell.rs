@@ -33,10 +33,15 @@ pub(crate) fn firmware_cargo(arguments: &[&str]) -> Command {
     command
 }
 
+/// Where the workspace builds.
+pub(crate) fn target() -> PathBuf {
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or("target".into(), PathBuf::from);
+    root().join(target)
+}
+
 /// Where the firmware's workspace builds.
 pub(crate) fn firmware_target() -> PathBuf {
-    let target = std::env::var_os("CARGO_TARGET_DIR").map_or(root().join("target"), PathBuf::from);
-    root().join(target).join("firmware")
+    target().join("firmware")
 }
 
 /// The command as a person would type it.

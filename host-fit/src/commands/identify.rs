@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::bail;
-use host_fit::data::{DataSet, Record};
+use host_fit::data::{DataSet, Demand, Record, check_excitation};
 use host_fit::delay::{DelayOptions, DelayVerdict, study_delays};
 use host_fit::extend::{effects_for, extend};
 use host_fit::fit::lean_base;
@@ -179,9 +179,8 @@ impl Progress for Bar<'_> {
 }
 
 impl Request {
-    /// Identifies a model on `set`.
-    pub(crate) fn identify(&self, set: &DataSet, console: Console) -> anyhow::Result<Found> {
-        let mut remarks = Vec::new();
+    /// Sizes and conventions, without the input delay.
+    fn structure(&self, set: &DataSet) -> anyhow::Result<Structure> {
         let learning: Vec<&Record> = set.identify().collect();
         let Some(shortest) = learning.iter().map(|r| r.len()).min() else {
             bail!(
@@ -189,13 +188,6 @@ impl Request {
             );
         };
         let at_rest = set.is_on_off() && starts_at_rest(&learning);
-        if !at_rest {
-            remarks.push(
-                "the records do not start at rest or the input is not on/off: the model has a constant term, and \
-                 free runs follow the measurement for as long as the longest lag"
-                    .to_owned(),
-            );
-        }
         let size = |given: Option<u16>, full: u16, averaged: u16| -> usize {
             given
                 .unwrap_or(if self.averaged { averaged } else { full })
@@ -204,7 +196,7 @@ impl Request {
         let longest_lag = self.max_lag.unwrap_or_else(|| {
             u16::try_from(shortest / 4).map_or(500, |quarter| quarter.clamp(1, 500))
         });
-        let mut structure = Structure {
+        Ok(Structure {
             state_lags: size(self.n1, 5, 2).min(longest_lag.into()),
             product_lags: size(self.n2, 10, 2).min(longest_lag.into()),
             inputs: size(self.n3, 1, 2),
@@ -221,7 +213,31 @@ impl Request {
             } else {
                 Start::Measured
             },
+        })
+    }
+
+    /// What the commands of `set` cannot tell about the model asked for, one sentence each.
+    fn excitation(&self, set: &DataSet) -> anyhow::Result<Vec<String>> {
+        let structure = self.structure(set)?;
+        let demand = Demand {
+            max_lag: structure.longest_lag.into(),
+            coefficients: structure.coefficients(),
         };
+        Ok(check_excitation(set, demand)?.remarks)
+    }
+
+    /// Identifies a model on `set`.
+    pub(crate) fn identify(&self, set: &DataSet, console: Console) -> anyhow::Result<Found> {
+        let mut remarks = Vec::new();
+        let learning: Vec<&Record> = set.identify().collect();
+        let mut structure = self.structure(set)?;
+        if structure.start == Start::Measured {
+            remarks.push(
+                "the records do not start at rest or the input is not on/off: the model has a constant term, and \
+                 free runs follow the measurement for as long as the longest lag"
+                    .to_owned(),
+            );
+        }
         if self.factors.iter().any(|f| !(f.is_finite() && *f >= 0.0)) {
             bail!("--factors takes finite numbers that are not below 0, as in --factors 1");
         }
@@ -389,6 +405,7 @@ struct Document<'a> {
     refinement: Option<RefinementDocument>,
     poles: [f64; 2],
     remarks: &'a [String],
+    excitation: &'a [String],
 }
 
 #[derive(serde::Serialize)]
@@ -435,6 +452,10 @@ fn delays(model: &Model) -> Delays<'_> {
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let set = DataSet::load(&args.dataset)?;
+    let excitation = args.request.excitation(&set)?;
+    for remark in &excitation {
+        console.warn(remark)?;
+    }
     let Found {
         identified,
         model,
@@ -488,6 +509,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         }),
         poles: [identified.pole_off, identified.pole_on],
         remarks: &remarks,
+        excitation: &excitation,
     })
 }
 

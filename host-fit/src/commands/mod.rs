@@ -36,6 +36,15 @@ impl Console {
         print(text)
     }
 
+    /// Warns at once, before a long computation: on standard error where that is a terminal, otherwise among the words
+    /// of the result; with `--json` the document is to carry it.
+    pub(crate) fn warn(self, text: &str) -> anyhow::Result<()> {
+        if io::stderr().is_terminal() {
+            return Ok(writeln!(io::stderr(), "warning: {text}")?);
+        }
+        self.say(&format!("warning: {text}"))
+    }
+
     /// Prints the JSON document of the command; silent without `--json`.
     pub(crate) fn document(self, value: &impl serde::Serialize) -> anyhow::Result<()> {
         if !self.json {

@@ -11,7 +11,9 @@ use super::free_runner::FreeRunner;
 use super::one_step::{ExchangeStep, KickStep, OneStep, PairStep};
 use super::options::{IdentifyOptions, Objective};
 use super::regression::Regression;
-use crate::search::{Point, Progress, Report, SearchStep, Speculative, minimise};
+use crate::search::{
+    Evaluation, Point, Progress, Report, SearchStep, Speculative, Success, minimise,
+};
 
 /// Fruitless kicks of a free-run search per unit of patience, and kicks in all.
 const FREE_KICKS: (usize, usize) = (8, 12);
@@ -82,6 +84,16 @@ pub(crate) fn search(
         progress,
         interrupt,
     );
+    if free.best.is_none() {
+        // Interrupted in the first stage: its best is the best so far.
+        free.best = report.best.map(|best| {
+            let delays = free_run.regression.layout.delays(&best.point);
+            let value = match free_run.epsilon(&delays, f64::INFINITY) {
+                Evaluation::Value(value) | Evaluation::AtLeast(value) => value,
+            };
+            Success { value, ..best }
+        });
+    }
     free.evaluations += report.evaluations;
     free.screened += report.screened;
     (free_run.regression, free)

@@ -155,7 +155,7 @@ pub(crate) fn check(records: &[&Record], structure: &Structure) -> Result<(), Id
         .iter()
         .map(|r| r.y.len() - 1 - structure.skipped())
         .sum();
-    let coefficients = structure.state_lags + structure.inputs * (1 + structure.product_lags);
+    let coefficients = structure.coefficients();
     if rows <= coefficients {
         return Err(IdentifyError::TooFewSamples { rows, coefficients });
     }

@@ -156,16 +156,22 @@ impl<'a> Exchange<'a> {
         sort(delays);
     }
 
+    /// All slots that lags can go to.
+    ///
+    /// Lags that had become equal are one in the list: the slots that this left
+    /// empty come after it, so that they can be filled again.
     pub(crate) fn slots(&self, delays: &Delays) -> Vec<Slot> {
-        let state = (0..delays.state.len()).map(|index| Slot {
-            list: List::State,
-            index,
-        });
-        let product = (0..delays.product.len()).map(|index| Slot {
-            list: List::Product,
-            index,
-        });
-        state.chain(product).collect()
+        let layout = &self.regression.layout;
+        let slots = |list: List, lags: usize, wanted: usize| {
+            (0..lags.max(wanted)).map(move |index| Slot { list, index })
+        };
+        slots(List::State, delays.state.len(), layout.state_lags)
+            .chain(slots(
+                List::Product,
+                delays.product.len(),
+                layout.product_lags,
+            ))
+            .collect()
     }
 
     /// The lag that leaves the smallest residual in a slot, and that residual.
@@ -455,8 +461,10 @@ pub(crate) fn set(delays: &mut Delays, slot: Slot, lag: u16) {
         List::State => &mut delays.state,
         List::Product => &mut delays.product,
     };
-    if let Some(place) = list.get_mut(slot.index) {
-        *place = lag;
+    match list.get_mut(slot.index) {
+        Some(place) => *place = lag,
+        // A slot whose lag had become equal to another's.
+        None => list.push(lag),
     }
 }
 
@@ -585,6 +593,20 @@ mod tests {
                 assert!((residual(&[(first, lags.0), (second, lags.1)]) - best).abs() < 1e-9);
             }
         }
+    }
+
+    #[test]
+    fn a_slot_left_empty_by_equal_lags_is_filled_again() {
+        let mut regression = regression(1);
+        regression.tabulate(&[11]);
+        let mut delays = Delays {
+            state: vec![1],
+            product: vec![5],
+            ticks: vec![11],
+        };
+        Exchange::new(&regression, &[11]).descend(&mut delays);
+        assert_eq!((delays.state.len(), delays.product.len()), (2, 2));
+        assert!(delays.state.contains(&21), "{delays:?}");
     }
 
     #[test]

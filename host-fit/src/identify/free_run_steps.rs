@@ -315,7 +315,8 @@ impl FreeKickStep {
                 set(&mut delays, slot, lag);
             }
         }
-        if around.rng.random_bool(INPUT_KICKS) {
+        // Without on/off edges every new input delay costs new tables.
+        if problem.regression.is_binary() && around.rng.random_bool(INPUT_KICKS) {
             let per_sample = problem.regression.signals.ticks_per_sample();
             let bounds = problem.regression.layout.input_bounds();
             for (tick, (low, high)) in delays.ticks.iter_mut().zip(bounds) {

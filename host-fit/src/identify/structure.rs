@@ -96,6 +96,12 @@ impl Default for Structure {
 }
 
 impl Structure {
+    /// Coefficients that the least squares estimate: N1 + N3·(1 + N2) and the constant.
+    #[must_use]
+    pub fn coefficients(&self) -> usize {
+        self.state_lags + self.inputs * (1 + self.product_lags) + usize::from(self.constant)
+    }
+
     /// Rows at a record's start that have no recorded past.
     pub(crate) fn skipped(&self) -> usize {
         let longest_delay = match &self.delay {

@@ -1,0 +1,247 @@
+//! `host-fit identify` as a script meets it: keys, seeds, threads, options.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// The program, built beside this test.
+fn program() -> PathBuf {
+    let test = std::env::current_exe().expect("this test");
+    let folder = test.ancestors().nth(2).expect("target/PROFILE/deps");
+    let program = folder.join(format!("host-fit{}", std::env::consts::EXE_SUFFIX));
+    if !program.is_file() {
+        let built = Command::new(env!("CARGO"))
+            .args(["build", "--release", "--package", "host-fit", "--quiet"])
+            .status()
+            .expect("cargo");
+        assert!(built.success());
+    }
+    program
+}
+
+/// Runs `identify` on a bundled set; the model goes to `model`.
+fn identify(set: &str, model: &Path, options: &[&str]) -> Output {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../data")
+        .join(set);
+    Command::new(program())
+        .args(["--json", "identify"])
+        .arg(data)
+        .arg("-o")
+        .arg(model)
+        .args(options)
+        .output()
+        .expect("the program starts")
+}
+
+/// The document and the model of a run that succeeds.
+#[track_caller]
+fn found(set: &str, options: &[&str]) -> (Value, String) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = folder.path().join("model.toml");
+    let output = identify(set, &model, options);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{options:?}: {error}");
+    let document = serde_json::from_slice(&output.stdout).expect("one JSON document");
+    (
+        document,
+        std::fs::read_to_string(model).expect("the model is there"),
+    )
+}
+
+/// A search small enough for a test.
+const SMALL: [&str; 8] = [
+    "--n1",
+    "2",
+    "--n2",
+    "2",
+    "--max-lag",
+    "60",
+    "--objective",
+    "one-step",
+];
+
+fn small<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    SMALL.into_iter().chain(more.iter().copied()).collect()
+}
+
+#[test]
+fn the_document_has_the_keys_that_scripts_rely_on() {
+    let (document, _) = found("ramp-cfd", &small(&[]));
+    for key in [
+        "model",
+        "objective",
+        "objective_value",
+        "one_step_norm",
+        "evaluations",
+        "wall_time_s",
+        "records",
+        "identify",
+        "validate",
+        "delays",
+        "excitation",
+    ] {
+        assert!(document.get(key).is_some(), "{key}");
+    }
+    let records = document["records"].as_array().expect("a list");
+    assert_eq!(records.len(), 4);
+    for indicators in records
+        .iter()
+        .chain([&document["identify"], &document["validate"]])
+    {
+        for key in ["samples", "epsilon", "fit_percent", "correlation", "rmse"] {
+            assert!(indicators[key].is_number(), "{key}: {indicators}");
+        }
+        assert!(indicators["noise_rmse"].is_null(), "there is no y_sd");
+    }
+    for key in ["state", "product", "input", "factors"] {
+        assert!(document["delays"][key].is_array(), "{key}");
+    }
+    // The bundled square waves repeat every 250 samples, which the longest lag reaches.
+    let (document, _) = found(
+        "ramp-cfd",
+        &["--evaluations", "50", "--objective", "one-step"],
+    );
+    let warnings = document["excitation"].as_array().expect("a list");
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.as_str().is_some_and(|w| w.contains("249–251"))),
+        "{warnings:?}"
+    );
+}
+
+#[test]
+fn a_seed_repeats_bit_for_bit_with_any_number_of_threads() {
+    for objective in ["one-step", "free-run"] {
+        let run = |more: &[&str]| {
+            let mut options = small(&["--objective", objective, "--evaluations", "400"]);
+            // The last `--objective` would be refused as doubled.
+            options.drain(6..8);
+            options.extend(more);
+            let (mut document, model) = found("ramp-cfd", &options);
+            for changing in ["wall_time_s", "model"] {
+                document[changing] = Value::Null;
+            }
+            (document.to_string(), model)
+        };
+        let first = run(&["--seed", "3"]);
+        assert_eq!(first, run(&["--seed", "3"]), "{objective}");
+        assert_eq!(
+            first,
+            run(&["--seed", "3", "--threads", "2"]),
+            "{objective}"
+        );
+    }
+}
+
+#[test]
+fn every_kind_of_model_is_identified() {
+    let (document, model) = found("ramp-cfd", &small(&["--averaged"]));
+    assert!(model.contains("averaged = true"));
+    assert_eq!(
+        document["delays"]["input"].as_array().map(Vec::len),
+        Some(2)
+    );
+
+    let (document, model) = found("ramp-cfd", &small(&["--effect", "amplitude-saturation"]));
+    assert!(model.contains("amplitude-saturation"));
+    assert!(
+        document["identify"]["fit_percent"]
+            .as_f64()
+            .expect("a number")
+            > 50.0
+    );
+
+    let (document, model) = found(
+        "ramp-cfd",
+        &small(&[
+            "--delay-law",
+            "9,2,10",
+            "--factors",
+            "1",
+            "--lags",
+            "literal",
+        ]),
+    );
+    assert!(model.contains("literal"));
+    assert_eq!(document["delays"]["factors"], serde_json::json!([1.0]));
+    assert_eq!(
+        document["delays"]["law"],
+        serde_json::json!([9.0, 2.0, 10.0])
+    );
+
+    let (document, _) = found("ramp-cfd", &small(&["--delay", "fixed"]));
+    assert_eq!(
+        document["delays"]["input"].as_array().map(Vec::len),
+        Some(1)
+    );
+    assert_eq!(document["delays"]["factors"], serde_json::json!([]));
+}
+
+/// The averaged model is refined on the averages that it imitates.
+#[test]
+fn averaged_models_are_refined_on_their_free_run() {
+    let options = [
+        "--averaged",
+        "--n3",
+        "1",
+        "--max-lag",
+        "30",
+        "--objective",
+        "free-run",
+        "--evaluations",
+        "300",
+    ];
+    let (document, _) = found("ramp-cfd", &options);
+    let epsilon = &document["refinement"]["identify_epsilon"];
+    let (before, after) = (epsilon[0].as_f64(), epsilon[1].as_f64());
+    let before = before.expect("a number");
+    let objective = document["objective_value"].as_f64().expect("a number");
+    assert!(after.expect("a number") <= before);
+    assert!(
+        (before / objective - 1.0).abs() < 1e-6,
+        "{before} {objective}"
+    );
+}
+
+#[test]
+fn factors_need_a_law() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = folder.path().join("model.toml");
+    for options in [["--factors", "1"], ["--factors=-1", "--delay-law=9,2,10"]] {
+        let output = identify("ramp-cfd", &model, &options);
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{error}");
+        assert!(error.contains("--factors"), "{error}");
+        assert!(!model.exists());
+    }
+}
+
+/// Ctrl-C: the best so far, as a model file.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_keeps_the_best_so_far() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = folder.path().join("model.toml");
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/paper-like");
+    let process = Command::new(program())
+        .args(["--json", "identify"])
+        .arg(data)
+        .arg("-o")
+        .arg(&model)
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    std::thread::sleep(std::time::Duration::from_millis(2500));
+    let asked = Command::new("kill")
+        .args(["-INT", &process.id().to_string()])
+        .status();
+    assert!(asked.expect("kill runs").success());
+    let output = process.wait_with_output().expect("it ends");
+    assert_eq!(output.status.code(), Some(0));
+    let document: Value = serde_json::from_slice(&output.stdout).expect("one JSON document");
+    assert_eq!(document["stop"], "interrupted");
+    assert!(model.is_file());
+}

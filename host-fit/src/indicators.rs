@@ -135,6 +135,34 @@ impl Scores {
 /// # Errors
 /// A missing channel, or a free run that diverges.
 pub fn score(model: &Model, records: &[Record]) -> Result<(Scores, Vec<Vec<f64>>), SimulateError> {
+    score_with(model, records, |_, error| Err(error))
+}
+
+/// As [`score`], for a model that nobody has run free yet: a record whose free
+/// run diverges has indicators that are not numbers. Also says of which that is true.
+///
+/// # Errors
+/// A missing channel.
+pub fn score_new(
+    model: &Model,
+    records: &[Record],
+) -> Result<(Scores, Vec<SimulateError>), SimulateError> {
+    let mut diverged = Vec::new();
+    let (scores, _) = score_with(model, records, |record, error| match error {
+        SimulateError::Diverged { .. } => {
+            diverged.push(error);
+            Ok(vec![f64::NAN; record.len()])
+        }
+        other => Err(other),
+    })?;
+    Ok((scores, diverged))
+}
+
+fn score_with(
+    model: &Model,
+    records: &[Record],
+    mut instead: impl FnMut(&Record, SimulateError) -> Result<Vec<f64>, SimulateError>,
+) -> Result<(Scores, Vec<Vec<f64>>), SimulateError> {
     let mut scores = Scores {
         records: Vec::new(),
         identify: None,
@@ -143,7 +171,10 @@ pub fn score(model: &Model, records: &[Record]) -> Result<(Scores, Vec<Vec<f64>>
     let (mut identify, mut validate) = (Sums::default(), Sums::default());
     let mut runs = Vec::new();
     for record in records {
-        let run = model.free_run(record)?;
+        let run = match model.free_run(record) {
+            Ok(run) => run,
+            Err(error) => instead(record, error)?,
+        };
         let sums = Sums::of(record, &run, model.warm_up());
         scores
             .records

@@ -11,7 +11,7 @@ use host_fit::fit::lean_base;
 use host_fit::identify::{
     DelayLaw, Identified, IdentifyOptions, InputDelay, Objective, Structure, identify,
 };
-use host_fit::indicators::{Indicators, Scores, score};
+use host_fit::indicators::{Indicators, Scores, score_new};
 use host_fit::model::{Delay, Model, Rounding, Start, Training};
 use host_fit::search::{Progress, Settings, Snapshot};
 use host_fit::simulate::{Signals, Simulator};
@@ -288,15 +288,17 @@ impl Request {
             model = extend(&model, &records, &self.effect)?.model;
             bar.finish_and_clear();
         }
-        let (scores, _) = score(&model, &records)?;
+        let (scores, diverged) = score_new(&model, &records)?;
+        remarks.extend(diverged.iter().map(ToString::to_string));
+        remarks.extend(overfitted(&scores));
         model.training = Training {
             data_hash: set.hash.clone(),
             tool_version: env!("CARGO_PKG_VERSION").to_owned(),
             seed: self.seed,
             objective: identified.objective.name().to_owned(),
             objective_value: identified.objective_value,
-            identify_fit_percent: scores.identify.as_ref().map_or(0.0, |i| i.fit_percent),
-            validate_fit_percent: scores.validate.as_ref().map(|i| i.fit_percent),
+            identify_fit_percent: finite(scores.identify.as_ref()).unwrap_or(0.0),
+            validate_fit_percent: finite(scores.validate.as_ref()),
             ..Training::envelope(&learning)
         };
         Ok(Found {
@@ -388,6 +390,9 @@ fn one_step_norm(model: &Model, set: &DataSet) -> anyhow::Result<f64> {
     Ok(sum.sqrt())
 }
 
+/// Points of FIT between identified and held-out records from which a word is due.
+const OVERFITTED: f64 = 12.0;
+
 #[derive(serde::Serialize)]
 struct Document<'a> {
     model: &'a Path,
@@ -447,6 +452,27 @@ fn delays(model: &Model) -> Delays<'_> {
         factors,
         law,
     }
+}
+
+fn finite(indicators: Option<&Indicators>) -> Option<f64> {
+    indicators
+        .map(|i| i.fit_percent)
+        .filter(|fit| fit.is_finite())
+}
+
+/// What to do about a model that holds on its own records only.
+fn overfitted(scores: &Scores) -> Option<String> {
+    let (own, held_out) = (
+        finite(scores.identify.as_ref())?,
+        finite(scores.validate.as_ref())?,
+    );
+    (held_out < own - OVERFITTED).then(|| {
+        format!(
+            "The model fits what it learned from ({own:.0} % FIT) far better than what was held out ({held_out:.0} %): \
+             it has more lags than these records can tell. Use fewer (`--n1 2 --n2 2`), more varied records, or \
+             `diagnose`, which starts from the fewest lags and adds physical effects."
+        )
+    })
 }
 
 /// Runs the command.

@@ -62,15 +62,23 @@ const HEAD: [&str; 8] = [
 ];
 
 fn row(i: &Indicators) -> [String; 8] {
+    // A free run that diverged has no numbers.
+    let number = |value: f64, digits: usize| {
+        if value.is_finite() {
+            format!("{value:.digits$}")
+        } else {
+            "–".to_owned()
+        }
+    };
     [
         i.name.clone(),
         role_name(i.role).to_owned(),
-        format!("{:.2}", i.fit_percent),
-        format!("{:.4}", i.correlation),
-        format!("{:.5}", i.rmse),
+        number(i.fit_percent, 2),
+        number(i.correlation, 4),
+        number(i.rmse, 5),
         i.noise_rmse
             .map_or_else(|| "–".into(), |n| format!("{n:.5}")),
-        format!("{:.4}", i.epsilon),
+        number(i.epsilon, 4),
         i.inside_envelope
             .map_or_else(|| "–".into(), |f| format!("{:.1} %", 100.0 * f)),
     ]

@@ -234,6 +234,69 @@ fn extend_finds_the_hidden_plenum() {
 }
 
 #[test]
+fn diagnose_names_the_hidden_plenum() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (out, page) = (
+        folder.path().join("new.toml"),
+        folder.path().join("out.html"),
+    );
+    let found = json(&[
+        p("diagnose"),
+        &data("paper/table-2-state-dependent.toml"),
+        &data("hidden-ramp"),
+        p("--report"),
+        &page,
+        p("-o"),
+        &out,
+    ]);
+    keys(
+        &found,
+        &["verdict", "missing", "ladder", "ranking", "where"],
+    );
+    assert_eq!(found["verdict"], "effect-missing");
+    assert_eq!(found["missing"], serde_json::json!(["plenum-droop"]));
+    let ladder = found["ladder"].as_array().expect("a list");
+    for rung in ladder {
+        keys(
+            rung,
+            &[
+                "effects",
+                "validate_rmse",
+                "validate_fit_percent",
+                "noise_rmse",
+            ],
+        );
+    }
+    assert_eq!(ladder[0]["effects"], serde_json::json!([]));
+    let first = &found["ranking"][0];
+    keys(
+        first,
+        &[
+            "effect",
+            "validate_rmse",
+            "error_reduction_percent",
+            "p_value",
+            "parameters",
+            "confounded_with",
+        ],
+    );
+    assert_eq!(first["effect"], "plenum-droop");
+    keys(
+        &first["parameters"]["recovery_time"],
+        &["value", "unit", "low", "high"],
+    );
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let last = ladder.last().expect("a rung");
+    assert!(number(&last["validate_rmse"]) < 1.05 * number(&last["noise_rmse"]));
+    // What was written scores what the ladder says, before and after.
+    let after = json(&[p("compare"), &out, &data("hidden-ramp")]);
+    let apart = number(&after["validate"]["rmse"]) / number(&last["validate_rmse"]) - 1.0;
+    assert!(apart.abs() < 1e-9, "{apart}");
+    let page = std::fs::read_to_string(&page).expect("a page");
+    assert!(page.contains("plenum-droop") && !page.contains("<script src"));
+}
+
+#[test]
 fn the_catalogue_is_listed_whole() {
     let found = json(&[p("effects")]);
     let names: Vec<&str> = found

@@ -30,9 +30,8 @@ impl Bench<'_> {
     /// enough, other first steps are tried as well: the best first one can be an
     /// imitation that only a second one completes.
     pub(super) fn climb(&self, base: Judged, step: &str, most: usize) -> Climb {
-        let names = base.model().effect_names();
         let mut start = Climb {
-            ladder: vec![self.rung(&base.held_out, &names, step)],
+            ladder: vec![self.rung(&base.held_out, &[], step)],
             current: base.clone(),
             base,
             added: Vec::new(),

@@ -45,7 +45,7 @@ pub enum Verdict {
 /// Held-out error after adding effects.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Rung {
-    /// The effects in the model, in the order added.
+    /// The effects added so far, in their order; those of the given model are not among them.
     pub effects: Vec<String>,
     /// Root mean square error of the free run on the held-out records, y.
     pub validate_rmse: f64,
@@ -223,7 +223,7 @@ pub fn diagnose(
     };
     let bench = Bench::new(records, options.seed, fit_options, interrupt)?;
     let as_given = bench.held_out(|_| given)?;
-    let mut ladder = vec![bench.rung(&as_given, &given.effect_names(), "the model as given")];
+    let mut ladder = vec![bench.rung(&as_given, &[], "the model as given")];
     let most = options.most_effects;
     let mut climb = if given.start == Start::Measured {
         // Records that begin in mid-run come from rigs that are no blown ramp:

@@ -4,6 +4,7 @@
 use super::bench::{Bench, Judged, LEVEL, Round};
 use super::evidence::{HeldOut, decoys, last_of_both, p_value};
 use super::{Ranked, estimates};
+use model_core::effect::Spec;
 
 /// An effect must lower the held-out error by this fraction to be worth its parameters …
 pub(super) const WORTHWHILE: f64 = 0.015;
@@ -48,18 +49,25 @@ impl Bench<'_> {
             .map(|(_, judged)| p_value(&current.held_out, &judged.held_out, self.period_s))
             .collect();
         let adjusted = holm(&p);
+        let worth = MINOR * self.excess(&base.held_out);
         if let Some(best) = order.first().copied() {
+            let square = |i: usize| candidates[i].1.held_out.rmse().powi(2);
+            let gain = current.held_out.rmse().powi(2) - square(best);
+            let doubtful = is_unidentified(&candidates[best].1, candidates[best].0);
             let matches = |i: &usize| {
                 let (a, b) = (&candidates[*i].1.held_out, &candidates[best].1.held_out);
-                let square = |held_out: &HeldOut| held_out.rmse().powi(2);
-                let gain = square(&current.held_out) - square(b);
-                alike(a, b, self.period_s) && square(a) - square(b) < NEARLY_ALL * gain
+                let short = square(*i) - square(best);
+                let not_worth_it = a.rmse() < (1.0 + WORTHWHILE) * b.rmse() && short < worth;
+                (alike(a, b, self.period_s) && short < NEARLY_ALL * gain)
+                    || (doubtful && not_worth_it)
             };
             let leading = order.iter().take_while(|i| matches(i)).count();
             // A stable sort: the smaller error first among equals.
-            order[..leading].sort_by_key(|i| candidates[*i].1.parameters());
+            order[..leading].sort_by_key(|i| {
+                let (spec, judged) = &candidates[*i];
+                (is_unidentified(judged, spec), judged.parameters())
+            });
         }
-        let worth = MINOR * self.excess(&base.held_out);
         let mut ranked: Vec<Ranked> = order
             .iter()
             .map(|i| {
@@ -117,6 +125,17 @@ impl Bench<'_> {
         .map(|energy| 1.0 - (1.0 - energy).max(0.0).sqrt())
         .fold(0.0, f64::max)
     }
+}
+
+/// Whether the data leave a parameter anywhere in its range: the effect then
+/// stands for something simpler.
+fn is_unidentified(judged: &Judged, spec: &Spec) -> bool {
+    let estimates = estimates(&judged.fits[0], spec);
+    spec.parameters.iter().any(|parameter| {
+        let whole = parameter.high - parameter.low;
+        let of = estimates.get(parameter.name);
+        whole > 0.0 && of.is_some_and(|e| e.high - e.low >= 0.99 * whole)
+    })
 }
 
 /// Holm's step-down adjustment: valid under any dependence.

@@ -43,6 +43,8 @@ pub struct Ranking<'a> {
 
 const ROW: f64 = 25.0;
 const SIZE: f64 = 14.5;
+/// Width of bold letters over plain ones.
+const BOLD: f64 = 1.12;
 /// Rows drawn; a longer list is cut at the bad end.
 const MOST: usize = 60;
 
@@ -94,7 +96,8 @@ pub fn ranking(plot: &Ranking<'_>) -> String {
         };
         let left = order
             .iter()
-            .map(|c| text_width(c.name, SIZE))
+            // Any of them may be bold.
+            .map(|c| BOLD * text_width(c.name, SIZE))
             .fold(60.0, f64::max)
             .min(320.0)
             + MARGIN

@@ -4,7 +4,8 @@ Usage: search_peers.py --dataset DIR --host-fit PROGRAM --seeds N --evaluations 
 DATASET is a folder with dataset.toml. Prints one line per run:
 method,problem,seed,evaluations,value,CPU seconds,end
 where end says whether the method ended by "itself", at the number of "evaluations"
-or at the "time" it was allowed. CPU seconds of the peers leave out loading and tables;
+or at the "time" it was allowed, or was "broken off" by an error of its own (evaluations and time
+are then those of its last improvement). CPU seconds of the peers leave out loading and tables;
 those of host-fit are of its whole process.
 
 The model is the paper's (N1 = 5, N2 = 10, N3 = 1, lags 1..500 as printed, law (2)
@@ -193,8 +194,8 @@ class Problem:
         self.known[key] = value
         if value < self.best:
             self.best = value
-            # Should the method have to be ended from outside, this is its result.
-            self.report(self, "time")
+            # Should the method break off or be ended from outside, this is its result.
+            self.report(self, "broken off")
         return value
 
 
@@ -297,7 +298,7 @@ def run_one(arguments, method, objective, seed):
             command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
             timeout=60 + 3 * arguments.seconds).stdout
     except subprocess.TimeoutExpired as expired:
-        lines = (expired.stdout or b"").decode()
+        lines = (expired.stdout or b"").decode().replace(",broken off", ",time")
     results = [text for text in lines.splitlines() if text.startswith(method + ",")]
     return results[-1] if results else line(method, objective, seed, 0, DIVERGED, 0.0, "failed")
 

@@ -166,7 +166,7 @@ fn table(lines: &str) -> Result<String> {
             let most = |f: fn(&Run) -> f64| runs.iter().map(f).fold(f64::NEG_INFINITY, f64::max);
             let lowest = runs.iter().map(|r| r.value).fold(f64::INFINITY, f64::min);
             let highest = most(|r| r.value);
-            // Runs that had used up what a peer is allowed.
+            // Runs that had used up what a peer is allowed, or broke off.
             let stopped = runs.iter().filter(|r| !r.by_itself).count();
             text += &format!(
                 "  {method:<24}{:>5}{:>13.0}{lowest:>11.5}{highest:>11.5}{:>11.3}{:>9.2}{:>9.2}{stopped:>9}\n",

@@ -35,7 +35,7 @@ pub struct Ranking<'a> {
     pub y_unit: &'a str,
     /// Candidates in any order; the best comes first in the picture.
     pub candidates: &'a [Candidate<'a>],
-    /// RMSE of the model as given.
+    /// RMSE of the model that the candidates were added to.
     pub base_rmse: Option<f64>,
     /// RMSE that the noise alone causes.
     pub noise_rmse: Option<f64>,
@@ -49,7 +49,7 @@ const BOLD: f64 = 1.12;
 const MOST: usize = 60;
 
 /// Draws candidates as dots with intervals, the best on top, between the noise floor and
-/// the model as given. Returns SVG.
+/// the model without an effect. Returns SVG.
 #[must_use]
 pub fn ranking(plot: &Ranking<'_>) -> String {
     let description = format!("{}: candidate effects by held-out error", plot.title);
@@ -76,7 +76,7 @@ pub fn ranking(plot: &Ranking<'_>) -> String {
             entries.push((Swatch::Dashes(INK), "noise floor".to_owned()));
         }
         if base.is_some() {
-            entries.push((Swatch::Line(MUTED), "model as given".to_owned()));
+            entries.push((Swatch::Line(MUTED), "without an effect".to_owned()));
         }
         let top = heading(canvas, plot.title, &entries);
 

@@ -267,10 +267,21 @@ fn finding_words(diagnosis: &Diagnosis) -> (String, String) {
         }
         Verdict::Unexplained => (
             "something is missing that the catalogue does not have".to_owned(),
-            format!(
-                "The held-out error is {} and {floor}; no effect of the catalogue, nor several, explains most of it.",
-                short(last)
-            ),
+            match diagnosis
+                .ladder
+                .last()
+                .map(|rung| rung.effects.join(" and "))
+            {
+                Some(tried) if !tried.is_empty() => format!(
+                    "The best that the catalogue does is {tried}: the held-out error is then {} and {floor}. \
+                     That is too little to name them as the cause; they are not in the model.",
+                    short(last)
+                ),
+                _ => format!(
+                    "The held-out error is {} and {floor}; no effect of the catalogue, nor several, explains most of it.",
+                    short(last)
+                ),
+            },
         ),
     }
 }

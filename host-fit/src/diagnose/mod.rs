@@ -26,9 +26,11 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use thiserror::Error;
 
-/// Accepted effects that explain less than this share of the excess error leave
-/// the verdict at "unexplained".
-const EXPLAINED: f64 = 0.5;
+/// Effects that explain less than this share of the excess error leave the verdict
+/// at "unexplained", where the noise floor is known …
+const EXPLAINED: f64 = 0.75;
+/// … and where it is not, so that part of what is left may be noise.
+const EXPLAINED_IN_UNKNOWN_NOISE: f64 = 0.5;
 
 /// What a diagnosis says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -115,7 +117,8 @@ pub struct Separation {
 pub struct Diagnosis {
     /// What it says.
     pub verdict: Verdict,
-    /// The missing effects in the order added.
+    /// The missing effects in the order added; none where the verdict is
+    /// "unexplained", though the ladder shows what was tried.
     pub missing: Vec<String>,
     /// How the errors were held out.
     pub held_out_by: HeldOutBy,
@@ -239,6 +242,14 @@ pub fn diagnose(
         return Err(DiagnoseError::Interrupted);
     }
     ladder.append(&mut climb.ladder);
+    let verdict = bench.verdict(&climb.base, &climb.current, climb.added.len());
+    if verdict == Verdict::Unexplained {
+        // Effects that explain the lesser part are imitations: the ladder shows
+        // them, the model is handed over without.
+        climb.current = climb.base.clone();
+        climb.added.clear();
+        climb.matched.clear();
+    }
     let stand_ins = bench.stand_ins(&climb);
     let Climb {
         base,
@@ -265,7 +276,7 @@ pub fn diagnose(
     }
     let separation = bench.separation(&last.model, &stand_ins, options.seed);
     Ok(Diagnosis {
-        verdict: bench.verdict(&base, &current, added.len()),
+        verdict,
         missing: added.iter().map(|spec| spec.name.to_owned()).collect(),
         held_out_by: bench.held_out_by,
         noise_source: bench.noise_source,
@@ -291,7 +302,11 @@ impl Bench<'_> {
             };
         }
         let left = self.excess(&last.held_out) / self.excess(&base.held_out).max(f64::MIN_POSITIVE);
-        if 1.0 - left < EXPLAINED && above_floor {
+        let enough = match self.noise_source {
+            NoiseSource::Scatter => EXPLAINED_IN_UNKNOWN_NOISE,
+            NoiseSource::Measured | NoiseSource::Repeats => EXPLAINED,
+        };
+        if 1.0 - left < enough && above_floor {
             Verdict::Unexplained
         } else {
             Verdict::EffectMissing

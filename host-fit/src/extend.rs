@@ -166,18 +166,31 @@ pub fn extend(
         constant: model.constant != 0.0,
         ..FitOptions::default()
     };
-    let with_all = |base: Model| -> Result<Fit, ExtendError> {
-        let mut current = base;
+    let with_each = |base: &Model, specs: &mut dyn Iterator<Item = &&'static Spec>| {
+        let mut current = base.clone();
         let mut last = None;
-        for spec in &specs {
+        for spec in specs {
             let fitted = fit_with_effect(&current, spec, &learning, &options)?;
             current = fitted.model.clone();
             last = Some(fitted);
         }
         match last {
             // Effects added one after the other are settled together.
-            Some(fitted) if specs.len() == 1 => Ok(fitted),
-            _ => Ok(fit(&current, &learning, &options)?),
+            Some(fitted) if names.len() == 1 => Ok(fitted),
+            _ => Ok::<Fit, ExtendError>(fit(&current, &learning, &options)?),
+        }
+    };
+    // The first of two effects bends to imitate the second and may not find back:
+    // each comes before the other once.
+    let with_all = |base: Model| {
+        let forth = with_each(&base, &mut specs.iter());
+        if specs.len() < 2 {
+            return forth;
+        }
+        match (forth, with_each(&base, &mut specs.iter().rev())) {
+            (Ok(forth), Ok(back)) if back.mean_square() < forth.mean_square() => Ok(back),
+            (Err(_), back) => back,
+            (forth, _) => forth,
         }
     };
     let given = with_all(model.clone());

@@ -13,7 +13,18 @@ const OTHER_STARTS: usize = 2;
 /// What another first step must gain, as a share of the best one's gain.
 const CONTENDER: f64 = 0.5;
 
+/// What may come after the first step of a path.
+enum Next<'a> {
+    /// All candidates.
+    Any,
+    /// Those that counted in some round.
+    Seen,
+    /// This one.
+    Only(&'a str),
+}
+
 /// From a base model, effect by effect.
+#[derive(Clone)]
 pub(super) struct Climb {
     pub(super) base: Judged,
     pub(super) current: Judged,
@@ -55,51 +66,58 @@ impl Bench<'_> {
             return start;
         };
         let mut seen: Vec<String> = contenders.iter().map(|r| r.effect.clone()).collect();
-        let mut best = self.follow(&start, &round, leader, most, &mut seen, false);
-        let simple = best.added.len() == 1 && !self.is_above_floor(&best.current);
-        if !simple {
-            let others = contenders
+        let follow = |first: &Ranked, most: usize, seen: &mut Vec<String>, next: &Next| {
+            let mut path = start.clone();
+            self.add(&mut path, &round, first);
+            self.go_on(&mut path, most, seen, next);
+            path
+        };
+        let better = |path: &Climb, best: &Climb| {
+            let ends = |climb: &Climb| climb.added.len();
+            prefers((&path.current, ends(path)), (&best.current, ends(best)))
+        };
+        let mut best = follow(leader, most, &mut seen, &Next::Any);
+        let others = &contenders[1..];
+        if best.added.len() > 1 || self.is_above_floor(&best.current) {
+            let promising = others
                 .iter()
-                .skip(1)
                 .filter(|other| gain(other) >= CONTENDER * gain(leader));
-            for other in others.take(OTHER_STARTS) {
-                if self.interrupted() {
-                    break;
-                }
-                let path = self.follow(&start, &round, other, most, &mut seen, true);
-                let ends = |climb: &Climb| climb.added.len();
-                if prefers((&path.current, ends(&path)), (&best.current, ends(&best))) {
+            for other in promising.take(OTHER_STARTS) {
+                let path = follow(other, most, &mut seen, &Next::Seen);
+                if better(&path, &best) {
                     best = path;
                 }
+            }
+        }
+        if most > 1 && self.is_above_floor(&best.current) {
+            // A leader that has bent to imitate another effect as well may not find
+            // back when that is added: the other way round it sets out unbent.
+            let mut unbent = None;
+            for other in others {
+                let path = follow(other, 2, &mut seen, &Next::Only(&leader.effect));
+                if better(&path, unbent.as_ref().unwrap_or(&best)) {
+                    unbent = Some(path);
+                }
+            }
+            if let Some(mut path) = unbent {
+                self.go_on(&mut path, most, &mut seen, &Next::Any);
+                best = path;
             }
         }
         best
     }
 
-    /// One path: `first`, then always the leader of the next round. `seen` are the
-    /// effects that counted in any round so far; `only_seen` tries no others.
-    fn follow(
-        &self,
-        start: &Climb,
-        round: &Round,
-        first: &Ranked,
-        most: usize,
-        seen: &mut Vec<String>,
-        only_seen: bool,
-    ) -> Climb {
-        let mut climb = Climb {
-            base: start.base.clone(),
-            current: start.current.clone(),
-            added: Vec::new(),
-            ladder: start.ladder.clone(),
-            ranking: start.ranking.clone(),
-            not_tried: start.not_tried.clone(),
-            matched: Vec::new(),
-        };
-        self.add(&mut climb, round, first);
-        while climb.added.len() < most && !self.at_the_floor(&climb.current.held_out) {
-            let round = self.round(&climb.current, &|name| {
-                !only_seen || seen.iter().any(|seen| seen == name)
+    /// Adds the leader of one round after the other. `seen` are the effects that
+    /// counted in any round so far.
+    fn go_on(&self, climb: &mut Climb, most: usize, seen: &mut Vec<String>, next: &Next) {
+        while climb.added.len() < most
+            && !self.at_the_floor(&climb.current.held_out)
+            && !self.interrupted()
+        {
+            let round = self.round(&climb.current, &|name| match next {
+                Next::Any => true,
+                Next::Seen => seen.iter().any(|seen| seen == name),
+                Next::Only(only) => name == *only,
             });
             if self.interrupted() {
                 break;
@@ -113,9 +131,8 @@ impl Bench<'_> {
             let Some(leader) = ranked.iter().find(|candidate| candidate.significant) else {
                 break;
             };
-            self.add(&mut climb, &round, leader);
+            self.add(climb, &round, leader);
         }
-        climb
     }
 
     fn add(&self, climb: &mut Climb, round: &Round, winner: &Ranked) {

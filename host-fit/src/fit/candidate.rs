@@ -7,12 +7,15 @@ use crate::model::{Delay, Model};
 use model_core::effect::{Parameter, Place, Spec};
 use model_core::recursion::Grading;
 use rayon::prelude::*;
+use std::cmp::Ordering;
 use thiserror::Error;
 
 /// How many starting points are followed to the end.
 const FOLLOWED: usize = 2;
-/// How many are tried with each response to jets of part strength.
-const REGRADED: usize = 4;
+/// Steps that starting points are followed for, and the share of them that goes on.
+const STAGES: [(usize, usize); 3] = [(1, 2), (1, 2), (2, 1)];
+/// At least as many go on, and are tried with each response to jets of part strength.
+const KEPT: usize = 4;
 /// The responses to jets of part strength.
 const GRADINGS: [Grading; 3] = [
     Grading::Proportional,
@@ -61,10 +64,6 @@ pub fn fit_with_effect(
     options: &FitOptions,
 ) -> Result<Fit, CandidateError> {
     let reference = channel_reference(spec, records)?;
-    let brief = FitOptions {
-        iterations: 4,
-        ..*options
-    };
     let scale = Scale::of(records);
     let with = |base: &Model, parameters: &[f64]| {
         let mut model = base.clone();
@@ -80,26 +79,17 @@ pub fn fit_with_effect(
         let fresh = fresh_starts(base, records);
         models.extend(fresh.iter().map(|base| with(base, &[])));
     }
-    let attempt = |models: Vec<Model>| -> Vec<Fit> {
-        let fits: Vec<Option<Fit>> = models
-            .par_iter()
-            .map(|model| fit(model, records, &brief).ok())
-            .collect();
-        fits.into_iter().flatten().collect()
-    };
-    let best_first = |a: &Fit, b: &Fit| a.mean_square().total_cmp(&b.mean_square());
-    let mut tried = attempt(models);
-    tried.sort_by(best_first);
+    let mut tried = narrowed(models, records, options);
     if spec.place == Place::Jet {
         // How the flow takes jets of part strength shows only once there are some.
-        let regraded = tried.iter().take(REGRADED).flat_map(|fit| {
+        let regraded = tried.iter().flat_map(|fit| {
             let others = GRADINGS.into_iter().filter(|g| *g != base.grading);
             others.map(|grading| Model {
                 grading,
                 ..fit.model.clone()
             })
         });
-        tried.extend(attempt(regraded.collect()));
+        tried.extend(narrowed(regraded.collect(), records, options));
         tried.sort_by(best_first);
     }
     tried.truncate(FOLLOWED);
@@ -124,6 +114,32 @@ pub fn fit_with_effect(
         .ok_or_else(|| CandidateError::Unstable {
             effect: spec.name.to_owned(),
         })
+}
+
+/// The best of several starting points, best first: all are followed for a step,
+/// the better half for another, and so on, so that most of the time goes to few.
+fn narrowed(models: Vec<Model>, records: &[&Record], options: &FitOptions) -> Vec<Fit> {
+    let mut models = models;
+    let mut best = Vec::new();
+    for (iterations, divisor) in STAGES {
+        let brief = FitOptions {
+            iterations,
+            ..*options
+        };
+        let fits: Vec<Option<Fit>> = models
+            .par_iter()
+            .map(|model| fit(model, records, &brief).ok())
+            .collect();
+        best = fits.into_iter().flatten().collect::<Vec<Fit>>();
+        best.sort_by(best_first);
+        best.truncate(best.len().div_ceil(divisor).max(KEPT));
+        models = best.iter().map(|fit| fit.model.clone()).collect();
+    }
+    best
+}
+
+fn best_first(a: &Fit, b: &Fit) -> Ordering {
+    a.mean_square().total_cmp(&b.mean_square())
 }
 
 /// The mean of the effect's channel over the records.

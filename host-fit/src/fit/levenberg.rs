@@ -10,8 +10,10 @@ use model_core::Output;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
-/// Derivatives carried by one run.
-const CHUNK: usize = 8;
+/// Derivatives carried by one run: up to eight …
+const FEW: usize = 8;
+/// … or, where more are wanted, up to twelve.
+const MANY: usize = 12;
 
 /// How to fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -194,7 +196,27 @@ impl Problem<'_> {
     }
 
     fn linearise(&self, values: &[f64], record: usize) -> Option<Linearised> {
-        let simulated = self.run(values, record)?;
+        let smooth: Vec<usize> = (0..self.axes.len())
+            .filter(|axis| self.axes[*axis].secant.is_none())
+            .collect();
+        let mut jacobian: Vec<Vec<f64>> = vec![Vec::new(); self.axes.len()];
+        let mut simulated = None;
+        let chunks = smooth.chunks(if smooth.len() <= FEW { FEW } else { MANY });
+        for chunk in chunks {
+            let (run, columns) = if chunk.len() <= FEW {
+                self.sensitivities::<FEW>(values, record, chunk)?
+            } else {
+                self.sensitivities::<MANY>(values, record, chunk)?
+            };
+            simulated = Some(run);
+            for (axis, column) in chunk.iter().zip(columns) {
+                jacobian[*axis] = column;
+            }
+        }
+        let simulated = match simulated {
+            Some(run) => run,
+            None => self.run(values, record)?,
+        };
         let measured = self.measured[record];
         let residual = |(k, sim): (usize, &f64)| {
             if k < self.warm_up {
@@ -204,27 +226,6 @@ impl Problem<'_> {
             }
         };
         let residual: Vec<f64> = simulated.iter().enumerate().map(residual).collect();
-        let mut jacobian: Vec<Vec<f64>> = vec![Vec::new(); self.axes.len()];
-        let smooth: Vec<usize> = (0..self.axes.len())
-            .filter(|axis| self.axes[*axis].secant.is_none())
-            .collect();
-        for chunk in smooth.chunks(CHUNK) {
-            let mut duals: Vec<Dual<CHUNK>> = values.iter().map(|v| Dual::constant(*v)).collect();
-            for (slot, axis) in chunk.iter().enumerate() {
-                let axis = &self.axes[*axis];
-                let value = values[axis.index];
-                duals[axis.index].partials[slot] = axis.slope(value);
-                jacobian[chunk[slot]] = Vec::with_capacity(simulated.len());
-            }
-            let simulator = Simulator::with_values(self.model, &duals, self.rounding);
-            simulator.run(&self.signals[record], |k, output: &Output<Dual<CHUNK>>| {
-                for (slot, axis) in chunk.iter().enumerate() {
-                    let slope = output.measured.partials[slot];
-                    jacobian[*axis].push(if k < self.warm_up { 0.0 } else { slope });
-                }
-                ControlFlow::Continue(())
-            });
-        }
         for (axis, column) in self.axes.iter().zip(&mut jacobian) {
             let Some(half) = axis.secant else { continue };
             let at = |shift: f64| {
@@ -247,9 +248,34 @@ impl Problem<'_> {
                 })
                 .collect();
         }
-        // A run with derivatives breaks off where the plain one would not.
-        let complete = jacobian.iter().all(|column| column.len() == residual.len());
-        complete.then_some(Linearised { residual, jacobian })
+        Some(Linearised { residual, jacobian })
+    }
+
+    /// y_sim of a record and its derivatives with respect to `axes`, at most `P`;
+    /// `None` if it diverges.
+    fn sensitivities<const P: usize>(
+        &self,
+        values: &[f64],
+        record: usize,
+        axes: &[usize],
+    ) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+        let signals = &self.signals[record];
+        let mut duals: Vec<Dual<P>> = values.iter().map(|v| Dual::constant(*v)).collect();
+        for (slot, axis) in axes.iter().enumerate() {
+            let axis = &self.axes[*axis];
+            duals[axis.index].partials[slot] = axis.slope(values[axis.index]);
+        }
+        let mut y = Vec::with_capacity(signals.u.len());
+        let mut columns = vec![Vec::with_capacity(signals.u.len()); axes.len()];
+        let simulator = Simulator::with_values(self.model, &duals, self.rounding);
+        let left = simulator.run(signals, |k, output: &Output<Dual<P>>| {
+            y.push(output.measured.value);
+            for (column, slope) in columns.iter_mut().zip(output.measured.partials) {
+                column.push(if k < self.warm_up { 0.0 } else { slope });
+            }
+            ControlFlow::Continue(())
+        });
+        left.is_none().then_some((y, columns))
     }
 
     fn linearise_all(&self, values: &[f64]) -> Option<Vec<Linearised>> {

@@ -28,7 +28,7 @@ use thiserror::Error;
 
 /// Effects that explain less than this share of the excess error leave the verdict
 /// at "unexplained", where the noise floor is known …
-const EXPLAINED: f64 = 0.75;
+const EXPLAINED: f64 = 0.85;
 /// … and where it is not, so that part of what is left may be noise.
 const EXPLAINED_IN_UNKNOWN_NOISE: f64 = 0.5;
 

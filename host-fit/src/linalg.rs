@@ -49,13 +49,16 @@ pub(crate) fn least_squares(columns: &[Vec<f64>], rhs: &[f64]) -> Result<Vec<f64
 }
 
 /// Solves A·x = b for a symmetric positive definite A (row-major); `None` if it
-/// is not.
+/// is not. Unknowns may be of very different size: A is brought to a unit
+/// diagonal first.
 pub(crate) fn solve_symmetric(a: &[f64], b: &[f64]) -> Option<Vec<f64>> {
     let n = b.len();
-    let a = MatRef::from_row_major_slice(a, n, n);
-    let factor = a.llt(Side::Lower).ok()?;
-    let x = factor.solve(faer::ColRef::from_slice(b));
-    Some(x.iter().copied().collect())
+    let size = |i: usize| a.get(i * n + i).filter(|d| **d > 0.0).map(|d| d.sqrt());
+    let sizes: Vec<f64> = (0..n).map(|i| size(i).unwrap_or(1.0)).collect();
+    let scaled = Mat::from_fn(n, n, |i, j| a[i * n + j] / (sizes[i] * sizes[j]));
+    let right = Mat::from_fn(n, 1, |i, _| b[i] / sizes[i]);
+    let x = scaled.llt(Side::Lower).ok()?.solve(right);
+    Some((0..n).map(|i| x[(i, 0)] / sizes[i]).collect())
 }
 
 /// Adds AᵀB to `out`; A and B are `rows` × `size`, column by column, `out` is

@@ -62,7 +62,6 @@ pub(super) struct Bench<'a> {
     pub(super) held_out_by: HeldOutBy,
     /// Everything that may be learned from, for the model that is handed over.
     identify: Vec<Record>,
-    pub(super) period_s: f64,
     on_off: bool,
     /// σ² of the noise per judged sample.
     floor: Vec<Vec<f64>>,
@@ -82,9 +81,6 @@ impl<'a> Bench<'a> {
     ) -> Result<Self, DiagnoseError> {
         use rand::{RngExt, SeedableRng};
         let (folds, held_out_by) = folds(records);
-        let Some(period_s) = records.first().map(|r| r.sample_period_s) else {
-            return Err(DiagnoseError::NothingToLearnFrom);
-        };
         if folds.is_empty() {
             return Err(DiagnoseError::NothingToLearnFrom);
         }
@@ -105,7 +101,6 @@ impl<'a> Bench<'a> {
             on_off: records.iter().all(Record::is_on_off),
             folds,
             held_out_by,
-            period_s,
             floor,
             noise_source,
             shifts: (0..DECOYS).map(|_| rng.random_range(0.1..0.9)).collect(),
@@ -188,6 +183,18 @@ impl<'a> Bench<'a> {
     pub(super) fn refitted(&self, model: &Model) -> Result<Judged, SimulateError> {
         let fits = (0..self.folds.len())
             .map(|fold| fit(model, &self.learning(fold), &self.options))
+            .collect::<Result<_, _>>()?;
+        self.judge(fits)
+    }
+
+    /// A model as it is, judged.
+    pub(super) fn as_it_is(&self, model: &Model) -> Result<Judged, SimulateError> {
+        let options = FitOptions {
+            iterations: 0,
+            ..self.options
+        };
+        let fits = (0..self.folds.len())
+            .map(|fold| fit(model, &self.learning(fold), &options))
             .collect::<Result<_, _>>()?;
         self.judge(fits)
     }
@@ -342,7 +349,7 @@ impl<'a> Bench<'a> {
     /// the noise is known.
     pub(super) fn is_above_floor(&self, judged: &Judged) -> bool {
         let margin = FLOOR_MARGIN * FLOOR_MARGIN;
-        let p = p_above_noise(&judged.held_out, &self.floor, self.period_s, margin);
+        let p = p_above_noise(&judged.held_out, &self.floor, margin);
         p < LEVEL
             && (self.noise_source != NoiseSource::Scatter
                 || self.unexplained_share(&judged.held_out) > TOO_MUCH

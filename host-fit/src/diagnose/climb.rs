@@ -13,6 +13,10 @@ const OTHER_STARTS: usize = 2;
 /// What another first step must gain, as a share of the best one's gain.
 const CONTENDER: f64 = 0.5;
 
+/// A run that drifts can be fitted to one record and leave on another: a refit that
+/// makes the held-out error this many times larger is not taken.
+const FITS_ONE_RECORD: f64 = 2.0;
+
 /// What may come after the first step of a path.
 enum Next<'a> {
     /// All candidates.
@@ -159,7 +163,7 @@ impl Bench<'_> {
             let without = self.without(&climb.current, climb.added[index], &base);
             let needless = without.filter(|judged| {
                 let loss = judged.held_out.rmse() / climb.current.held_out.rmse() - 1.0;
-                let p = p_value(&judged.held_out, &climb.current.held_out, self.period_s);
+                let p = p_value(&judged.held_out, &climb.current.held_out);
                 loss < WORTHWHILE || p > LEVEL
             });
             match needless {
@@ -201,7 +205,7 @@ impl Bench<'_> {
                 let Ok(judged) = self.with(&without, other) else {
                     continue;
                 };
-                if alike(&judged.held_out, &climb.current.held_out, self.period_s) {
+                if alike(&judged.held_out, &climb.current.held_out) {
                     found.push((spec.name.to_owned(), name.clone(), judged.model().clone()));
                 }
             }
@@ -215,7 +219,14 @@ impl Bench<'_> {
         &self,
         given: &Model,
     ) -> Result<(Judged, &'static str), SimulateError> {
+        let as_it_is = self.as_it_is(given)?;
         let plain = self.refitted(given)?;
+        if plain.held_out.rmse() > FITS_ONE_RECORD * as_it_is.held_out.rmse() {
+            return Ok((
+                as_it_is,
+                "as it is: refitted in free run it leaves elsewhere",
+            ));
+        }
         if given.product_lags.is_empty() {
             let bilinear = Model {
                 product_lags: vec![1],
@@ -224,7 +235,7 @@ impl Bench<'_> {
             };
             if let Ok(bilinear) = self.refitted(&bilinear) {
                 let gain = 1.0 - bilinear.held_out.rmse() / plain.held_out.rmse();
-                let p = p_value(&plain.held_out, &bilinear.held_out, self.period_s);
+                let p = p_value(&plain.held_out, &bilinear.held_out);
                 if gain > WORTHWHILE && p < LEVEL {
                     return Ok((bilinear, "refitted with the product of input and output"));
                 }

@@ -4,9 +4,15 @@
 use crate::fit::dot;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Length of the blocks whose errors count as independent, s. Sensor noise is
-/// correlated over tens of milliseconds, the flow over a tenth of a second.
-const BLOCK_S: f64 = 0.5;
+/// Length of the blocks whose errors count as independent: this many correlation
+/// times of the errors …
+const CORRELATION_TIMES: f64 = 8.0;
+/// … but not less than so many samples …
+const SHORTEST: usize = 20;
+/// … and not so long that there are fewer than so many blocks.
+const FEWEST: usize = 24;
+/// Values that are enough to estimate a correlation time from.
+const PLENTY: usize = 4000;
 
 /// Standard deviation of normal numbers over their median absolute deviation.
 const NORMAL: f64 = 1.4826;
@@ -18,6 +24,8 @@ pub(super) struct HeldOut {
     /// Σ e² and the number of samples.
     pub(super) sum_of_squares: f64,
     pub(super) samples: usize,
+    /// Samples of a block that counts as independent of the next.
+    block: usize,
 }
 
 impl HeldOut {
@@ -25,6 +33,7 @@ impl HeldOut {
         let sum_of_squares = errors.iter().map(|e| dot(e, e)).sum();
         let samples = errors.iter().map(Vec::len).sum();
         Self {
+            block: block(&errors),
             errors,
             sum_of_squares,
             samples,
@@ -40,9 +49,27 @@ impl HeldOut {
     }
 }
 
-/// Samples of a block.
-fn block(period_s: f64) -> usize {
-    ((BLOCK_S / period_s).round() as usize).max(20)
+/// Samples of a block whose errors count as independent of the next one's.
+fn block(errors: &[Vec<f64>]) -> usize {
+    let samples: usize = errors.iter().map(Vec::len).sum();
+    let thinned = (samples / PLENTY).max(1);
+    let means = |errors: &Vec<f64>| -> Vec<f64> {
+        let each = errors.chunks_exact(thinned);
+        each.map(|chunk| chunk.iter().sum::<f64>() / thinned as f64)
+            .collect()
+    };
+    let series: Vec<Vec<f64>> = errors.iter().map(means).collect();
+    let covariance = |lag: usize| -> f64 {
+        let pairs = series.iter().filter(|s| s.len() > lag);
+        pairs.map(|s| dot(&s[lag..], &s[..s.len() - lag])).sum()
+    };
+    let longest = samples / FEWEST;
+    let variance = covariance(0).max(f64::MIN_POSITIVE);
+    // Summed up to where the correlation is lost for the first time.
+    let correlations = (1..=longest / thinned).map(|lag| covariance(lag) / variance);
+    let time = 1.0 + 2.0 * correlations.take_while(|rho| *rho > 0.0).sum::<f64>();
+    let samples = (CORRELATION_TIMES * time * thinned as f64) as usize;
+    samples.clamp(SHORTEST, longest.max(SHORTEST))
 }
 
 /// One-sided p-value of "`better` has the smaller held-out error than `worse`".
@@ -53,8 +80,8 @@ fn block(period_s: f64) -> usize {
 /// (cluster-robust), as many degrees of freedom as there are blocks in which the
 /// models differ. A paired test on the blocks' gains would take it for scatter
 /// that a gain lies in few places.
-pub(super) fn p_value(worse: &HeldOut, better: &HeldOut, period_s: f64) -> f64 {
-    let block = block(period_s);
+pub(super) fn p_value(worse: &HeldOut, better: &HeldOut) -> f64 {
+    let block = better.block;
     // m·d and d·d of the blocks.
     let mut blocks = Vec::new();
     for (worse, better) in worse.errors.iter().zip(&better.errors) {
@@ -102,13 +129,8 @@ fn median(mut numbers: Vec<f64>) -> f64 {
 /// times Σ σ²" by blocks; σ² per sample in the same shape as the errors. How much
 /// blocks scatter is taken from their median deviation: an excess that lies in few
 /// of them must not hide behind itself.
-pub(super) fn p_above_noise(
-    held_out: &HeldOut,
-    variance: &[Vec<f64>],
-    period_s: f64,
-    margin: f64,
-) -> f64 {
-    let block = block(period_s);
+pub(super) fn p_above_noise(held_out: &HeldOut, variance: &[Vec<f64>], margin: f64) -> f64 {
+    let block = held_out.block;
     let mut excess = Vec::new();
     for (errors, variance) in held_out.errors.iter().zip(variance) {
         let (errors, variance) = last_of_both(errors, variance);
@@ -194,7 +216,7 @@ mod tests {
                 HeldOut::new((0..2).map(|_| coloured(rng, 10_000)).collect())
             };
             let (a, b) = (held_out(&mut rng), held_out(&mut rng));
-            alarms += usize::from(p_value(&a, &b, 0.001) < 0.05);
+            alarms += usize::from(p_value(&a, &b) < 0.05);
         }
         // Binomial(400, 0.05): 20 ± 4.4.
         assert!((7..=35).contains(&alarms), "{alarms} of {trials}");
@@ -222,8 +244,8 @@ mod tests {
                 };
                 HeldOut::new(noise.iter().map(off).collect())
             };
-            alarms += usize::from(p_value(&off_by(0.5), &off_by(-0.5), 0.001) < 0.05);
-            found += usize::from(p_value(&off_by(1.0), &off_by(0.0), 0.001) < 0.01);
+            alarms += usize::from(p_value(&off_by(0.5), &off_by(-0.5)) < 0.05);
+            found += usize::from(p_value(&off_by(1.0), &off_by(0.0)) < 0.01);
         }
         // Six clusters: the test is a little off its level.
         assert!((5..=45).contains(&alarms), "{alarms} of {trials}");

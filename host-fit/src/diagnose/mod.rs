@@ -28,7 +28,7 @@ use thiserror::Error;
 
 /// Effects that explain less than this share of the excess error leave the verdict
 /// at "unexplained", where the noise floor is known …
-const EXPLAINED: f64 = 0.85;
+const EXPLAINED: f64 = 0.9;
 /// … and where it is not, so that part of what is left may be noise.
 const EXPLAINED_IN_UNKNOWN_NOISE: f64 = 0.5;
 
@@ -242,7 +242,13 @@ pub fn diagnose(
         return Err(DiagnoseError::Interrupted);
     }
     ladder.append(&mut climb.ladder);
-    let verdict = bench.verdict(&climb.base, &climb.current, climb.added.len());
+    let verdict = match bench.verdict(&climb.base, &climb.current, climb.added.len()) {
+        // Effects on a base that is worse than what was given explain nothing.
+        Verdict::EffectMissing if climb.current.held_out.rmse() >= as_given.rmse() => {
+            Verdict::Unexplained
+        }
+        verdict => verdict,
+    };
     if verdict == Verdict::Unexplained {
         // Effects that explain the lesser part are imitations: the ladder shows
         // them, the model is handed over without.

@@ -4,10 +4,14 @@
 use super::bench::{Bench, Judged, LEVEL, Round};
 use super::evidence::{HeldOut, decoys, last_of_both, p_value};
 use super::{Ranked, estimates};
+use crate::residual::NoiseSource;
 use model_core::effect::Spec;
 
 /// An effect must lower the held-out error by this fraction to be worth its parameters …
 pub(super) const WORTHWHILE: f64 = 0.015;
+/// … by this one where neither the noise is known nor anything shows that the base
+/// errs by more than noise …
+const WORTHWHILE_IN_THE_DARK: f64 = 0.1;
 /// … and the excess error of the base by this one: what a model's own coarseness
 /// leaves (its sampling, the shape of a threshold) is no effect.
 const MINOR: f64 = 0.01;
@@ -17,9 +21,9 @@ const NEARLY_ALL: f64 = 0.1;
 const ALIKE: f64 = 0.005;
 
 /// Whether the data cannot tell two models apart: by chance or by size.
-pub(super) fn alike(a: &HeldOut, b: &HeldOut, period_s: f64) -> bool {
+pub(super) fn alike(a: &HeldOut, b: &HeldOut) -> bool {
     let (better, worse) = if a.rmse() <= b.rmse() { (a, b) } else { (b, a) };
-    worse.rmse() <= (1.0 + ALIKE) * better.rmse() || p_value(worse, better, period_s) >= LEVEL
+    worse.rmse() <= (1.0 + ALIKE) * better.rmse() || p_value(worse, better) >= LEVEL
 }
 
 /// Which of two ends of a search to keep: the clearly better one, and among equals
@@ -46,10 +50,16 @@ impl Bench<'_> {
         order.sort_by(|a, b| error(a).total_cmp(&error(b)));
         let p: Vec<f64> = candidates
             .iter()
-            .map(|(_, judged)| p_value(&current.held_out, &judged.held_out, self.period_s))
+            .map(|(_, judged)| p_value(&current.held_out, &judged.held_out))
             .collect();
         let adjusted = holm(&p);
         let worth = MINOR * self.excess(&base.held_out);
+        let in_the_dark = self.noise_source == NoiseSource::Scatter && !self.is_above_floor(base);
+        let worthwhile = if in_the_dark {
+            WORTHWHILE_IN_THE_DARK
+        } else {
+            WORTHWHILE
+        };
         if let Some(best) = order.first().copied() {
             let square = |i: usize| candidates[i].1.held_out.rmse().powi(2);
             let gain = current.held_out.rmse().powi(2) - square(best);
@@ -58,8 +68,7 @@ impl Bench<'_> {
                 let (a, b) = (&candidates[*i].1.held_out, &candidates[best].1.held_out);
                 let short = square(*i) - square(best);
                 let not_worth_it = a.rmse() < (1.0 + WORTHWHILE) * b.rmse() && short < worth;
-                (alike(a, b, self.period_s) && short < NEARLY_ALL * gain)
-                    || (doubtful && not_worth_it)
+                (alike(a, b) && short < NEARLY_ALL * gain) || (doubtful && not_worth_it)
             };
             let leading = order.iter().take_while(|i| matches(i)).count();
             // A stable sort: the smaller error first among equals.
@@ -84,9 +93,10 @@ impl Bench<'_> {
                     parameters: estimates(&judged.fits[0], spec),
                     confounded_with: Vec::new(),
                     significant: adjusted[*i] < LEVEL
-                        && reduction > WORTHWHILE
+                        && reduction > worthwhile
                         && before * before - after * after > worth
-                        && reduction > chance,
+                        && reduction > chance
+                        && !is_shapeless(judged, spec),
                 }
             })
             .collect();
@@ -94,7 +104,7 @@ impl Bench<'_> {
             for b in 0..ranked.len() {
                 let (x, y) = (&candidates[order[a]].1, &candidates[order[b]].1);
                 let both = ranked[a].significant && ranked[b].significant;
-                if a != b && both && alike(&x.held_out, &y.held_out, self.period_s) {
+                if a != b && both && alike(&x.held_out, &y.held_out) {
                     let other = ranked[b].effect.clone();
                     ranked[a].confounded_with.push(other);
                 }
@@ -130,12 +140,25 @@ impl Bench<'_> {
 /// Whether the data leave a parameter anywhere in its range: the effect then
 /// stands for something simpler.
 fn is_unidentified(judged: &Judged, spec: &Spec) -> bool {
+    unidentified(judged, spec) > 0
+}
+
+/// Whether the data leave every parameter anywhere in its range: whatever the
+/// effect does to the error, it is not known to be there.
+fn is_shapeless(judged: &Judged, spec: &Spec) -> bool {
+    let count = unidentified(judged, spec);
+    count > 0 && count == spec.parameters.len()
+}
+
+/// Parameters that the data leave anywhere in their range.
+fn unidentified(judged: &Judged, spec: &Spec) -> usize {
     let estimates = estimates(&judged.fits[0], spec);
-    spec.parameters.iter().any(|parameter| {
+    let anywhere = spec.parameters.iter().filter(|parameter| {
         let whole = parameter.high - parameter.low;
         let of = estimates.get(parameter.name);
         whole > 0.0 && of.is_some_and(|e| e.high - e.low >= 0.99 * whole)
-    })
+    });
+    anywhere.count()
 }
 
 /// Holm's step-down adjustment: valid under any dependence.

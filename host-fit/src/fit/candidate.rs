@@ -10,7 +10,8 @@ use rayon::prelude::*;
 use std::cmp::Ordering;
 use thiserror::Error;
 
-/// How many starting points are followed to the end.
+/// How many starting points are followed to the end, beside the best with each
+/// response to jets of part strength.
 const FOLLOWED: usize = 2;
 /// Steps that starting points are followed for, and the share of them that goes on.
 const STAGES: [(usize, usize); 3] = [(1, 2), (1, 2), (2, 1)];
@@ -92,8 +93,14 @@ pub fn fit_with_effect(
         tried.extend(narrowed(regraded.collect(), records, options));
         tried.sort_by(best_first);
     }
-    tried.truncate(FOLLOWED);
-    let finished: Vec<Option<Fit>> = tried
+    let mut met = Vec::new();
+    let leading = tried.iter().enumerate().filter(|(place, fit)| {
+        let first_of_its_grading = !met.contains(&fit.model.grading);
+        met.push(fit.model.grading);
+        *place < FOLLOWED || first_of_its_grading
+    });
+    let leading: Vec<&Fit> = leading.map(|(_, fit)| fit).collect();
+    let finished: Vec<Option<Fit>> = leading
         .par_iter()
         .map(|start| {
             let lost_its_law = spec.parameters.is_empty()

@@ -134,16 +134,18 @@ pub fn settle_fixed_delay(
                 let mut model = best.model.clone();
                 let shift =
                     |h: &u16| (i32::from(*h) + by).clamp(0, most.min(i32::from(u16::MAX))) as u16;
-                model.delay = Delay::Fixed {
-                    delays: delays.iter().map(shift).collect(),
-                };
-                fit(&model, records, &brief)
+                let shifted: Vec<u16> = delays.iter().map(shift).collect();
+                if shifted == *delays {
+                    return None;
+                }
+                model.delay = Delay::Fixed { delays: shifted };
+                fit(&model, records, &brief).ok()
             };
             let (up, down) = rayon::join(|| moved(step), || moved(-step));
             let nearer = [up, down]
                 .into_iter()
                 .flatten()
-                .filter(|fit| fit.mean_square() < best.mean_square() * (1.0 - 1e-6))
+                .filter(|fit| fit.mean_square() < best.mean_square() * (1.0 - options.tolerance))
                 .min_by(|a, b| a.mean_square().total_cmp(&b.mean_square()));
             match nearer {
                 Some(fit) => best = fit,

@@ -9,7 +9,9 @@ use std::collections::BTreeMap;
 
 use crate::data::{Record, Use};
 use crate::diagnose::ParameterEstimate;
-use crate::fit::{CandidateError, Fit, FitOptions, fit, fit_with_effect, lean_base};
+use crate::fit::{
+    CandidateError, Fit, FitOptions, fit, fit_with_effect, lean_base, pieces, restart_after,
+};
 use crate::model::{Model, Start};
 use crate::simulate::SimulateError;
 use model_core::effect::Spec;
@@ -165,6 +167,17 @@ pub fn extend(
     let options = FitOptions {
         constant: model.constant != 0.0,
         ..FitOptions::default()
+    };
+    let cut: Vec<Record>;
+    let learning = match restart_after(model, records) {
+        Some(samples) => {
+            cut = learning
+                .iter()
+                .flat_map(|record| pieces(record, samples))
+                .collect();
+            cut.iter().collect()
+        }
+        None => learning,
     };
     let with_each = |base: &Model, specs: &mut dyn Iterator<Item = &&'static Spec>| {
         let mut current = base.clone();

@@ -68,6 +68,7 @@ struct Document<'a> {
     detectable: &'a [Detectable],
     /// How the errors were held out.
     held_out_by: HeldOutBy,
+    restarted_s: Option<f64>,
     /// Where the noise floor comes from, and its size, y rms.
     noise_source: NoiseSource,
     noise_estimate: f64,
@@ -156,6 +157,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         places: failures.as_ref().map_or(&[], |failures| &failures.by),
         detectable: &detectable,
         held_out_by: diagnosis.held_out_by,
+        restarted_s: diagnosis.restarted_s,
         noise_source: diagnosis.noise_source,
         noise_estimate: diagnosis.noise_estimate,
         experiment: separation.map(|separation| ExperimentDocument {
@@ -197,6 +199,12 @@ pub(crate) fn verdict_words(diagnosis: &Diagnosis) -> (String, String) {
         HeldOutBy::End => meaning.push_str(
             " There is one record only: its end was judged by models that saw its beginning; a second record would say more.",
         ),
+    }
+    if let Some(seconds) = diagnosis.restarted_s {
+        meaning.push_str(&format!(
+            " The rig integrates and its free run drifts: all errors here are of free runs that start anew from the measurement every {} s.",
+            short(seconds)
+        ));
     }
     if let Some(separation) = &diagnosis.separation {
         meaning.push_str(&format!(

@@ -49,6 +49,31 @@ pub struct Record {
 }
 
 impl Record {
+    /// The samples `from..to` as a record of their own; what lies beyond the end is left out.
+    #[must_use]
+    pub fn part(&self, from: usize, to: usize) -> Self {
+        let cut = |series: &Vec<f64>| -> Vec<f64> {
+            let wanted = series.iter().skip(from).take(to.saturating_sub(from));
+            wanted.copied().collect()
+        };
+        Self {
+            name: self.name.clone(),
+            role: self.role,
+            sample_period_s: self.sample_period_s,
+            t0: self.t0 + from as f64 * self.sample_period_s,
+            u: cut(&self.u),
+            y: cut(&self.y),
+            y_sd: self.y_sd.as_ref().map(cut),
+            y_min: self.y_min.as_ref().map(cut),
+            y_max: self.y_max.as_ref().map(cut),
+            channels: self
+                .channels
+                .iter()
+                .map(|(name, series)| (name.clone(), cut(series)))
+                .collect(),
+        }
+    }
+
     /// A record of input and output alone, starting at t = 0.
     #[must_use]
     pub fn new(name: &str, role: Use, sample_period_s: f64, u: Vec<f64>, y: Vec<f64>) -> Self {

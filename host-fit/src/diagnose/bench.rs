@@ -5,7 +5,7 @@ use super::evidence::{HeldOut, p_above_noise};
 use super::folds::{Fold, HeldOutBy, folds};
 use super::{DiagnoseError, NotTried, Rung};
 use crate::data::Record;
-use crate::fit::{Fit, FitOptions, fit, fit_with_effect, lean_base};
+use crate::fit::{Fit, FitOptions, fit, fit_with_effect, lean_base, pieces};
 use crate::model::Model;
 use crate::residual::{NoiseSource, examine, noise_floor};
 use crate::simulate::SimulateError;
@@ -75,12 +75,25 @@ pub(super) struct Bench<'a> {
 impl<'a> Bench<'a> {
     pub(super) fn new(
         records: &[Record],
+        restarted: Option<usize>,
         seed: u64,
         options: FitOptions,
         interrupt: &'a AtomicBool,
     ) -> Result<Self, DiagnoseError> {
         use rand::{RngExt, SeedableRng};
-        let (folds, held_out_by) = folds(records);
+        let (mut folds, held_out_by) = folds(records);
+        let mut identify: Vec<Record> = records
+            .iter()
+            .filter(|r| r.role == crate::data::Use::Identify)
+            .cloned()
+            .collect();
+        if let Some(samples) = restarted {
+            folds = folds.iter().map(|fold| fold.restarted(samples)).collect();
+            identify = identify
+                .iter()
+                .flat_map(|record| pieces(record, samples))
+                .collect();
+        }
         if folds.is_empty() {
             return Err(DiagnoseError::NothingToLearnFrom);
         }
@@ -93,11 +106,7 @@ impl<'a> Bench<'a> {
         }
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
         Ok(Self {
-            identify: records
-                .iter()
-                .filter(|r| r.role == crate::data::Use::Identify)
-                .cloned()
-                .collect(),
+            identify,
             on_off: records.iter().all(Record::is_on_off),
             folds,
             held_out_by,
@@ -183,18 +192,6 @@ impl<'a> Bench<'a> {
     pub(super) fn refitted(&self, model: &Model) -> Result<Judged, SimulateError> {
         let fits = (0..self.folds.len())
             .map(|fold| fit(model, &self.learning(fold), &self.options))
-            .collect::<Result<_, _>>()?;
-        self.judge(fits)
-    }
-
-    /// A model as it is, judged.
-    pub(super) fn as_it_is(&self, model: &Model) -> Result<Judged, SimulateError> {
-        let options = FitOptions {
-            iterations: 0,
-            ..self.options
-        };
-        let fits = (0..self.folds.len())
-            .map(|fold| fit(model, &self.learning(fold), &options))
             .collect::<Result<_, _>>()?;
         self.judge(fits)
     }

@@ -2,6 +2,7 @@
 //! record in turn, or the end of the only one.
 
 use crate::data::{Record, Use};
+use crate::fit::pieces;
 
 /// Most folds of a cross-validation.
 const MOST_FOLDS: usize = 4;
@@ -22,6 +23,24 @@ pub(super) struct Fold {
 pub(super) struct Judging {
     pub(super) record: Record,
     pub(super) from: usize,
+}
+
+impl Fold {
+    /// The same split with free runs that start anew every `samples`.
+    pub(super) fn restarted(&self, samples: usize) -> Self {
+        let judging = self.judging.iter().flat_map(|judging| {
+            let judged = judging.record.part(judging.from, judging.record.len());
+            pieces(&judged, samples)
+        });
+        Self {
+            learning: self
+                .learning
+                .iter()
+                .flat_map(|record| pieces(record, samples))
+                .collect(),
+            judging: judging.map(|record| Judging { record, from: 0 }).collect(),
+        }
+    }
 }
 
 /// How the error was held out.
@@ -61,7 +80,7 @@ pub(super) fn folds(records: &[Record]) -> (Vec<Fold>, HeldOutBy) {
     if let [only] = identify.as_slice() {
         let from = (LEARNED_SHARE * only.len() as f64) as usize;
         let fold = Fold {
-            learning: vec![beginning(only, from)],
+            learning: vec![only.part(0, from)],
             judging: vec![Judging {
                 record: (*only).clone(),
                 from,
@@ -85,24 +104,6 @@ pub(super) fn folds(records: &[Record]) -> (Vec<Fold>, HeldOutBy) {
         fold
     };
     ((0..count).map(fold).collect(), HeldOutBy::Turns)
-}
-
-/// The first `samples` of a record.
-fn beginning(record: &Record, samples: usize) -> Record {
-    let cut = |series: &Vec<f64>| series.iter().take(samples).copied().collect();
-    Record {
-        u: cut(&record.u),
-        y: cut(&record.y),
-        y_sd: record.y_sd.as_ref().map(cut),
-        y_min: record.y_min.as_ref().map(cut),
-        y_max: record.y_max.as_ref().map(cut),
-        channels: record
-            .channels
-            .iter()
-            .map(|(name, series)| (name.clone(), cut(series)))
-            .collect(),
-        ..record.clone()
-    }
 }
 
 #[cfg(test)]
@@ -159,6 +160,21 @@ mod tests {
             assert_eq!(learned.len() + judged.len(), 5);
             assert!(judged.iter().all(|name| !learned.contains(name)));
         }
+    }
+
+    #[test]
+    fn restarts_keep_every_sample_once() {
+        let (folds, _) = folds(&[record("a", Use::Identify)]);
+        let fold = folds[0].restarted(3);
+        let lengths = |records: &[Record]| records.iter().map(Record::len).collect::<Vec<_>>();
+        assert_eq!(lengths(&fold.learning), [3, 3]);
+        let judged: Vec<f64> = fold
+            .judging
+            .iter()
+            .flat_map(|j| j.record.y.clone())
+            .collect();
+        assert_eq!(judged, [6.0, 7.0, 8.0, 9.0]);
+        assert!((fold.learning[1].t0 - 0.003).abs() < 1e-12);
     }
 
     #[test]

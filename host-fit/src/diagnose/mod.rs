@@ -14,7 +14,7 @@ pub use folds::HeldOutBy;
 
 use crate::data::Record;
 use crate::experiment::{Experiment, Limits, separating};
-use crate::fit::{Fit, FitOptions};
+use crate::fit::{Fit, FitOptions, restart_after};
 use crate::model::{Model, Start};
 use crate::residual::NoiseSource;
 use crate::simulate::SimulateError;
@@ -122,6 +122,9 @@ pub struct Diagnosis {
     pub missing: Vec<String>,
     /// How the errors were held out.
     pub held_out_by: HeldOutBy,
+    /// After how many seconds free runs started anew from the measurement, for rigs
+    /// that drift: see [`restart_after`].
+    pub restarted_s: Option<f64>,
     /// Where the noise floor comes from.
     pub noise_source: NoiseSource,
     /// The noise floor on what was judged, y rms: measured or estimated.
@@ -224,14 +227,15 @@ pub fn diagnose(
         constant: given.start == Start::Measured || given.constant != 0.0,
         ..FitOptions::default()
     };
-    let bench = Bench::new(records, options.seed, fit_options, interrupt)?;
+    let restarted = restart_after(given, records);
+    let bench = Bench::new(records, restarted, options.seed, fit_options, interrupt)?;
     let as_given = bench.held_out(|_| given)?;
     let mut ladder = vec![bench.rung(&as_given, &[], "the model as given")];
     let most = options.most_effects;
     let mut climb = if given.start == Start::Measured {
         // Records that begin in mid-run come from rigs that are no blown ramp:
         // their dynamics is the user's choice of lags.
-        let (base, step) = bench.with_the_product(given)?;
+        let (base, step) = bench.with_the_product(given, &as_given)?;
         bench.climb(base, step, most)
     } else {
         let lean = bench.lean(given)?;
@@ -285,6 +289,7 @@ pub fn diagnose(
         verdict,
         missing: added.iter().map(|spec| spec.name.to_owned()).collect(),
         held_out_by: bench.held_out_by,
+        restarted_s: restarted.map(|samples| samples as f64 * given.sample_period_s),
         noise_source: bench.noise_source,
         noise_estimate: bench.noise_rmse(),
         ladder,

@@ -90,6 +90,8 @@ struct Axis {
     high: f64,
     /// Half width of the secant, for coordinates that act in steps.
     secant: Option<f64>,
+    /// The index of a coordinate that moves against this one, so that their sum stays.
+    against: Option<usize>,
 }
 
 impl Axis {
@@ -101,6 +103,7 @@ impl Axis {
                 low: f64::NEG_INFINITY,
                 high: f64::INFINITY,
                 secant: None,
+                against: None,
             },
             Some(parameter) => Self {
                 index,
@@ -109,6 +112,7 @@ impl Axis {
                 high: parameter.high,
                 secant: (!coordinate.is_smooth())
                     .then_some(0.01 * (parameter.high - parameter.low)),
+                against: None,
             },
         }
     }
@@ -264,6 +268,9 @@ impl Problem<'_> {
         for (slot, axis) in axes.iter().enumerate() {
             let axis = &self.axes[*axis];
             duals[axis.index].partials[slot] = axis.slope(values[axis.index]);
+            if let Some(index) = axis.against {
+                duals[index].partials[slot] = -1.0;
+            }
         }
         let mut y = Vec::with_capacity(signals.u.len());
         let mut columns = vec![Vec::with_capacity(signals.u.len()); axes.len()];
@@ -405,7 +412,10 @@ fn descend(
         .iter()
         .enumerate()
         .filter(|(index, coordinate)| moves(*index, coordinate))
-        .map(|(index, coordinate)| Axis::of(index, coordinate))
+        .map(|(index, coordinate)| Axis {
+            against: held_sum(model, index),
+            ..Axis::of(index, coordinate)
+        })
         .collect();
     let problem = Problem {
         model,
@@ -451,7 +461,10 @@ fn descend(
             if let Some(step) = bounded_step(&damped, &gradient, &reach) {
                 let mut moved = values.clone();
                 for (axis, step) in problem.axes.iter().zip(&step) {
-                    moved[axis.index] = axis.moved(values[axis.index], *step);
+                    moved[axis.index] = axis.moved(moved[axis.index], *step);
+                    if let Some(index) = axis.against {
+                        moved[index] -= step;
+                    }
                 }
                 let moved_cost = problem.cost(&moved, cost);
                 if moved_cost < cost {
@@ -521,26 +534,39 @@ fn sandwich(parts: &[Linearised], information: &[f64], n: usize) -> Option<Vec<f
             from = to;
         }
     }
-    let product = |left: &dyn Fn(usize, usize) -> f64, right: &dyn Fn(usize, usize) -> f64| {
-        let mut out = vec![0.0; n * n];
-        for i in 0..n {
-            for j in 0..n {
-                out[i * n + j] = (0..n).map(|k| left(i, k) * right(k, j)).sum();
-            }
-        }
-        out
-    };
-    let half = product(&|i, k| inverse[k][i], &|k, j| middle[k * n + j]);
-    Some(product(&|i, k| half[i * n + k], &|k, j| inverse[j][k]))
+    let half = product(n, |i, k| inverse[k][i], |k, j| middle[k * n + j]);
+    Some(product(n, |i, k| half[i * n + k], |k, j| inverse[j][k]))
 }
 
-fn in_values(mut searched: Vec<f64>, axes: &[Axis], values: &[f64]) -> Vec<f64> {
+/// Covariance of the coordinates themselves from that of what is searched.
+fn in_values(searched: Vec<f64>, axes: &[Axis], values: &[f64]) -> Vec<f64> {
     let n = axes.len();
-    for (i, row) in axes.iter().enumerate() {
-        for (j, column) in axes.iter().enumerate() {
-            searched[i * n + j] *=
-                row.slope(values[row.index]) * column.slope(values[column.index]);
-        }
-    }
-    searched
+    // ∂coordinate i/∂searched j.
+    let slope = |i: usize, j: usize| match axes[j].against {
+        _ if i == j => axes[j].slope(values[axes[j].index]),
+        Some(index) if axes[i].index == index => -1.0,
+        _ => 0.0,
+    };
+    let half = product(n, |i, k| slope(i, k), |k, j| searched[k * n + j]);
+    product(n, |i, k| half[i * n + k], |k, j| slope(j, k))
+}
+
+/// The product of two square matrices, row-major.
+fn product(
+    n: usize,
+    left: impl Fn(usize, usize) -> f64,
+    right: impl Fn(usize, usize) -> f64,
+) -> Vec<f64> {
+    let cells = (0..n * n).map(|cell| (cell / n, cell % n));
+    cells
+        .map(|(i, j)| (0..n).map(|k| left(i, k) * right(k, j)).sum())
+        .collect()
+}
+
+/// The coordinate that moves against the one with index `index`: a_1 against every
+/// other a_i. Oversampled rigs fix the sum of the a_i to many digits and what is
+/// left to fewer; damped in proportion to the former, the latter would never move.
+fn held_sum(model: &Model, index: usize) -> Option<usize> {
+    // The constant comes before a_1.
+    (2..=model.a.len()).contains(&index).then_some(1)
 }

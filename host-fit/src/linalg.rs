@@ -7,6 +7,11 @@ use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
 /// Singular values below this share of the largest count as zero.
 const RANK_TOLERANCE: f64 = 1e-12;
 
+/// Directions with less than this share of the best known one's information are unknown.
+const UNKNOWN: f64 = 1e-11;
+/// A coordinate takes part in directions that hold more than this share of it.
+const TAKES_PART: f64 = 1e-6;
+
 /// A decomposition that did not converge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
@@ -59,6 +64,33 @@ pub(crate) fn solve_symmetric(a: &[f64], b: &[f64]) -> Option<Vec<f64>> {
     let right = Mat::from_fn(n, 1, |i, _| b[i] / sizes[i]);
     let x = scaled.llt(Side::Lower).ok()?.solve(right);
     Some((0..n).map(|i| x[(i, 0)] / sizes[i]).collect())
+}
+
+/// The inverse of an information matrix (symmetric, row-major, `n` × `n`) in the
+/// directions that it knows, and which coordinates take part in the others.
+/// `None` if the decomposition fails.
+pub(crate) fn inverse_where_known(a: &[f64], n: usize) -> Option<(Vec<f64>, Vec<bool>)> {
+    let size = |i: usize| a.get(i * n + i).filter(|d| **d > 0.0).map(|d| d.sqrt());
+    let sizes: Vec<f64> = (0..n).map(|i| size(i).unwrap_or(1.0)).collect();
+    let scaled = Mat::from_fn(n, n, |i, j| a[i * n + j] / (sizes[i] * sizes[j]));
+    let eigen = scaled.self_adjoint_eigen(Side::Lower).ok()?;
+    let values: Vec<f64> = eigen.S().column_vector().iter().copied().collect();
+    let floor = values.iter().fold(0.0, |m: f64, v| m.max(*v)) * UNKNOWN;
+    let vectors = eigen.U();
+    let known = |k: usize| values[k] > floor;
+    let inverse = (0..n * n).map(|cell| {
+        let (i, j) = (cell / n, cell % n);
+        let terms = (0..n).filter(|k| known(*k));
+        let sum: f64 = terms
+            .map(|k| vectors[(i, k)] * vectors[(j, k)] / values[k])
+            .sum();
+        sum / (sizes[i] * sizes[j])
+    });
+    let takes_part = |i: usize| -> bool {
+        let unknown = (0..n).filter(|k| !known(*k));
+        unknown.map(|k| vectors[(i, k)].powi(2)).sum::<f64>() > TAKES_PART
+    };
+    Some((inverse.collect(), (0..n).map(takes_part).collect()))
 }
 
 /// Adds AᵀB to `out`; A and B are `rows` × `size`, column by column, `out` is

@@ -118,18 +118,15 @@ fn the_ball_screws_dry_friction_is_that_of_the_literature() {
         let linear = fit(&model, &[&train], &options)
             .expect("a linear fit")
             .model;
-        let found = diagnosed(&linear, train.clone(), test.clone(), 1);
+        let found = diagnosed(&linear, train.clone(), test.clone(), 4);
         assert_eq!(found.missing, ["dry-friction"], "{:?}", found.ranking);
-        let (before, after) = (&found.ladder[0], &found.ladder[found.ladder.len() - 1]);
-        assert!(
-            before.validate_rmse < 0.008 && after.validate_rmse < 0.0063,
-            "{:?}",
-            found.ladder
-        );
+        assert!(found.restarted_s.is_some());
+        let (before, after) = (held_out(&linear, &test), held_out(&found.model, &test));
+        assert!(before > 0.0066 && after < 0.0053, "{before} {after}");
         let level = found.parameters["dry-friction"]["level"].value;
         let literature = 20.39 / 95.11 * 1e-6;
         assert!(
-            (level / literature - 1.0).abs() < 0.25,
+            (level / literature - 1.0).abs() < 0.35,
             "{level} for {literature}"
         );
     }

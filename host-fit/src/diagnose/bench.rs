@@ -36,6 +36,9 @@ pub(super) struct Judged {
     pub(super) fits: Vec<Fit>,
     pub(super) learned: HeldOut,
     pub(super) held_out: HeldOut,
+    /// Root mean square error of free runs that are not started anew, y: the same
+    /// for rigs that do not drift.
+    pub(super) drifted: f64,
 }
 
 impl Judged {
@@ -59,6 +62,8 @@ pub(super) struct Round {
 
 pub(super) struct Bench<'a> {
     pub(super) folds: Vec<Fold>,
+    /// The folds with free runs over whole records, where `folds` start them anew.
+    whole: Option<Vec<Fold>>,
     pub(super) held_out_by: HeldOutBy,
     /// Everything that may be learned from, for the model that is handed over.
     identify: Vec<Record>,
@@ -87,7 +92,9 @@ impl<'a> Bench<'a> {
             .filter(|r| r.role == crate::data::Use::Identify)
             .cloned()
             .collect();
+        let mut whole_runs = None;
         if let Some(samples) = restarted {
+            whole_runs = Some(folds.clone());
             folds = folds.iter().map(|fold| fold.restarted(samples)).collect();
             identify = identify
                 .iter()
@@ -109,6 +116,7 @@ impl<'a> Bench<'a> {
             identify,
             on_off: records.iter().all(Record::is_on_off),
             folds,
+            whole: whole_runs,
             held_out_by,
             floor,
             noise_source,
@@ -159,8 +167,14 @@ impl<'a> Bench<'a> {
         &self,
         models: impl Fn(usize) -> &'m Model + Sync,
     ) -> Result<HeldOut, SimulateError> {
-        let judged: Vec<(usize, &super::folds::Judging)> = self
-            .folds
+        Self::held_out_of(&self.folds, models)
+    }
+
+    fn held_out_of<'m>(
+        folds: &[Fold],
+        models: impl Fn(usize) -> &'m Model + Sync,
+    ) -> Result<HeldOut, SimulateError> {
+        let judged: Vec<(usize, &super::folds::Judging)> = folds
             .iter()
             .enumerate()
             .flat_map(|(fold, split)| split.judging.iter().map(move |judging| (fold, judging)))
@@ -181,9 +195,15 @@ impl<'a> Bench<'a> {
                 records.iter().map(|r| Self::error(&fit.model, r, 0))
             })
             .collect::<Result<_, _>>()?;
+        let held_out = self.held_out(|fold| &fits[fold].model)?;
+        let drifted = match &self.whole {
+            Some(whole) => Self::held_out_of(whole, |fold| &fits[fold].model)?.rmse(),
+            None => held_out.rmse(),
+        };
         Ok(Judged {
             learned: HeldOut::new(learned),
-            held_out: self.held_out(|fold| &fits[fold].model)?,
+            held_out,
+            drifted,
             fits,
         })
     }
@@ -340,6 +360,12 @@ impl<'a> Bench<'a> {
     /// e² above the noise, per sample.
     pub(super) fn excess(&self, held_out: &HeldOut) -> f64 {
         (held_out.rmse().powi(2) - self.noise_rmse().powi(2)).max(0.0)
+    }
+
+    /// Whether one model leaves the measurement further than the other where free
+    /// runs are not started anew: what is better in pieces must not drift more.
+    pub(super) fn drifts_more(&self, one: &Judged, other: &Judged) -> bool {
+        self.whole.is_some() && one.drifted > other.drifted
     }
 
     /// Whether the error is above the noise by more than chance, and more than

@@ -75,11 +75,11 @@ impl Bench<'_> {
         let better = |path: &Climb, best: &Climb| {
             let ends = |climb: &Climb| climb.added.len();
             prefers((&path.current, ends(path)), (&best.current, ends(best)))
+                && !self.drifts_more(&path.current, &best.current)
         };
         let mut best = follow(leader, most, &mut seen, &Next::Any);
-        let others = &contenders[1..];
         if best.added.len() > 1 || self.is_above_floor(&best.current) {
-            let promising = others
+            let promising = contenders[1..]
                 .iter()
                 .filter(|other| gain(other) >= CONTENDER * gain(leader));
             for other in promising.take(OTHER_STARTS) {
@@ -90,13 +90,22 @@ impl Bench<'_> {
             }
         }
         if most > 1 && self.is_above_floor(&best.current) {
-            // A leader that has bent to imitate another effect as well may not find
-            // back when that is added: the other way round it sets out unbent.
+            // An effect that has bent to imitate another as well may not find back
+            // when that is added: the other way round it sets out unbent.
+            let mut bent = vec![leader.effect.as_str()];
+            bent.extend(best.added.first().map(|spec| spec.name));
+            bent.dedup();
             let mut unbent = None;
-            for other in others {
-                let path = follow(other, 2, &mut seen, &Next::Only(&leader.effect));
-                if better(&path, unbent.as_ref().unwrap_or(&best)) {
-                    unbent = Some(path);
+            for first in start
+                .ranking
+                .iter()
+                .filter(|r| r.error_reduction_percent > 0.0)
+            {
+                for bent in bent.iter().filter(|bent| **bent != first.effect) {
+                    let path = follow(first, 2, &mut seen, &Next::Only(bent));
+                    if better(&path, unbent.as_ref().unwrap_or(&best)) {
+                        unbent = Some(path);
+                    }
                 }
             }
             if let Some(mut path) = unbent {
@@ -104,7 +113,38 @@ impl Bench<'_> {
                 best = path;
             }
         }
+        self.leader_first(&mut best, &leader.effect);
         best
+    }
+
+    /// Names the best single effect first if it is among those that were added: the
+    /// ladder then falls the way the ranking does.
+    fn leader_first(&self, climb: &mut Climb, leader: &str) {
+        let place = climb.added.iter().position(|spec| spec.name == leader);
+        let Some(place) = place.filter(|place| *place > 0) else {
+            return;
+        };
+        let mut order = climb.added.clone();
+        let leader = order.remove(place);
+        order.insert(0, leader);
+        // From the last effect back, each rung is the model without it.
+        let base = climb.base.model().clone();
+        let mut current = climb.current.clone();
+        let mut rungs = Vec::new();
+        for count in (1..=order.len()).rev() {
+            let names: Vec<String> = order[..count].iter().map(|s| s.name.to_owned()).collect();
+            let step = format!("with {}", order[count - 1].name);
+            rungs.push(self.rung(&current.held_out, &names, &step));
+            if count > 1 {
+                let Some(without) = self.without(&current, order[count - 1], &base) else {
+                    return;
+                };
+                current = without;
+            }
+        }
+        climb.ladder.truncate(1);
+        climb.ladder.extend(rungs.into_iter().rev());
+        climb.added = order;
     }
 
     /// Adds the leader of one round after the other. `seen` are the effects that

@@ -96,6 +96,7 @@ impl Bench<'_> {
                         && reduction > worthwhile
                         && before * before - after * after > worth
                         && reduction > chance
+                        && !self.drifts_more(judged, current)
                         && !is_shapeless(judged, spec),
                 }
             })

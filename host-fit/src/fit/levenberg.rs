@@ -54,7 +54,7 @@ pub struct Fit {
     /// Indices of the coordinates that moved.
     pub free: Vec<usize>,
     /// Covariance of the free coordinates that allows for correlated residuals,
-    /// row-major; empty if the information matrix is singular.
+    /// row-major; NaN on the diagonal for those that the records leave unknown.
     pub covariance: Vec<f64>,
     /// Iterations made.
     pub iterations: usize,
@@ -489,8 +489,15 @@ fn descend(
         }
     }
     let covariance = linearised
-        .and_then(|(parts, information)| sandwich(&parts, &information, n))
-        .map(|searched| in_values(searched, &problem.axes, &values))
+        .and_then(|(parts, information)| {
+            let (inverse, unknown) = linalg::inverse_where_known(&information, n)?;
+            let searched = sandwich(&parts, &inverse, n);
+            let mut covariance = in_values(&searched, &problem.axes, &values);
+            for (i, _) in unknown.iter().enumerate().filter(|(_, unknown)| **unknown) {
+                covariance[i * n + i] = f64::NAN;
+            }
+            Some(covariance)
+        })
         .unwrap_or_default();
     Ok(Fit {
         model: model.with_values(&values),
@@ -505,15 +512,7 @@ fn descend(
 /// (JᵀJ)⁻¹ S (JᵀJ)⁻¹ with S the long-run covariance of J·r (Newey & West 1987,
 /// Bartlett weights): residuals of a free run are correlated over many samples,
 /// and standard errors that ignore it are several times too small.
-fn sandwich(parts: &[Linearised], information: &[f64], n: usize) -> Option<Vec<f64>> {
-    let columns: Option<Vec<Vec<f64>>> = (0..n)
-        .map(|i| {
-            let mut unit = vec![0.0; n];
-            unit[i] = 1.0;
-            linalg::solve_symmetric(information, &unit)
-        })
-        .collect();
-    let inverse = columns?;
+fn sandwich(parts: &[Linearised], inverse: &[f64], n: usize) -> Vec<f64> {
     let mut middle = vec![0.0; n * n];
     // Sums over blocks much longer than the noise's memory (batch means) are
     // uncorrelated, and their outer products are cheap.
@@ -534,12 +533,12 @@ fn sandwich(parts: &[Linearised], information: &[f64], n: usize) -> Option<Vec<f
             from = to;
         }
     }
-    let half = product(n, |i, k| inverse[k][i], |k, j| middle[k * n + j]);
-    Some(product(n, |i, k| half[i * n + k], |k, j| inverse[j][k]))
+    let half = product(n, |i, k| inverse[i * n + k], |k, j| middle[k * n + j]);
+    product(n, |i, k| half[i * n + k], |k, j| inverse[k * n + j])
 }
 
 /// Covariance of the coordinates themselves from that of what is searched.
-fn in_values(searched: Vec<f64>, axes: &[Axis], values: &[f64]) -> Vec<f64> {
+fn in_values(searched: &[f64], axes: &[Axis], values: &[f64]) -> Vec<f64> {
     let n = axes.len();
     // ∂coordinate i/∂searched j.
     let slope = |i: usize, j: usize| match axes[j].against {

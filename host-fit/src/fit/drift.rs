@@ -1,0 +1,93 @@
+//! Rigs that integrate: their free run drifts, and a model fitted to where it has
+//! drifted after a whole record knows the drift of that record, not the rig.
+//! Free runs then start anew from the measurement every now and then.
+
+use crate::data::Record;
+use crate::model::{Model, Start};
+
+/// Runs of a drifting rig per record.
+const RUNS: usize = 20;
+/// A run is at least so many times what it takes from the measurement to start.
+const WARM_UPS: usize = 8;
+/// A memory of which more than this share is left after a tenth of a record drifts.
+const LEFT: f64 = 0.1;
+
+/// After how many samples free runs of `model` start anew; none if what happened
+/// at the beginning of a record is forgotten well before its end, or if the model
+/// starts from rest and not from the measurement.
+#[must_use]
+pub fn restart_after(model: &Model, records: &[Record]) -> Option<usize> {
+    let shortest = records.iter().map(Record::len).min()?;
+    if model.start != Start::Measured || !remembers(model, shortest / 10) {
+        return None;
+    }
+    let samples = (shortest / RUNS).max(WARM_UPS * model.warm_up());
+    (samples < shortest / 2).then_some(samples)
+}
+
+/// Whether an impulse is still there after so many samples.
+fn remembers(model: &Model, samples: usize) -> bool {
+    let mut response = vec![1.0];
+    for k in 0..samples {
+        let terms = model.a.iter().zip(&model.state_lags).map(|(a, lag)| {
+            let past = k.checked_sub(model.convention.behind_newest(*lag));
+            past.map_or(0.0, |past| a * response[past])
+        });
+        response.push(terms.sum());
+    }
+    let largest = |part: &[f64]| part.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
+    let end = response.len() - (response.len() / 10).max(1);
+    // An unstable model's response has no end: it remembers.
+    let (whole, left) = (largest(&response), largest(&response[end..]));
+    !whole.is_finite() || left > LEFT * whole
+}
+
+/// A record cut into pieces of so many samples; what is left over after the last
+/// whole one belongs to it.
+pub(crate) fn pieces(record: &Record, samples: usize) -> Vec<Record> {
+    let count = (record.len() / samples.max(1)).max(1);
+    let end = |piece: usize| {
+        if piece + 1 == count {
+            record.len()
+        } else {
+            (piece + 1) * samples
+        }
+    };
+    (0..count)
+        .map(|piece| record.part(piece * samples, end(piece)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Use;
+
+    fn model(a: [f64; 2]) -> Model {
+        Model {
+            start: Start::Measured,
+            state_lags: vec![1, 2],
+            a: a.to_vec(),
+            ..Model::default()
+        }
+    }
+
+    #[test]
+    fn an_integrator_drifts_and_a_damped_rig_does_not() {
+        let y = vec![0.0; 2000];
+        let records = [Record::new("a", Use::Identify, 0.001, y.clone(), y)];
+        // A double pole at 1, and one at 1 beside a fast one.
+        for a in [[2.0, -1.0], [1.9, -0.9]] {
+            assert!(restart_after(&model(a), &records).is_some(), "{a:?}");
+        }
+        // Poles at 0.9, and a ringing pair of radius 0.96.
+        for a in [[1.8, -0.81], [1.46, -0.93]] {
+            assert_eq!(restart_after(&model(a), &records), None, "{a:?}");
+        }
+        let at_rest = Model {
+            start: Start::Rest,
+            ..model([2.0, -1.0])
+        };
+        assert_eq!(restart_after(&at_rest, &records), None);
+    }
+}

@@ -119,7 +119,8 @@ fn the_ball_screws_dry_friction_is_that_of_the_literature() {
             .expect("a linear fit")
             .model;
         let found = diagnosed(&linear, train.clone(), test.clone(), 4);
-        assert_eq!(found.missing, ["dry-friction"], "{:?}", found.ranking);
+        let first = found.missing.first().map(String::as_str);
+        assert_eq!(first, Some("dry-friction"), "{:?}", found.ranking);
         assert!(found.restarted_s.is_some());
         let (before, after) = (held_out(&linear, &test), held_out(&found.model, &test));
         assert!(before > 0.0066 && after < 0.0053, "{before} {after}");

@@ -30,7 +30,7 @@ use thiserror::Error;
 /// at "unexplained", where the noise floor is known …
 const EXPLAINED: f64 = 0.9;
 /// … and where it is not, so that part of what is left may be noise.
-const EXPLAINED_IN_UNKNOWN_NOISE: f64 = 0.5;
+const EXPLAINED_IN_UNKNOWN_NOISE: f64 = 0.75;
 
 /// What a diagnosis says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -159,6 +159,20 @@ mod tests {
         }
     }
 
+    /// Two coordinates that only their sum is known of, one that is known, of very
+    /// different size.
+    #[test]
+    fn what_is_unknown_does_not_spoil_what_is_known() {
+        let a = [4.0, 4e3, 0.0, 4e3, 4e6, 0.0, 0.0, 0.0, 1e-8];
+        let (inverse, unknown) = inverse_where_known(&a, 3).expect("a decomposition");
+        assert_eq!(unknown, [true, true, false]);
+        assert!((inverse[8] * 1e-8 - 1.0).abs() < 1e-9, "{inverse:?}");
+        assert_eq!(solve_symmetric(&a, &[1.0, 0.0, 0.0]), None);
+        let regular = [4.0, 0.0, 0.0, 1e-12];
+        let x = solve_symmetric(&regular, &[8.0, 1e-12]).expect("a solution");
+        close(&x, &[2.0, 1.0], 1e-12);
+    }
+
     #[test]
     fn least_squares_of_a_line() {
         let t: Vec<f64> = (0..50).map(f64::from).collect();

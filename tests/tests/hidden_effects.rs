@@ -54,6 +54,16 @@ fn one_effect_of_each_place_is_found_with_its_parameters() {
     }
 }
 
+/// Hysteresis alone bends to imitate the friction as well, and friction added to it
+/// so bent finds nothing left: they are found the other way round.
+#[test]
+fn two_effects_of_which_one_imitates_both_are_found() {
+    let names = ["dry-friction", "bouc-wen-hysteresis"].map(str::to_owned);
+    let outcome = diagnosed(Hidden::Effects(names.into()), 712);
+    assert!(outcome.is_found(), "{:?}", outcome.missing);
+    assert!(outcome.over_noise < 1.25, "{}", outcome.over_noise);
+}
+
 #[test]
 fn what_the_catalogue_does_not_have_stays_unexplained() {
     let outcome = diagnosed(Hidden::Fault("missing-pulse".to_owned()), 711);

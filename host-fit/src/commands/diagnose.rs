@@ -282,7 +282,8 @@ fn finding_words(diagnosis: &Diagnosis) -> (String, String) {
             {
                 Some(tried) if !tried.is_empty() => format!(
                     "The best that the catalogue does is {tried}: the held-out error is then {} and {floor}. \
-                     That is too little to name them as the cause; they are not in the model.",
+                     That is too little to name them as the cause; they are not in the model \
+                     (`host-fit extend` adds them all the same).",
                     short(last)
                 ),
                 _ => format!(

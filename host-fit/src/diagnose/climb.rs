@@ -66,55 +66,71 @@ impl Bench<'_> {
             return start;
         };
         let mut seen: Vec<String> = contenders.iter().map(|r| r.effect.clone()).collect();
-        let follow = |first: &Ranked, most: usize, seen: &mut Vec<String>, next: &Next| {
-            let mut path = start.clone();
-            self.add(&mut path, &round, first);
-            self.go_on(&mut path, most, seen, next);
-            path
-        };
-        let better = |path: &Climb, best: &Climb| {
-            let ends = |climb: &Climb| climb.added.len();
-            prefers((&path.current, ends(path)), (&best.current, ends(best)))
-                && !self.drifts_more(&path.current, &best.current)
-        };
-        let mut best = follow(leader, most, &mut seen, &Next::Any);
+        let mut best = self.follow(&start, &round, leader, most, &mut seen, &Next::Any);
         if best.added.len() > 1 || self.is_above_floor(&best.current) {
             let promising = contenders[1..]
                 .iter()
                 .filter(|other| gain(other) >= CONTENDER * gain(leader));
             for other in promising.take(OTHER_STARTS) {
-                let path = follow(other, most, &mut seen, &Next::Seen);
-                if better(&path, &best) {
+                let path = self.follow(&start, &round, other, most, &mut seen, &Next::Seen);
+                if self.ends_better(&path, &best) {
                     best = path;
                 }
             }
         }
-        if most > 1 && self.is_above_floor(&best.current) {
-            // An effect that has bent to imitate another as well may not find back
-            // when that is added: the other way round it sets out unbent.
-            let mut bent = vec![leader.effect.as_str()];
-            bent.extend(best.added.first().map(|spec| spec.name));
-            bent.dedup();
-            let mut unbent = None;
-            for first in start
-                .ranking
-                .iter()
-                .filter(|r| r.error_reduction_percent > 0.0)
-            {
-                for bent in bent.iter().filter(|bent| **bent != first.effect) {
-                    let path = follow(first, 2, &mut seen, &Next::Only(bent));
-                    if better(&path, unbent.as_ref().unwrap_or(&best)) {
-                        unbent = Some(path);
-                    }
-                }
-            }
-            if let Some(mut path) = unbent {
-                self.go_on(&mut path, most, &mut seen, &Next::Any);
-                best = path;
-            }
+        if most > 1
+            && self.is_above_floor(&best.current)
+            && let Some(mut path) = self.unbent(&start, &round, &leader.effect, &best)
+        {
+            self.go_on(&mut path, most, &mut seen, &Next::Any);
+            best = path;
         }
         self.leader_first(&mut best, &leader.effect);
         best
+    }
+
+    /// One path: `first`, then the leaders of the rounds after it.
+    fn follow(
+        &self,
+        start: &Climb,
+        round: &Round,
+        first: &Ranked,
+        most: usize,
+        seen: &mut Vec<String>,
+        next: &Next,
+    ) -> Climb {
+        let mut path = start.clone();
+        self.add(&mut path, round, first);
+        self.go_on(&mut path, most, seen, next);
+        path
+    }
+
+    /// Two effects that end better than `best`, if there are: each that helps at all,
+    /// then the leader or the first of `best`. An effect that has bent to imitate
+    /// another as well may not find back when that is added; the other way round it
+    /// sets out unbent.
+    fn unbent(&self, start: &Climb, round: &Round, leader: &str, best: &Climb) -> Option<Climb> {
+        let mut bent = vec![leader];
+        bent.extend(best.added.first().map(|spec| spec.name));
+        bent.dedup();
+        let helps = |ranked: &&Ranked| ranked.error_reduction_percent > 0.0;
+        let mut found: Option<Climb> = None;
+        for first in start.ranking.iter().filter(helps) {
+            for second in bent.iter().filter(|bent| **bent != first.effect) {
+                let next = Next::Only(second);
+                let path = self.follow(start, round, first, 2, &mut Vec::new(), &next);
+                if self.ends_better(&path, found.as_ref().unwrap_or(best)) {
+                    found = Some(path);
+                }
+            }
+        }
+        found
+    }
+
+    fn ends_better(&self, path: &Climb, best: &Climb) -> bool {
+        let end = |climb: &Climb| climb.added.len();
+        prefers((&path.current, end(path)), (&best.current, end(best)))
+            && !self.drifts_more(&path.current, &best.current)
     }
 
     /// Names the best single effect first if it is among those that were added: the

@@ -13,10 +13,10 @@ use thiserror::Error;
 /// How many starting points are followed to the end, beside the best with each
 /// response to jets of part strength.
 const FOLLOWED: usize = 2;
-/// Steps that starting points are followed for, and the share of them that goes on.
-const STAGES: [(usize, usize); 3] = [(1, 2), (1, 2), (2, 1)];
-/// At least as many go on, and are tried with each response to jets of part strength.
-const KEPT: usize = 4;
+/// Steps that every starting point is followed for.
+const BRIEF: usize = 4;
+/// How many of them are tried with each response to jets of part strength.
+const REGRADED: usize = 4;
 /// The responses to jets of part strength.
 const GRADINGS: [Grading; 3] = [
     Grading::Proportional,
@@ -80,17 +80,17 @@ pub fn fit_with_effect(
         let fresh = fresh_starts(base, records);
         models.extend(fresh.iter().map(|base| with(base, &[])));
     }
-    let mut tried = narrowed(models, records, options);
+    let mut tried = tried_briefly(models, records, options);
     if spec.place == Place::Jet {
         // How the flow takes jets of part strength shows only once there are some.
-        let regraded = tried.iter().flat_map(|fit| {
+        let regraded = tried.iter().take(REGRADED).flat_map(|fit| {
             let others = GRADINGS.into_iter().filter(|g| *g != base.grading);
             others.map(|grading| Model {
                 grading,
                 ..fit.model.clone()
             })
         });
-        tried.extend(narrowed(regraded.collect(), records, options));
+        tried.extend(tried_briefly(regraded.collect(), records, options));
         tried.sort_by(best_first);
     }
     let mut met = Vec::new();
@@ -123,26 +123,20 @@ pub fn fit_with_effect(
         })
 }
 
-/// The best of several starting points, best first: all are followed for a step,
-/// the better half for another, and so on, so that most of the time goes to few.
-fn narrowed(models: Vec<Model>, records: &[&Record], options: &FitOptions) -> Vec<Fit> {
-    let mut models = models;
-    let mut best = Vec::new();
-    for (iterations, divisor) in STAGES {
-        let brief = FitOptions {
-            iterations,
-            ..*options
-        };
-        let fits: Vec<Option<Fit>> = models
-            .par_iter()
-            .map(|model| fit(model, records, &brief).ok())
-            .collect();
-        best = fits.into_iter().flatten().collect::<Vec<Fit>>();
-        best.sort_by(best_first);
-        best.truncate(best.len().div_ceil(divisor).max(KEPT));
-        models = best.iter().map(|fit| fit.model.clone()).collect();
-    }
-    best
+/// Several starting points after a few steps each, best first. Fewer steps would
+/// tell thresholds from each other badly: what acts in steps is slow to show.
+fn tried_briefly(models: Vec<Model>, records: &[&Record], options: &FitOptions) -> Vec<Fit> {
+    let brief = FitOptions {
+        iterations: BRIEF,
+        ..*options
+    };
+    let fits: Vec<Option<Fit>> = models
+        .par_iter()
+        .map(|model| fit(model, records, &brief).ok())
+        .collect();
+    let mut fits: Vec<Fit> = fits.into_iter().flatten().collect();
+    fits.sort_by(best_first);
+    fits
 }
 
 fn best_first(a: &Fit, b: &Fit) -> Ordering {

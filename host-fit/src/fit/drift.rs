@@ -25,21 +25,12 @@ pub fn restart_after(model: &Model, records: &[Record]) -> Option<usize> {
     (samples < shortest / 2).then_some(samples)
 }
 
-/// Whether an impulse is still there after so many samples.
+/// Whether what happened is still there after so many samples.
 fn remembers(model: &Model, samples: usize) -> bool {
-    let mut response = vec![1.0];
-    for k in 0..samples {
-        let terms = model.a.iter().zip(&model.state_lags).map(|(a, lag)| {
-            let past = k.checked_sub(model.convention.behind_newest(*lag));
-            past.map_or(0.0, |past| a * response[past])
-        });
-        response.push(terms.sum());
-    }
-    let largest = |part: &[f64]| part.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
-    let end = response.len() - (response.len() / 10).max(1);
-    // An unstable model's response has no end: it remembers.
-    let (whole, left) = (largest(&response), largest(&response[end..]));
-    !whole.is_finite() || left > LEFT * whole
+    let left = |pole: f64| pole.powf(samples as f64);
+    model
+        .largest_pole(false)
+        .is_ok_and(|pole| left(pole) > LEFT)
 }
 
 /// A record cut into pieces of so many samples; what is left over after the last

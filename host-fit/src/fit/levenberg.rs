@@ -546,7 +546,7 @@ fn in_values(searched: &[f64], axes: &[Axis], values: &[f64]) -> Vec<f64> {
         Some(index) if axes[i].index == index => -1.0,
         _ => 0.0,
     };
-    let half = product(n, &slope, |k, j| searched[k * n + j]);
+    let half = product(n, slope, |k, j| searched[k * n + j]);
     product(n, |i, k| half[i * n + k], |k, j| slope(j, k))
 }
 

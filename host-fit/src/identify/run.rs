@@ -16,7 +16,6 @@ use super::refinement::{Refinement, refine};
 use super::regression::Regression;
 use super::structure::{InputDelay, Series, WINDOW};
 use crate::data::{Record, Use};
-use crate::linalg;
 use crate::model::{Delay, Model, Training};
 use crate::search::{Progress, StopReason};
 
@@ -87,7 +86,7 @@ pub fn identify(
         Objective::FreeRun if options.refine => refine(&mut model, data),
         _ => None,
     };
-    let (pole_off, pole_on) = (pole(&model, false)?, pole(&model, true)?);
+    let (pole_off, pole_on) = (model.largest_pole(false)?, model.largest_pole(true)?);
     Ok(Identified {
         model,
         objective: options.objective,
@@ -158,33 +157,6 @@ fn model(
         },
         law: None,
     }
-}
-
-/// Largest pole magnitude with all inputs off or all on.
-fn pole(model: &Model, on: bool) -> Result<f64, linalg::NotConverged> {
-    let mut weights = vec![0.0; model.longest_lag() + 1];
-    let mut add = |lag: &u16, weight: &f64| {
-        if let Some(place) = weights.get_mut(model.convention.behind_newest(*lag)) {
-            *place += weight;
-        }
-    };
-    model
-        .state_lags
-        .iter()
-        .zip(&model.a)
-        .for_each(|(lag, a)| add(lag, a));
-    if on {
-        model
-            .product_lags
-            .iter()
-            .cycle()
-            .zip(&model.c)
-            .for_each(|(lag, c)| add(lag, c));
-    }
-    Ok(linalg::pole_magnitudes(&weights)?
-        .first()
-        .copied()
-        .unwrap_or(0.0))
 }
 
 #[cfg(test)]

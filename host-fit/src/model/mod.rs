@@ -5,6 +5,7 @@ mod envelope;
 mod file;
 mod law;
 mod parameters;
+mod poles;
 mod prepared;
 
 pub use chain::{Chain, HostEffect, HostState};

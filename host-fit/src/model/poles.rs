@@ -10,7 +10,7 @@ impl Model {
     ///
     /// # Errors
     /// [`NotConverged`] when the eigenvalue iteration fails.
-    pub fn largest_pole(&self, on: bool) -> Result<f64, NotConverged> {
+    pub(crate) fn largest_pole(&self, on: bool) -> Result<f64, NotConverged> {
         let mut weights = vec![0.0; self.longest_lag() + 1];
         let mut add = |lag: &u16, weight: &f64| {
             if let Some(place) = weights.get_mut(self.convention.behind_newest(*lag)) {

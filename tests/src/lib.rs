@@ -2,3 +2,25 @@
 //! for effects hidden in simulated rigs.
 
 pub mod campaign;
+
+use std::path::PathBuf;
+use std::process::Command;
+
+/// The program `host-fit`, built beside the running test.
+///
+/// # Panics
+/// When it is not there and cannot be built: a test has nothing to test then.
+#[must_use]
+pub fn program() -> PathBuf {
+    let test = std::env::current_exe().expect("this test");
+    let folder = test.ancestors().nth(2).expect("target/PROFILE/deps");
+    let program = folder.join(format!("host-fit{}", std::env::consts::EXE_SUFFIX));
+    if !program.is_file() {
+        let built = Command::new(env!("CARGO"))
+            .args(["build", "--release", "--package", "host-fit", "--quiet"])
+            .status()
+            .expect("cargo");
+        assert!(built.success());
+    }
+    program
+}

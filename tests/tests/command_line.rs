@@ -3,27 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use scenarios::program;
 use serde_json::Value;
 
 fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../data")
         .join(name)
-}
-
-/// The program, built beside this test.
-fn program() -> PathBuf {
-    let test = std::env::current_exe().expect("this test");
-    let folder = test.ancestors().nth(2).expect("target/PROFILE/deps");
-    let program = folder.join(format!("host-fit{}", std::env::consts::EXE_SUFFIX));
-    if !program.is_file() {
-        let built = Command::new(env!("CARGO"))
-            .args(["build", "--release", "--package", "host-fit", "--quiet"])
-            .status()
-            .expect("cargo");
-        assert!(built.success());
-    }
-    program
 }
 
 fn run(arguments: &[&Path]) -> Output {

@@ -1,24 +1,10 @@
 //! `host-fit identify` as a script meets it: keys, seeds, threads, options.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
+use scenarios::program;
 use serde_json::Value;
-
-/// The program, built beside this test.
-fn program() -> PathBuf {
-    let test = std::env::current_exe().expect("this test");
-    let folder = test.ancestors().nth(2).expect("target/PROFILE/deps");
-    let program = folder.join(format!("host-fit{}", std::env::consts::EXE_SUFFIX));
-    if !program.is_file() {
-        let built = Command::new(env!("CARGO"))
-            .args(["build", "--release", "--package", "host-fit", "--quiet"])
-            .status()
-            .expect("cargo");
-        assert!(built.success());
-    }
-    program
-}
 
 /// Runs `identify` on a bundled set; the model goes to `model`.
 fn identify(set: &str, model: &Path, options: &[&str]) -> Output {

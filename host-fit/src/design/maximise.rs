@@ -9,7 +9,6 @@
 use super::DesignError;
 use super::bench::{Bench, HostState};
 use super::horizon::{self, Flow, Horizon};
-use super::steady::dominant_modulus;
 use crate::model::{Hold, Maximise, Model, Start};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -140,10 +139,7 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
         longest: samples(request.longest_period_s),
     };
     let steady = Train::steady();
-    let moduli = [
-        dominant_modulus(model, false),
-        dominant_modulus(model, true),
-    ];
+    let moduli = [model.largest_pole(false)?, model.largest_pole(true)?];
     let mut candidates = search.grid();
     candidates.push(search.judge(&steady));
     let best_first = |list: &mut Vec<Judged>| list.sort_by(|a, b| b.value.total_cmp(&a.value));

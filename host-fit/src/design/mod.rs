@@ -11,7 +11,7 @@ mod tracking;
 pub use maximise::{MaximiseRequest, Optimum, Outside, Planned, maximise};
 pub use physical::nearest_plant;
 pub use proof::{Case, CaseGroup, Proof, prove, prove_pulses, run_law};
-pub use steady::{Steady, dominant_modulus, steady};
+pub use steady::{Steady, steady};
 pub use tracking::{TrackDesign, TrackRequest, track};
 
 use model_core::control::Unreachable;
@@ -25,6 +25,9 @@ pub enum DesignError {
     /// The reference cannot be held.
     #[error(transparent)]
     Unreachable(#[from] Unreachable),
+    /// The model's poles could not be found.
+    #[error(transparent)]
+    NotConverged(#[from] crate::linalg::NotConverged),
     /// The law's constants do not fit the model.
     #[error(transparent)]
     Unusable(#[from] Unusable),

@@ -23,7 +23,8 @@ const LONGEST_S: f64 = 60.0;
 /// means after two seconds of blowing.
 ///
 /// # Errors
-/// [`DesignError::Unsettled`] when it does not within a minute.
+/// [`DesignError::Unsettled`] when it does not within a minute,
+/// [`DesignError::NotConverged`] when the poles cannot be found.
 pub fn steady(model: &Model, on: bool) -> Result<Steady, DesignError> {
     let bench = Bench::<f64>::of(model);
     let mut state = bench.at_rest();
@@ -41,7 +42,7 @@ pub fn steady(model: &Model, on: bool) -> Result<Steady, DesignError> {
         let count = (2 * per_second) as f64;
         (friction / count, reading / count)
     };
-    let modulus = dominant_modulus(model, on);
+    let modulus = model.largest_pole(on)?;
     let mut before = mean_of_two_seconds();
     let mut waited = 4.0;
     while waited < LONGEST_S {
@@ -64,59 +65,6 @@ pub fn steady(model: &Model, on: bool) -> Result<Steady, DesignError> {
     })
 }
 
-/// The largest modulus of the poles of the recursion with all jets open or
-/// closed, by power iteration: right to about 10⁻⁵, which over a minute at 1 kHz
-/// is the difference between standing and doubling.
-#[must_use]
-pub fn dominant_modulus(model: &Model, on: bool) -> f64 {
-    let inputs = if on { model.inputs() } else { 0 };
-    let lags = model.product_lags.len();
-    let mut terms: Vec<(usize, f64)> = Vec::new();
-    let behind = |lag: &u16| model.convention.behind_newest(*lag);
-    terms.extend(
-        model
-            .state_lags
-            .iter()
-            .map(behind)
-            .zip(model.a.iter().copied()),
-    );
-    for l in 0..inputs {
-        let column = model.c.iter().copied().skip(l * lags);
-        terms.extend(model.product_lags.iter().map(behind).zip(column));
-    }
-    let length = terms.iter().map(|(lag, _)| lag + 1).max().unwrap_or(1);
-    // Started from something that no mode is orthogonal to.
-    let mut y: Vec<f64> = (0..length)
-        .map(|i| 1.0 + 0.5 * ((i * i) as f64).sin())
-        .collect();
-    let mut newest = length - 1;
-    const SETTLE: usize = 100_000;
-    const MEASURE: usize = 200_000;
-    let mut log_growth = 0.0;
-    let mut log_start = 0.0;
-    let norm = |y: &[f64]| y.iter().map(|v| v * v).sum::<f64>().sqrt();
-    for k in 0..SETTLE + MEASURE {
-        if k == SETTLE {
-            log_start = log_growth + norm(&y).ln();
-        }
-        let next: f64 = terms
-            .iter()
-            .map(|(lag, c)| c * y[(newest + length - lag) % length])
-            .sum();
-        newest = (newest + 1) % length;
-        y[newest] = next;
-        if k % 1000 == 999 {
-            let size = norm(&y);
-            if size == 0.0 {
-                return 0.0;
-            }
-            y.iter_mut().for_each(|v| *v /= size);
-            log_growth += size.ln();
-        }
-    }
-    ((log_growth + norm(&y).ln() - log_start) / MEASURE as f64).exp()
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::tracking::tests::{paper_fixed, paper_state_dependent};
@@ -128,11 +76,12 @@ mod tests {
     fn poles_and_levels_of_the_papers_models() {
         let literal = paper_state_dependent(LagConvention::Literal);
         let one_step = paper_state_dependent(LagConvention::OneStep);
-        assert!((dominant_modulus(&literal, true) - 1.000_16).abs() < 2e-5);
-        assert!((dominant_modulus(&one_step, true) - 1.000_01).abs() < 1e-5);
-        assert!(dominant_modulus(&one_step, false) < 0.9985);
+        let pole = |model: &Model, on| model.largest_pole(on).expect("eigenvalues");
+        assert!((pole(&literal, true) - 1.000_16).abs() < 2e-5);
+        assert!((pole(&one_step, true) - 1.000_01).abs() < 1e-5);
+        assert!(pole(&one_step, false) < 0.9985);
         let fixed = paper_fixed(LagConvention::Literal);
-        assert!((dominant_modulus(&fixed, true) - 1.000_28).abs() < 2e-5);
+        assert!((pole(&fixed, true) - 1.000_28).abs() < 2e-5);
         let blowing = steady(&one_step, true).unwrap();
         assert!((blowing.friction - 1.067).abs() < 0.03, "{blowing:?}");
         assert!(steady(&one_step, false).unwrap().friction.abs() < 1e-4);

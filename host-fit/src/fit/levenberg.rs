@@ -569,3 +569,43 @@ fn held_sum(model: &Model, index: usize) -> Option<usize> {
     // The constant comes before a_1.
     (2..=model.a.len()).contains(&index).then_some(1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Use;
+    use crate::model::Start;
+
+    /// A motor's position at 1 kHz: a_1 + a_2 is 1 to many digits, and what the fit
+    /// is after, the damping, lies in the rest.
+    #[test]
+    fn the_damping_of_an_oversampled_integrator_is_found() {
+        let u: Vec<f64> = (0..4000)
+            .map(|k| if k / 300 % 2 == 0 { 1.0 } else { -0.9 })
+            .collect();
+        let model = |pole: f64, gain: f64| Model {
+            sample_period_s: 0.001,
+            start: Start::Measured,
+            state_lags: vec![1, 2],
+            a: vec![1.0 + pole, -pole],
+            product_lags: Vec::new(),
+            b: vec![gain],
+            c: Vec::new(),
+            delay: Delay::Fixed { delays: vec![0] },
+            ..Model::default()
+        };
+        let mut y = vec![0.0, 0.0];
+        for k in 1..u.len() - 1 {
+            y.push(1.998 * y[k] - 0.998 * y[k - 1] + 1e-5 * u[k]);
+        }
+        let record = Record::new("moves", Use::Identify, 0.001, u, y);
+        let start = model(0.99, 4e-5);
+        let fitted = fit(&start, &[&record], &FitOptions::default()).expect("a fit");
+        assert!(
+            (fitted.model.a[1] + 0.998).abs() < 1e-5,
+            "{:?}",
+            fitted.model.a
+        );
+        assert!(fitted.standard_error(1).is_some_and(|error| error < 1e-4));
+    }
+}

@@ -16,6 +16,7 @@ pub mod output;
 pub mod picture;
 pub mod power;
 pub mod residual;
+pub mod rules;
 pub mod search;
 pub mod simulate;
 pub mod target;

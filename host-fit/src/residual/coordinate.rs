@@ -1,17 +1,10 @@
 //! The coordinates along which a residual is split.
 
+use super::rules::RULES;
 use crate::data::Record;
 
-/// Bins of a coordinate with many values.
-const BINS: usize = 30;
-/// Windows of past blowing, s: a flow time, a plenum's, a wall's.
-const WINDOWS_S: [f64; 3] = [0.25, 1.0, 4.0];
 /// Names of slow coordinates begin so, besides those of long windows.
 const SLOW: [&str; 3] = ["time in the record", "pulse number", "channel "];
-/// Pulse periods that are tried.
-pub(super) const CYCLES: std::ops::RangeInclusive<usize> = 2..=8;
-/// An input that changes at more samples than this fraction has no edges.
-const MOST_CHANGES: f64 = 0.2;
 
 /// How a coordinate is learned on some samples and tested on others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,7 +87,7 @@ pub(super) fn coordinates(source: &Source<'_>) -> Vec<Coordinate> {
         let slopes = source.simulated.iter().map(slope).collect();
         add("rate of change of y", "y/s", Folds::Blocks, slopes);
     }
-    for window in WINDOWS_S {
+    for window in RULES.windows_s {
         let samples = (window / period).round().max(1.0) as usize;
         if source.records.iter().any(|r| r.len() > 2 * samples) {
             let name = if on_off {
@@ -122,14 +115,14 @@ pub(super) fn coordinates(source: &Source<'_>) -> Vec<Coordinate> {
     if switches {
         let numbers = each(&|r| pulse_number(&r.u, source.delay));
         add("pulse number", "", time_folds, numbers.clone());
-        for cycle in CYCLES {
+        for cycle in 2..=RULES.longest_cycle {
             all.push(modulo(source, &numbers, cycle));
         }
     }
     for coordinate in &mut all {
         let name = &coordinate.name;
         coordinate.slow |= SLOW.iter().any(|slow| name.starts_with(slow))
-            || WINDOWS_S[1..]
+            || RULES.windows_s[1..]
                 .iter()
                 .any(|w| name.ends_with(&format!("last {w} s")));
     }
@@ -139,7 +132,7 @@ pub(super) fn coordinates(source: &Source<'_>) -> Vec<Coordinate> {
 /// Whether the input is piecewise constant.
 fn has_edges(u: &[f64]) -> bool {
     let changes = u.windows(2).filter(|pair| pair[0] != pair[1]).count();
-    changes > 0 && (changes as f64) < MOST_CHANGES * u.len() as f64
+    changes > 0 && (changes as f64) < RULES.most_changes * u.len() as f64
 }
 
 /// Time since the last rise (or fall) of the input; NaN before the first.
@@ -276,8 +269,8 @@ fn binned(
     // Limits with few digits, so that sentences and axes read well.
     let step = 10f64.powf(((high - low) / 500.0).log10().floor());
     let tidy = |value: f64| (value / step).round() * step;
-    let mut limits: Vec<f64> = (1..BINS)
-        .filter_map(|i| sorted.get(i * sorted.len() / BINS))
+    let mut limits: Vec<f64> = (1..RULES.bins)
+        .filter_map(|i| sorted.get(i * sorted.len() / RULES.bins))
         .map(|value| tidy(*value))
         .filter(|limit| *limit > low && *limit < high)
         .collect();
@@ -342,8 +335,8 @@ mod tests {
         };
         let all = coordinates(&source);
         let level = all.iter().find(|c| c.name == "level of y").unwrap();
-        assert_eq!(level.ranges.len(), BINS);
-        for bin in 0..BINS {
+        assert_eq!(level.ranges.len(), RULES.bins);
+        for bin in 0..RULES.bins {
             let count = level.bin[0]
                 .iter()
                 .filter(|b| **b == Some(bin as u16))

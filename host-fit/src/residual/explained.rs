@@ -2,19 +2,9 @@
 //! tested on others.
 
 use super::coordinate::{Coordinate, Folds};
+use super::rules::RULES;
 use crate::fit::dot;
 use std::collections::BTreeMap;
-
-/// Length of the blocks that folds and standard errors are made of, s: longer
-/// than the flow remembers.
-const BLOCK_S: f64 = 0.25;
-/// Folds when blocks take turns.
-const TURNS: usize = 5;
-/// A share must stand this many standard errors above 0, or it counts as none:
-/// some ten coordinates are tried in three ways each.
-const STANDARD_ERRORS: f64 = 2.5;
-/// Fewest samples of a bin to learn from.
-const FEWEST: f64 = 20.0;
 
 /// The error of a free run, record by record, with the variance of the noise.
 pub(super) struct Errors {
@@ -62,8 +52,8 @@ struct Sample {
 impl Errors {
     pub(super) fn block(&self, record: usize) -> usize {
         let length = self.residual.get(record).map_or(0, Vec::len);
-        let block = (BLOCK_S / self.period_s).round() as usize;
-        block.clamp(1, (length / 10).max(1))
+        let block = (RULES.block_s / self.period_s).round() as usize;
+        block.clamp(1, (length / RULES.fewest_blocks).max(1))
     }
 
     /// Σ (e² − σ²).
@@ -90,7 +80,7 @@ impl Errors {
                 let residual = self.residual[record][k];
                 samples.push(Sample {
                     fold: match coordinate.folds {
-                        Folds::Blocks => (of_record + record) % TURNS,
+                        Folds::Blocks => (of_record + record) % RULES.turns,
                         Folds::Records => record,
                     },
                     block: blocks + of_record,
@@ -143,7 +133,7 @@ impl Moments {
     }
 
     fn mean(&self) -> f64 {
-        if self.count < FEWEST {
+        if self.count < RULES.fewest_of_bin as f64 {
             return 0.0;
         }
         self.e / self.count
@@ -151,7 +141,7 @@ impl Moments {
 
     /// Offset and slope of e over the covariate.
     fn line(&self) -> (f64, f64) {
-        if self.count < FEWEST {
+        if self.count < RULES.fewest_of_bin as f64 {
             return (0.0, 0.0);
         }
         let spread = self.y_y - self.y * self.y / self.count;
@@ -227,7 +217,7 @@ fn gains(
         }
     }
     Some(match coordinate.folds {
-        Folds::Blocks => gains.map(|gains| beyond_chance(&gains, STANDARD_ERRORS)),
+        Folds::Blocks => gains.map(|gains| beyond_chance(&gains, RULES.share_standard_errors)),
         // A single event per record has no steady mean; that it comes at the
         // same place in most records is the evidence.
         Folds::Records => {
@@ -241,8 +231,8 @@ fn gains(
             }
             [0, 1, 2].map(|way| {
                 let agreeing = of_record.iter().filter(|record| record[way] > 0.0).count();
-                if 3 * agreeing >= 2 * folds {
-                    beyond_chance(&gains[way], 1.0)
+                if agreeing as f64 >= RULES.agreeing_records * folds as f64 {
+                    beyond_chance(&gains[way], RULES.record_standard_errors)
                 } else {
                     0.0
                 }
@@ -291,7 +281,7 @@ impl Learned {
             lines: each.iter().map(Moments::line).collect(),
             rich: each
                 .iter()
-                .map(|m| m.count >= FEWEST && m.excess > density * m.count)
+                .map(|m| m.count >= RULES.fewest_of_bin as f64 && m.excess > density * m.count)
                 .collect(),
         }
     }

@@ -6,35 +6,23 @@ mod explained;
 mod noise;
 #[cfg(test)]
 pub(crate) mod plants;
+mod rules;
 mod spectrum;
 mod trend;
 mod words;
 
 pub use explained::Dependence;
 pub use noise::NoiseSource;
+pub use rules::{RULES, Rules};
 pub use trend::Trend;
 
 use crate::data::{Record, Use};
 use crate::model::Model;
 use crate::picture::{FailureBin, FailureView};
 use crate::simulate::SimulateError;
-use coordinate::{CYCLES, Coordinate, Source, coordinates};
+use coordinate::{Coordinate, Source, coordinates};
 use explained::{Errors, beyond_chance, explained};
 use serde::Serialize;
-
-/// An excess counts when it stands this many standard errors above 0 …
-const STANDARD_ERRORS: f64 = 3.0;
-/// … and is at least this fraction of the noise: y_sd is not known better.
-const LEAST_EXCESS: f64 = 0.05;
-/// The share of the excess that the smallest interval is sought for.
-const CONCENTRATION: f64 = 0.75;
-/// A bin must hold this share of the samples to be called the worst.
-const WORST_HOLDS: f64 = 0.004;
-/// A longer cycle of pulses must explain this much more than a shorter one.
-const LONGER_CYCLE: f64 = 1.05;
-
-/// Pulses count time as well: their number must explain this much more than time.
-const PULSES_ARE_A_CLOCK: f64 = 1.3;
 
 /// The error along one coordinate. Serialises to the keys of `compare --json`.
 #[derive(Clone, Debug, Serialize)]
@@ -189,14 +177,13 @@ pub fn examine(
             by.push(found);
         }
     }
-    debug_assert!(cycles.is_empty() || cycles.len() == CYCLES.count());
     by.extend(shortest_cycle(cycles));
     let share = |name: &str| {
         by.iter()
             .find(|w| w.coordinate == name)
             .map_or(0.0, |w| w.explained_fraction)
     };
-    if share("pulse number") <= PULSES_ARE_A_CLOCK * share("time in the record") {
+    if share("pulse number") <= RULES.pulses_are_a_clock * share("time in the record") {
         by.retain(|w| w.coordinate != "pulse number");
     }
     if above_noise {
@@ -241,15 +228,15 @@ fn is_above(errors: &Errors) -> bool {
     // A single large event has no steady mean, but noise alone does not reach
     // it: Σ e² of as many independent samples as blocks varies by √(2/n).
     let varies = (2.0 / blocks.len().max(1) as f64).sqrt();
-    let steady = beyond_chance(&blocks, STANDARD_ERRORS) > LEAST_EXCESS * noise;
-    steady || excess > (LEAST_EXCESS + 4.0 * varies) * noise
+    let steady = beyond_chance(&blocks, RULES.excess_standard_errors) > RULES.least_excess * noise;
+    steady || excess > (RULES.least_excess + RULES.event_deviations * varies) * noise
 }
 
 /// The cycle that explains most; a multiple of it explains as much and is not
 /// preferred.
 fn shortest_cycle(cycles: Vec<Where>) -> Option<Where> {
     cycles.into_iter().reduce(|best, next| {
-        if next.explained_fraction > LONGER_CYCLE * best.explained_fraction {
+        if next.explained_fraction > RULES.longer_cycle * best.explained_fraction {
             next
         } else {
             best
@@ -342,7 +329,7 @@ fn along(errors: &Errors, coordinate: &Coordinate, excess: f64, above_noise: boo
 
 /// The bin with the most excess per sample and its neighbours of at least half that.
 fn worst(tallies: &[Tally], samples: f64, single: bool) -> (usize, usize, Tally) {
-    let large = |i: &usize| tallies[*i].count >= WORST_HOLDS * samples;
+    let large = |i: &usize| tallies[*i].count >= RULES.worst_holds * samples;
     let peak = (0..tallies.len())
         .filter(large)
         .max_by(|a, b| tallies[*a].density().total_cmp(&tallies[*b].density()))
@@ -351,7 +338,7 @@ fn worst(tallies: &[Tally], samples: f64, single: bool) -> (usize, usize, Tally)
     if single || sum.density() <= 0.0 {
         return (first, last, sum);
     }
-    let half = 0.5 * sum.density();
+    let half = RULES.worst_neighbour * sum.density();
     while first > 0 && tallies[first - 1].density() >= half {
         first -= 1;
         sum = sum.plus(&tallies[first]);
@@ -375,7 +362,7 @@ fn concentration(
         let mut sum = Tally::default();
         for (last, tally) in tallies.iter().enumerate().skip(first) {
             sum = sum.plus(tally);
-            if sum.excess() >= CONCENTRATION * excess {
+            if sum.excess() >= RULES.concentration * excess {
                 if best.as_ref().is_none_or(|(count, _)| sum.count < *count) {
                     let interval = Interval {
                         from: coordinate.ranges[first].0,

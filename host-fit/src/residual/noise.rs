@@ -1,15 +1,8 @@
 //! The noise floor that a residual is judged against.
 
 use super::explained::Errors;
+use super::rules::RULES;
 use crate::data::Record;
-
-/// Command history that must agree before two samples count as repeats, s.
-const HISTORY_S: f64 = 1.0;
-/// Periods back that are compared: a fault of every n-th pulse agrees with
-/// itself only n periods earlier.
-const PERIODS_BACK: usize = 8;
-/// Fewest pairs of repeats, in histories, that give an estimate.
-const FEWEST_HISTORIES: f64 = 2.0;
 
 /// Where the noise floor comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -58,9 +51,9 @@ pub(super) fn floor(
 /// apart; the least over the number of periods.
 fn by_repeats(record: &Record) -> Option<f64> {
     let period = command_period(&record.u)?;
-    let history = (HISTORY_S / record.sample_period_s).round().max(1.0) as usize;
+    let history = (RULES.history_s / record.sample_period_s).round().max(1.0) as usize;
     let mut least: Option<f64> = None;
-    for periods in 1..=PERIODS_BACK {
+    for periods in 1..=RULES.periods_back {
         let shift = periods * period;
         let (mut same, mut pairs, mut sum) = (0, 0.0, 0.0);
         for k in shift..record.len() {
@@ -77,7 +70,7 @@ fn by_repeats(record: &Record) -> Option<f64> {
                 pairs += 1.0;
             }
         }
-        if pairs >= FEWEST_HISTORIES * history as f64 {
+        if pairs >= RULES.fewest_histories * history as f64 {
             let variance = 0.5 * sum / pairs;
             least = Some(least.map_or(variance, |l: f64| l.min(variance)));
         }
@@ -97,7 +90,9 @@ fn command_period(u: &[f64]) -> Option<usize> {
     between.sort_unstable();
     let middle = *between.get(between.len() / 2)?;
     let alike = between.iter().filter(|b| b.abs_diff(middle) <= 1).count();
-    (between.len() >= 4 && 4 * alike >= 3 * between.len()).then_some(middle)
+    let periodic = between.len() >= RULES.fewest_periods
+        && alike as f64 >= RULES.alike_periods * between.len() as f64;
+    periodic.then_some(middle)
 }
 
 /// σ² of white noise from third differences, which smooth motion leaves small;

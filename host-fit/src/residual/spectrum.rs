@@ -1,16 +1,10 @@
 //! The excess error by frequency band.
 
 use super::explained::Errors;
+use super::rules::RULES;
 use super::{Interval, Where};
 use crate::picture::FailureBin;
 use std::f64::consts::TAU;
-
-/// Length of the pieces that spectra are taken of, s.
-const PIECE_S: f64 = 1.024;
-/// Fewest pieces.
-const FEWEST: usize = 6;
-/// A band's surplus must stand this many standard errors above 0.
-const STANDARD_ERRORS: f64 = 3.0;
 
 /// Energies of one piece in each band.
 struct Piece {
@@ -23,7 +17,7 @@ struct Piece {
 /// How far the excess error's spectrum departs from that of y itself: a misfit
 /// that has y's own spectrum is at no particular frequency.
 pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
-    let length = ((PIECE_S / errors.period_s) as usize).clamp(64, 4096);
+    let length = ((RULES.piece_s / errors.period_s) as usize).clamp(64, 4096);
     let length = 1 << length.ilog2();
     let mut limits = vec![0.5];
     while *limits.last()? < length as f64 / 2.0 {
@@ -44,7 +38,7 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
             from += length;
         }
     }
-    if pieces.len() < FEWEST {
+    if pieces.len() < RULES.fewest_pieces {
         return None;
     }
     let sum = |of: &dyn Fn(&Piece) -> f64| pieces.iter().map(of).sum::<f64>();
@@ -91,7 +85,8 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
     // y_sd says nothing of the noise's colour: what is claimed for a band counts
     // only as far as the error is not noise.
     let known = excess / (excess + noise);
-    let fraction = known * super::explained::beyond_chance(&gains, STANDARD_ERRORS) / excess;
+    let fraction =
+        known * super::explained::beyond_chance(&gains, RULES.band_standard_errors) / excess;
     let hz = |line: f64| line / (length as f64 * errors.period_s);
     let n = (pieces.len() * length) as f64;
     let bins: Vec<FailureBin> = (0..bands)

@@ -2,15 +2,9 @@
 
 use super::Where;
 use super::explained::Errors;
+use super::rules::RULES;
 use crate::data::Record;
 use statrs::distribution::{ContinuousCDF, StudentsT};
-
-/// Level of the test of a trend; a handful are made.
-const LEVEL: f64 = 0.002;
-/// Weaker correlations are not worth a sentence.
-const WEAKEST: f64 = 0.5;
-/// Fewest edges.
-const FEWEST: usize = 8;
 
 /// How the error after edges changes with the dwell before them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,7 +51,7 @@ pub(super) fn from_edge_to_edge(
         }
     }
     let (correlation, p) = correlation(&dwells, &sizes)?;
-    (p < LEVEL && correlation.abs() > WEAKEST).then_some(Trend {
+    (p < RULES.trend_level && correlation.abs() > RULES.trend_weakest).then_some(Trend {
         rest: rising,
         correlation,
     })
@@ -75,7 +69,7 @@ fn edges(u: &[f64]) -> Vec<(usize, bool)> {
 /// Pearson's correlation and its two-sided p-value.
 fn correlation(x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
     let n = x.len() as f64;
-    if x.len() < FEWEST {
+    if x.len() < RULES.trend_edges {
         return None;
     }
     let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);

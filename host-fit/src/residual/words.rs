@@ -1,11 +1,7 @@
 //! The split of an error, read out in plain language.
 
+use super::rules::RULES;
 use super::{Dependence, Failures, NoiseSource, Where};
-
-/// Coordinates that explain less are left out of the sentences.
-const WORTH_SAYING: f64 = 0.1;
-/// Most coordinates that are read out.
-const MOST: usize = 3;
 
 impl Failures {
     /// Sentences for a person, the most important first.
@@ -34,8 +30,8 @@ impl Failures {
         let said: Vec<&Where> = self
             .by
             .iter()
-            .filter(|w| w.explained_fraction >= WORTH_SAYING)
-            .take(MOST)
+            .filter(|w| w.explained_fraction >= RULES.worth_saying)
+            .take(RULES.most_said)
             .collect();
         if said.is_empty() {
             sentences.push(
@@ -43,7 +39,7 @@ impl Failures {
             );
         }
         sentences.extend(said.into_iter().map(sentence));
-        if self.bias.abs() > 0.3 * self.rmse {
+        if self.bias.abs() > RULES.worth_saying_bias * self.rmse {
             let direction = if self.bias > 0.0 { "low" } else { "high" };
             sentences.push(format!(
                 "On the whole the model reads {} too {direction}.",
@@ -58,7 +54,9 @@ impl Failures {
 fn sentence(found: &Where) -> String {
     let explained = percent(found.explained_fraction);
     let mut text = match found.concentration {
-        Some(held) if held.share > 1.3 * held.of_samples && !is_cycle(found) => {
+        Some(held)
+            if held.share > RULES.worth_saying_interval * held.of_samples && !is_cycle(found) =>
+        {
             let place = place(found, held.from, held.to);
             let more = if found.unit == "Hz" {
                 format!("{} of y's own energy", percent(held.of_samples))
@@ -89,7 +87,7 @@ fn sentence(found: &Where) -> String {
         };
         text.push_str(&format!(" and {verb} with {dwell}"));
     }
-    if found.bias.abs() > 0.5 * found.worst_rmse {
+    if found.bias.abs() > RULES.worth_saying_worst_bias * found.worst_rmse {
         let direction = if found.bias > 0.0 { "low" } else { "high" };
         text.push_str(&format!(
             "; at its worst the model reads {} too {direction}",

@@ -1,0 +1,193 @@
+//! Rules: the thresholds by which the tool decides, each with its meaning and where its value comes from.
+//!
+//! Every room keeps its own in one structure, written with the macro [`rules!`]: what a rule means is said once, as
+//! the field's documentation, and the same words are printed by `host-fit rules` and stand in `docs/rules.md`.
+//!
+//! A rule decides something a user can see (what counts as significant, as worth saying, as diverged). What only says
+//! how a computation is carried out (block lengths of a loop, memory limits) is no rule and stays where it is used.
+
+use serde::Serialize;
+
+/// One threshold.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Rule {
+    /// Its name, dashes for underscores.
+    pub name: String,
+    /// Its value.
+    pub value: Value,
+    /// Unit of the value; empty for a pure number.
+    pub unit: &'static str,
+    /// What it decides.
+    pub meaning: String,
+    /// Where the value comes from: the data it was tuned on, the test that holds it, or that it is a convention.
+    pub calibrated: &'static str,
+}
+
+/// The value of a rule: one number, or a list of them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Value {
+    /// A count.
+    Count(u64),
+    /// A number.
+    Number(f64),
+    /// Several.
+    List(Vec<f64>),
+}
+
+impl From<f64> for Value {
+    fn from(value: f64) -> Self {
+        Self::Number(value)
+    }
+}
+
+impl From<usize> for Value {
+    fn from(value: usize) -> Self {
+        Self::Count(value as u64)
+    }
+}
+
+impl From<u32> for Value {
+    fn from(value: u32) -> Self {
+        Self::Count(value.into())
+    }
+}
+
+impl From<u16> for Value {
+    fn from(value: u16) -> Self {
+        Self::Count(value.into())
+    }
+}
+
+impl<const N: usize> From<[f64; N]> for Value {
+    fn from(values: [f64; N]) -> Self {
+        Self::List(values.to_vec())
+    }
+}
+
+impl std::fmt::Display for Value {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Count(value) => write!(f, "{value}"),
+            Self::Number(value) => write!(f, "{value}"),
+            Self::List(values) => {
+                let each: Vec<String> = values.iter().map(f64::to_string).collect();
+                f.write_str(&each.join(", "))
+            }
+        }
+    }
+}
+
+/// The rules of one room.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Rulebook {
+    /// The room: a module of this library.
+    pub room: &'static str,
+    /// What its rules decide.
+    pub about: String,
+    /// The rules.
+    pub rules: Vec<Rule>,
+}
+
+/// The rules of every room, in the order in which the way of the data meets them.
+#[must_use]
+pub fn books() -> Vec<Rulebook> {
+    vec![crate::residual::RULES.book()]
+}
+
+/// Writes a structure of rules, its values in force as the constant `RULES`, and its [`Rulebook`].
+///
+/// ```ignore
+/// rules! {
+///     /// When a residual counts as more than noise.
+///     pub struct Rules in "residual";
+///
+///     /// An excess counts when it stands this many standard errors above 0.
+///     standard_errors: f64 = 3.0, "standard errors", "convention: one false alarm in 700";
+/// }
+/// ```
+macro_rules! rules {
+    (
+        $(#[doc = $about:literal])+
+        $vis:vis struct $name:ident in $room:literal;
+        $(
+            $(#[doc = $meaning:literal])+
+            $rule:ident: $type:ty = $value:expr, $unit:literal, $calibrated:literal;
+        )+
+    ) => {
+        $(#[doc = $about])+
+        #[derive(Clone, Debug, PartialEq)]
+        $vis struct $name {
+            $(
+                $(#[doc = $meaning])+
+                #[doc = concat!("\n\nUnit: ", $unit, ".\n\nCalibrated: ", $calibrated, ".")]
+                pub $rule: $type,
+            )+
+        }
+
+        /// The rules in force.
+        $vis const RULES: $name = $name { $($rule: $value,)+ };
+
+        impl $name {
+            /// The table of these rules.
+            #[must_use]
+            pub fn book(&self) -> $crate::rules::Rulebook {
+                $crate::rules::Rulebook {
+                    room: $room,
+                    about: $crate::rules::words(&[$($about),+]),
+                    rules: vec![
+                        $($crate::rules::Rule {
+                            name: stringify!($rule).replace('_', "-"),
+                            value: self.$rule.into(),
+                            unit: $unit,
+                            meaning: $crate::rules::words(&[$($meaning),+]),
+                            calibrated: $calibrated,
+                        },)+
+                    ],
+                }
+            }
+        }
+    };
+}
+pub(crate) use rules;
+
+/// The lines of a documentation comment as one paragraph.
+pub(crate) fn words(lines: &[&str]) -> String {
+    let lines: Vec<&str> = lines.iter().map(|line| line.trim()).collect();
+    lines.join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Value;
+
+    rules! {
+        /// What the
+        /// tests decide.
+        pub struct Example in "example";
+
+        /// Less than this
+        /// is nothing.
+        least_share: f64 = 0.5, "share", "convention";
+        /// Time constants.
+        starts_s: [f64; 2] = [0.1, 0.2], "s", "convention";
+        /// Most of them.
+        most: usize = 3, "", "convention";
+    }
+
+    #[test]
+    fn a_rule_is_said_once_and_serves_code_and_page() {
+        assert_eq!(RULES.most, 3);
+        let book = RULES.book();
+        assert_eq!(
+            (book.room, book.about.as_str()),
+            ("example", "What the tests decide.")
+        );
+        let rule = &book.rules[0];
+        assert_eq!(rule.name, "least-share");
+        assert_eq!(rule.meaning, "Less than this is nothing.");
+        assert_eq!(rule.value, Value::Number(0.5));
+        let values: Vec<String> = book.rules.iter().map(|r| r.value.to_string()).collect();
+        assert_eq!(values, ["0.5", "0.1, 0.2", "3"]);
+    }
+}

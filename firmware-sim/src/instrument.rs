@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use thiserror::Error;
 
-use crate::plant::{Plant, Rig, SAMPLE_PERIOD_S};
+use crate::plant::SAMPLE_PERIOD_S;
 
 /// Why an instrument is refused.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -194,42 +194,9 @@ impl Instrument {
     }
 }
 
-/// The rig on the bench, measured once and live: noise and converter on every reading.
-#[derive(Debug, Clone)]
-pub struct BenchRig {
-    rig: Rig,
-    noise: NoiseSource,
-    converter: Option<Converter>,
-}
-
-impl BenchRig {
-    /// Connects noise and converter to a rig.
-    pub fn new(rig: Rig, noise: Noise, converter: Option<Converter>, seed: u64) -> Self {
-        Self {
-            rig,
-            noise: NoiseSource::new(noise, ChaCha8Rng::seed_from_u64(seed)),
-            converter,
-        }
-    }
-
-    /// The friction of the flow now, without film, noise and converter (y): what control is about.
-    pub fn friction(&self) -> f64 {
-        self.rig.friction()
-    }
-}
-
-impl Plant for BenchRig {
-    fn step(&mut self, command: bool) -> f64 {
-        let analogue = self.rig.step(command) + self.noise.sample();
-        self.converter
-            .map_or(analogue, |c| c.reading(c.code(analogue)))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::{BasePlant, PlantSpec};
 
     fn variance(x: &[f64]) -> f64 {
         x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64
@@ -298,21 +265,5 @@ mod tests {
             once.measure(&truth, 1),
             Err(InstrumentError::TooFewRepeats(1))
         );
-    }
-
-    #[test]
-    fn the_bench_reads_the_rig_through_noise() {
-        let base = BasePlant::draw(&mut ChaCha8Rng::seed_from_u64(2));
-        let rig = Rig::new(&PlantSpec::new(base, &[]), None).unwrap();
-        let mut quiet = rig.clone();
-        let mut bench = BenchRig::new(rig, Noise::HOT_FILM, Some(Converter::TWELVE_BIT), 8);
-        let off: Vec<f64> = (0..20_000)
-            .map(|k| {
-                let on = (k / 200) % 2 == 0;
-                bench.step(on) - quiet.step(on)
-            })
-            .collect();
-        let expected = Noise::HOT_FILM.standard_deviation().powi(2);
-        assert!((variance(&off) / expected - 1.0).abs() < 0.15);
     }
 }

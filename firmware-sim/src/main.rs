@@ -1,15 +1,16 @@
 //! Command line of the simulator: writes data sets with something hidden in them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand, ValueEnum};
 
-use firmware_sim::dataset::write_whole;
 use firmware_sim::hidden_set::HiddenSetPlan;
 use firmware_sim::paper_like::{Disturbances, LagReading, paper_like_set};
 use firmware_sim::plant::RateLaw;
+use recordings::DataSet;
+use recordings::output::write_atomic;
 
 /// Simulated rigs and their recordings.
 #[derive(Debug, Parser)]
@@ -130,9 +131,10 @@ fn run(command: Command) -> Result<()> {
             };
             plan.instrument.repeats = repeats;
             let hidden = plan.build()?;
-            hidden.data.write(&out)?;
+            save(&hidden.data, &out)?;
             if let Some(path) = truth {
-                write_whole(&path, &hidden.truth.to_toml())?;
+                let text = hidden.truth.to_toml();
+                write_atomic(&path, |file| file.write_all(text.as_bytes()))?;
             }
         }
         Command::PaperSet { lags, seed, out } => {
@@ -140,8 +142,16 @@ fn run(command: Command) -> Result<()> {
                 Lags::Literal => LagReading::Literal,
                 Lags::OneStep => LagReading::OneStep,
             };
-            paper_like_set(lags, Disturbances::default(), seed).write(&out)?;
+            save(&paper_like_set(lags, Disturbances::default(), seed)?, &out)?;
         }
     }
     Ok(())
+}
+
+/// Saves a set into the folder `out`, making the folders above it if needed.
+fn save(set: &DataSet, out: &Path) -> Result<()> {
+    if let Some(parent) = out.parent() {
+        std::fs::create_dir_all(parent)?;
+    }
+    Ok(set.save(out)?)
 }

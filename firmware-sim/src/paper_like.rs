@@ -3,15 +3,14 @@
 //! The recursion is written out here once more on purpose: a set that judges the tool must not come out
 //! of the tool's own code.
 
-use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use recordings::{DataError, DataSet, Record, Use};
 
 use crate::command::{Command, RUN_SAMPLES, TAIL_SAMPLES};
-use crate::dataset::{DataSet, Record, Use};
 use crate::plant::SAMPLE_PERIOD_S;
 
 /// Which sample a printed lag τ means when y_{k+1} is computed.
@@ -130,7 +129,14 @@ fn play(command: &[f64], lags: LagReading, size: Disturbances, mut rng: ChaCha8R
 
 /// The paper's runs: step, 4 Hz 50 %, 4 Hz 80 %, 8 Hz 50 % to identify (40 000 samples), a second
 /// constant run and 8 Hz 80 % held out. Blowing starts with the record and ends 1.5 s before its end.
-pub fn paper_like_set(lags: LagReading, size: Disturbances, seed: u64) -> DataSet {
+///
+/// # Errors
+/// [`DataError`] when the disturbances are so large that the model grows without bound.
+pub fn paper_like_set(
+    lags: LagReading,
+    size: Disturbances,
+    seed: u64,
+) -> Result<DataSet, DataError> {
     let end = RUN_SAMPLES - TAIL_SAMPLES;
     let square = |name: &str, period: usize, on: f64| {
         let openings: Vec<(usize, usize)> = (0..end)
@@ -156,26 +162,12 @@ pub fn paper_like_set(lags: LagReading, size: Disturbances, seed: u64) -> DataSe
         .map(|((command, role), number)| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             rng.set_stream(number);
-            Record {
-                name: command.name,
-                role,
-                t: (0..command.levels.len())
-                    .map(|k| k as f64 * SAMPLE_PERIOD_S)
-                    .collect(),
-                y: play(&command.levels, lags, size, rng),
-                u: command.levels,
-                y_sd: Vec::new(),
-                y_min: Vec::new(),
-                y_max: Vec::new(),
-                channels: BTreeMap::new(),
-            }
+            let y = play(&command.levels, lags, size, rng);
+            Record::new(&command.name, role, SAMPLE_PERIOD_S, command.levels, y)
         })
         .collect();
-    DataSet {
-        title: format!("Table II of hal-01298166 with disturbances, run {seed}"),
-        sample_period_s: SAMPLE_PERIOD_S,
-        records,
-    }
+    let title = format!("Table II of hal-01298166 with disturbances, run {seed}");
+    DataSet::from_records(Some(title), records)
 }
 
 #[cfg(test)]
@@ -199,7 +191,7 @@ mod tests {
             (LagReading::Literal, [0.11, 0.23, 0.54, 0.79, 0.99]),
             (LagReading::OneStep, [0.15, 0.27, 0.62, 0.84, 1.02]),
         ] {
-            let set = paper_like_set(lags, QUIET, 1);
+            let set = paper_like_set(lags, QUIET, 1).unwrap();
             let y = &set.records[0].y;
             for (k, value) in [100, 200, 500, 1000, 2000].into_iter().zip(expected) {
                 assert!((y[k] - value).abs() < 0.01, "{lags:?} at {k}: {}", y[k]);
@@ -209,7 +201,7 @@ mod tests {
 
     #[test]
     fn the_first_edge_arrives_after_the_delay_of_separated_flow() {
-        let set = paper_like_set(LagReading::Literal, QUIET, 1);
+        let set = paper_like_set(LagReading::Literal, QUIET, 1).unwrap();
         let first = set.records[1].y.iter().position(|y| *y != 0.0);
         // round(47.35 + 12.69) = 60 samples; y_{k+1} shows what arrived at k.
         assert_eq!(first, Some(61));
@@ -217,18 +209,11 @@ mod tests {
 
     #[test]
     fn disturbances_have_their_size_and_the_set_its_shape() {
-        let loud = paper_like_set(LagReading::Literal, Disturbances::default(), 5);
-        assert_eq!(
-            loud,
-            paper_like_set(LagReading::Literal, Disturbances::default(), 5)
-        );
-        let quiet = paper_like_set(LagReading::Literal, QUIET, 5);
-        let identify: usize = loud
-            .records
-            .iter()
-            .filter(|r| r.role == Use::Identify)
-            .map(|r| r.y.len())
-            .sum();
+        let made = |size| paper_like_set(LagReading::Literal, size, 5).unwrap();
+        let loud = made(Disturbances::default());
+        assert_eq!(loud.hash, made(Disturbances::default()).hash);
+        let quiet = made(QUIET);
+        let identify: usize = loud.identify().map(Record::len).sum();
         assert_eq!(identify, 40_000);
         for (a, b) in loud.records.iter().zip(&quiet.records) {
             assert!(a.u[RUN_SAMPLES - TAIL_SAMPLES..].iter().all(|u| *u == 0.0));

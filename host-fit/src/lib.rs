@@ -1,7 +1,6 @@
 //! Host side: recordings to models.
 
 pub mod codegen;
-pub mod data;
 pub mod delay;
 pub mod design;
 pub mod diagnose;
@@ -12,7 +11,6 @@ pub mod fit;
 pub mod identify;
 pub mod indicators;
 pub mod model;
-pub mod output;
 pub mod picture;
 pub mod power;
 pub mod residual;
@@ -23,3 +21,6 @@ pub mod target;
 pub mod user_effect;
 
 mod linalg;
+
+pub use recordings as data;
+pub use recordings::output;

@@ -4,6 +4,7 @@
 //! what and what to do. 2: wrong usage.
 
 mod commands;
+mod plants;
 
 use std::io::Write;
 use std::process::ExitCode;

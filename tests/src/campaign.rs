@@ -1,10 +1,8 @@
 //! The hidden-effects campaign: rigs of `firmware-sim` that hide something, a
 //! diagnosis that is told nothing, and the count of what it found.
 
-use firmware_sim::dataset::Use as Role;
 use firmware_sim::hidden_set::{HiddenSet, HiddenSetPlan};
 use firmware_sim::plant::{Effect, Fault};
-use host_fit::data::{Record, Use};
 use host_fit::diagnose::{Diagnosis, Options, Verdict, diagnose};
 use host_fit::model::{Delay, Model, Start, Training};
 use model_core::model::Averaging;
@@ -101,27 +99,6 @@ impl Outcome {
     }
 }
 
-/// The records of a simulated set as the tool reads them.
-#[must_use]
-pub fn records(set: &HiddenSet) -> Vec<Record> {
-    let each = set.data.records.iter().map(|record| Record {
-        name: record.name.clone(),
-        role: match record.role {
-            Role::Identify => Use::Identify,
-            Role::Validate => Use::Validate,
-        },
-        sample_period_s: firmware_sim::plant::SAMPLE_PERIOD_S,
-        t0: 0.0,
-        u: record.u.clone(),
-        y: record.y.clone(),
-        y_sd: Some(record.y_sd.clone()),
-        y_min: Some(record.y_min.clone()),
-        y_max: Some(record.y_max.clone()),
-        channels: record.channels.clone(),
-    });
-    each.collect()
-}
-
 /// A model as an engineer would hand it in: a rough guess, with the wrong
 /// delays where the case says so, without delay law where the law is hidden.
 fn given(case: &Case) -> Model {
@@ -192,9 +169,13 @@ pub fn run(case: &Case) -> Result<Outcome, String> {
         seed: case.seed,
         ..Options::default()
     };
-    let records = records(&set);
-    let diagnosis = diagnose(&given(case), &records, &options, &AtomicBool::new(false))
-        .map_err(|e| e.to_string())?;
+    let diagnosis = diagnose(
+        &given(case),
+        &set.data.records,
+        &options,
+        &AtomicBool::new(false),
+    )
+    .map_err(|e| e.to_string())?;
     Ok(outcome(
         case,
         &set,

@@ -1,6 +1,6 @@
 //! The valve's hold times are kept whatever the law is shown.
 
-use firmware_sim::closed_loop::{Controller, Law, OpenLoop, Relay};
+use closed_loop::{Controller, OpenLoop, Relay, TrackingController};
 use model_core::Parts;
 use model_core::control::budget::Budget;
 use model_core::control::{Air, Hold, HoldTimes, PulseTrain, Reachable, Switches, Tracking};
@@ -108,7 +108,7 @@ proptest! {
             correction_limit: 0.5,
             residual_limit: 0.5,
         };
-        let mut law = Law::new(&model, tracking, model.on_off_state::<16, 1>(), Vec::new());
+        let mut law = TrackingController::new(&model, tracking, model.on_off_state::<16, 1>(), Vec::new());
         let mut valve = Vec::new();
         for (k, reading) in readings.iter().enumerate() {
             let reference = references[k * references.len() / readings.len()];

@@ -29,6 +29,16 @@ const STEPS: &[Step] = &[
             "-Dwarnings",
         ]))
     }),
+    // The fitter does not depend on the simulator that it is judged by.
+    ("library alone", || {
+        run(&mut cargo(&[
+            "check",
+            "--release",
+            "--package=host-fit",
+            "--lib",
+            "--no-default-features",
+        ]))
+    }),
     // The README's test command; documentation examples are part of it.
     ("tests", || {
         run(&mut cargo(&["test", "--release", "--workspace"]))

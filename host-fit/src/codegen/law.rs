@@ -4,7 +4,7 @@ use super::layout::number;
 use super::{CodegenError, jets, outputs, references};
 use crate::model::{Delay, Law, Maximise, Model, Track};
 use crate::simulate::Ring;
-use firmware_sim::closed_loop::AHEAD;
+use closed_loop::AHEAD;
 use model_core::State;
 use model_core::control::{Tracking, golden};
 use std::fmt::Write as _;

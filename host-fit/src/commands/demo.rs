@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use firmware_sim::closed_loop::{Figures, OpenLoop, Relay, run as close_the_loop};
+use closed_loop::{Figures, OpenLoop, Relay, run as close_the_loop};
 use firmware_sim::hidden_set::HiddenSetPlan;
 use firmware_sim::plant::{PlantSpec, Rig};
 use host_fit::codegen::generate;

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use firmware_sim::closed_loop::{Figures, Trace};
+use closed_loop::{Figures, Trace};
 use host_fit::design::{
-    Case, CaseGroup, MaximiseRequest, Optimum, Outside, Planned, Proof, Steady, TrackDesign,
-    TrackRequest, maximise, prove, prove_pulses, track,
+    Case, CaseGroup, JUDGED_FROM, MaximiseRequest, Optimum, Outside, Planned, Proof, Steady,
+    TrackDesign, TrackRequest, maximise, prove, prove_pulses, track,
 };
 use host_fit::model::{Law, Model};
 use host_fit::output::write_atomic;
@@ -15,6 +15,7 @@ use serde::Serialize;
 
 use super::Console;
 use super::average::{not_negative, positive};
+use crate::plants::Plants;
 
 /// Design an on/off law for the valve from a model and write it into the model file.
 ///
@@ -183,11 +184,12 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
             .exit();
     }
     let mut model = Model::load(&args.model)?;
+    let plants = Plants::of(&model, args.seed)?;
     let bar = console.progress(0, "{spinner} designing and trying in the loop {elapsed}");
     let (law, design, proof) = match args.goal {
         Goal::Track => {
             let design = track(&model, &request(args))?;
-            let proof = prove(&model, &design.law, args.seed)?;
+            let proof = prove(&model, &design.law, &plants.nearest, &plants.others);
             (Law::Track(design.law.clone()), Design::Track(design), proof)
         }
         Goal::Maximise => {
@@ -202,7 +204,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
                     horizon_s: args.horizon,
                 },
             )?;
-            let proof = prove_pulses(&model, &optimum.law, args.seed)?;
+            let proof = prove_pulses(&optimum.law, plants.blown, &plants.nearest, &plants.others);
             (
                 Law::Maximise(optimum.law.clone()),
                 Design::Maximise(optimum),
@@ -231,6 +233,12 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     match &design {
         Design::Track(design) => console.say(&track_words(design))?,
         Design::Maximise(optimum) => console.say(&optimum_words(optimum))?,
+    }
+    if !plants.left_out.is_empty() {
+        console.say(&format!(
+            "note: tried on plants without {}, which the simulator does not know",
+            plants.left_out.join(", ")
+        ))?;
     }
     console.say(&case_table(&proof))?;
     console.say(&format!(
@@ -270,7 +278,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
             Design::Track(_) => None,
         },
         cases: proof.cases.iter().map(CaseDocument::from).collect(),
-        relay: Figures::of(&proof.compared, 4000).into(),
+        relay: Figures::of(&proof.compared, JUDGED_FROM).into(),
     })
 }
 
@@ -418,7 +426,7 @@ fn case_table(proof: &Proof) -> String {
     }
     line(
         proof.compared_name,
-        &Figures::of(&proof.compared, 4000),
+        &Figures::of(&proof.compared, JUDGED_FROM),
         None,
         None,
     );

@@ -3,15 +3,15 @@
 mod bench;
 mod horizon;
 mod maximise;
-mod physical;
 mod proof;
 mod steady;
 mod tracking;
 
 pub use maximise::{MaximiseRequest, Optimum, Outside, Planned, maximise};
-pub use physical::nearest_plant;
-pub use proof::{Case, CaseGroup, Proof, prove, prove_pulses, run_law};
-pub use steady::{Steady, steady};
+pub use proof::{
+    Case, CaseGroup, JUDGED_FROM, Proof, TRIAL_SAMPLES, Trial, prove, prove_pulses, run_law,
+};
+pub use steady::{Steady, steady, time_constants};
 pub use tracking::{TrackDesign, TrackRequest, track};
 
 use model_core::control::Unreachable;
@@ -91,7 +91,4 @@ pub enum DesignError {
         /// Largest pole modulus with the valve open.
         on: f64,
     },
-    /// A plant could not be built from the model.
-    #[error("no physical plant could be made from the model: {0}")]
-    Plant(String),
 }

@@ -1,4 +1,4 @@
-//! What a model settles at, and whether it settles.
+//! What a model settles at, whether it settles, and how fast.
 
 use super::DesignError;
 use super::bench::Bench;
@@ -62,6 +62,40 @@ pub fn steady(model: &Model, on: bool) -> Result<Steady, DesignError> {
         on,
         seconds: LONGEST_S,
         modulus,
+    })
+}
+
+/// From the arrival of an edge to 1 − 1/e of the way between the levels `low` and
+/// `high`, opening and closing, s (0.001–10).
+#[must_use]
+pub fn time_constants(model: &Model, low: f64, high: f64) -> [f64; 2] {
+    let bench = Bench::<f64>::of(model);
+    let mut state = bench.at_rest();
+    let per_second = (1.0 / model.sample_period_s).round() as usize;
+    [true, false].map(|on| {
+        let (from, to) = if on { (low, high) } else { (high, low) };
+        let goal = from + (to - from) * (1.0 - (-1.0_f64).exp());
+        let mut arrived = None;
+        for k in 0..30 * per_second {
+            let output = bench.step(&mut state, on);
+            if (output.arrived > 0.5) == on && arrived.is_none() {
+                arrived = Some(k);
+            }
+            let there = if on {
+                output.next >= goal
+            } else {
+                output.next <= goal
+            };
+            if let (Some(arrived), true) = (arrived, there) {
+                let time = (k + 1 - arrived) as f64 * model.sample_period_s;
+                // Settle before the next edge.
+                for _ in 0..10 * per_second {
+                    bench.step(&mut state, on);
+                }
+                return time.clamp(0.001, 10.0);
+            }
+        }
+        10.0
     })
 }
 

@@ -2,10 +2,9 @@
 
 use super::DesignError;
 use super::bench::Bench;
-use super::physical::time_constants;
-use super::steady::{Steady, steady};
+use super::steady::{Steady, steady, time_constants};
 use crate::model::{Delay, Hold, Model, Start, Track};
-use firmware_sim::closed_loop::{Figures, Law, ModelFlow, run};
+use closed_loop::{AHEAD, Figures, ModelFlow, TrackingController, run};
 use model_core::control::budget::Budget;
 use model_core::control::tracking::Unusable;
 use model_core::control::{Reachable, Tracking};
@@ -170,7 +169,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     };
     let duty_of = |law: &Track| {
         let tracking: Tracking<f64> = law.tracking();
-        tracking.validate::<_, { firmware_sim::closed_loop::AHEAD }>(&bench.prepared, longest)?;
+        tracking.validate::<_, AHEAD>(&bench.prepared, longest)?;
         Ok::<_, DesignError>(on_model(&bench, tracking))
     };
     let figures = duty_of(&law)?;
@@ -264,7 +263,7 @@ fn on_model(bench: &Bench<f64>, tracking: Tracking<f64>) -> Figures {
         },
         ..tracking
     };
-    let mut law = Law::new(
+    let mut law = TrackingController::new(
         &bench.prepared,
         free,
         bench.at_rest(),

@@ -12,23 +12,7 @@ use model_core::recursion::{Grading, LagConvention};
 pub(crate) fn records(effects: &[&str], faults: &[&str], seed: u64) -> Vec<Record> {
     let plan = HiddenSetPlan::draw(effects, faults, seed).expect("a known effect");
     let set = plan.build().expect("a possible plant");
-    set.data
-        .records
-        .into_iter()
-        .map(|r| {
-            let role = match r.role {
-                firmware_sim::dataset::Use::Identify => Use::Identify,
-                firmware_sim::dataset::Use::Validate => Use::Validate,
-            };
-            Record {
-                y_sd: Some(r.y_sd),
-                y_min: Some(r.y_min),
-                y_max: Some(r.y_max),
-                channels: r.channels,
-                ..Record::new(&r.name, role, 0.001, r.u, r.y)
-            }
-        })
-        .collect()
+    set.data.records
 }
 
 /// The leanest bilinear model with a state-dependent delay, identified on the records.

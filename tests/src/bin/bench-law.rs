@@ -1,9 +1,10 @@
 //! The designed law against what people use, on plants that are not its model:
 //! `cargo xtask bench-law`.
 
-use firmware_sim::closed_loop::{
-    Controller, Disturbed, Figures, FirstOrder, Gains, Law, Lost, OpenLoop, PulseWidth, Relay, run,
+use closed_loop::{
+    Controller, Figures, FirstOrder, Gains, OpenLoop, PulseWidth, Relay, TrackingController, run,
 };
+use firmware_sim::bench::{Disturbed, Lost};
 use firmware_sim::instrument::{Converter, Noise};
 use firmware_sim::plant::{BasePlant, DelayLaw, PlantSpec, Rig};
 use host_fit::design::{TrackRequest, track};
@@ -141,7 +142,7 @@ impl Bench {
         let design = self.designed(goal, switches_per_s, least_air)?;
         let prepared = self.model.prepare::<f32>();
         let at_rest = State::at_rest(&prepared, Ring::reaching(300), Ring::reaching(300));
-        let law = Law::new(&prepared, design.tracking(), at_rest, Vec::new());
+        let law = TrackingController::new(&prepared, design.tracking(), at_rest, Vec::new());
         Some(self.run(law, goal, goal))
     }
 

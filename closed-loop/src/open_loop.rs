@@ -1,6 +1,6 @@
 //! Blowing without looking: steadily or in pulses.
 
-use super::Controller;
+use crate::run::Controller;
 use model_core::control::{Hold, HoldTimes, PulseTrain};
 
 /// A pulse train played whatever the sensor says.

@@ -1,6 +1,6 @@
 //! A model as the flow: what a law does when everything is as identified.
 
-use super::Flow;
+use crate::run::Controlled;
 use model_core::history::Memory;
 use model_core::model::StateOf;
 use model_core::{Input, Parts, Real, step};
@@ -10,6 +10,19 @@ pub struct ModelFlow<'a, T: Real, M: Parts<T>, Y, J> {
     model: &'a M,
     state: StateOf<T, M, Y, J>,
     channels: Vec<T>,
+}
+
+impl<T: Real, M: Parts<T>, Y, J> Clone for ModelFlow<'_, T, M, Y, J>
+where
+    StateOf<T, M, Y, J>: Clone,
+{
+    fn clone(&self) -> Self {
+        Self {
+            model: self.model,
+            state: self.state.clone(),
+            channels: self.channels.clone(),
+        }
+    }
 }
 
 impl<'a, T: Real, M: Parts<T>, Y: Memory<T>, J: Memory<T>> ModelFlow<'a, T, M, Y, J> {
@@ -23,7 +36,7 @@ impl<'a, T: Real, M: Parts<T>, Y: Memory<T>, J: Memory<T>> ModelFlow<'a, T, M, Y
     }
 }
 
-impl<T: Real, M: Parts<T>, Y: Memory<T>, J: Memory<T>> Flow for ModelFlow<'_, T, M, Y, J> {
+impl<T: Real, M: Parts<T>, Y: Memory<T>, J: Memory<T>> Controlled for ModelFlow<'_, T, M, Y, J> {
     /// The reading belongs to the sample in which the command acts: sensor
     /// effects of the model are one sample old.
     fn step(&mut self, command: bool) -> Option<f64> {

@@ -1,23 +1,29 @@
-//! Measured data: records of command and response, read, checked, averaged and judged for what they can tell.
+//! Recordings: records of command and response, read, checked, averaged and judged for what they can tell.
 //!
 //! A data set is a folder with `dataset.toml` and CSV files, or one CSV file. Everything is checked when it is loaded
 //! ([`DataSet::load`]) or put together in memory ([`DataSet::from_records`]); every fault is one paragraph that names
-//! file, line and column, or the TOML key, and the remedy ([`DataError`]).
+//! file, line and column, or the TOML key, and the remedy ([`DataError`]). Whatever is written appears whole or not at
+//! all ([`output`]).
 
 mod average;
+mod averaging;
 mod error;
 mod excitation;
 mod folder;
 mod folding;
 mod hash;
+pub mod output;
 mod raw;
 mod record;
 mod rows;
 mod sampling;
+mod set;
 mod table;
 
-pub use average::{Align, AverageError, AverageSummary, Averaging, Defect, Dropped, average_files};
+pub use average::average_files;
+pub use averaging::{Align, AverageError, AverageSummary, Averaging, Defect, Dropped};
 pub use error::{DataError, Place, Problem};
 pub use excitation::{Demand, Excitation, ExcitationError, RecordExcitation, check_excitation};
-pub use record::{DataSet, Record, Use};
+pub use record::{Record, Use};
+pub use set::DataSet;
 pub use table::InputFile;

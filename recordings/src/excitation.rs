@@ -5,7 +5,8 @@
 //! single step they are d per edge and no more. Beside the pairs, the whole span of delays is judged at once: the
 //! eigenvalues of the covariance of lagged inputs tell how many of them are free of the others.
 
-use super::record::{DataSet, Record};
+use crate::record::Record;
+use crate::set::DataSet;
 
 /// Lags put side by side in the covariance.
 const MOST_LAGS: usize = 32;
@@ -370,7 +371,7 @@ fn symmetric_eigenvalues(mut a: Vec<f64>, n: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::Use;
+    use crate::Use;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 

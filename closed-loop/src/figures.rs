@@ -1,7 +1,6 @@
 //! What a closed-loop run amounts to.
 
-use super::Trace;
-use crate::plant::SAMPLE_PERIOD_S;
+use crate::run::{SAMPLE_PERIOD_S, Trace};
 
 /// Figures of a run against its reference, in y and SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,8 +81,8 @@ fn settling(trace: &Trace) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Sample;
     use super::*;
+    use crate::run::Sample;
 
     #[test]
     fn a_square_wave_about_its_reference() {

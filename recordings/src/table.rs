@@ -5,10 +5,10 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use super::error::{DataError, Place, Problem};
-use super::record::{Origin, Record, Use, check_values};
-use super::rows::{RowReader, number, printed_unit};
-use super::sampling::PrintedTimes;
+use crate::error::{DataError, Place, Problem};
+use crate::record::{Origin, Record, Use, check_values};
+use crate::rows::{RowReader, number, printed_unit};
+use crate::sampling::PrintedTimes;
 
 /// The columns of one file; all have the same length, at least 2, and only finite values.
 #[derive(Debug)]

@@ -1,51 +1,18 @@
-//! The loop at 1 kHz: a controller that sees readings and gives commands, a
-//! flow that sees commands and gives readings, and what came of it.
+//! A controller that sees readings and gives commands, a flow that sees commands
+//! and gives readings, and the record of the two.
 
-mod bench;
-mod figures;
-mod law;
-mod model_flow;
-mod open_loop;
-mod proportional_integral;
-mod relay;
-
-pub use bench::{Disturbed, Lost};
-pub use figures::Figures;
-pub use law::{AHEAD, Law};
-pub use model_flow::ModelFlow;
-pub use open_loop::OpenLoop;
-pub use proportional_integral::{FirstOrder, Gains, PulseWidth};
-pub use relay::Relay;
-
-use crate::instrument::BenchRig;
-use crate::plant::{Plant, Rig, SAMPLE_PERIOD_S};
 use std::fmt::Write as _;
 
+/// Seconds between two commands.
+pub const SAMPLE_PERIOD_S: f64 = 0.001;
+
 /// What can be controlled: a flow whose true friction is known besides the reading.
-pub trait Flow {
+pub trait Controlled {
     /// Holds the command for one sample, then reads the sensor (y); `None` when
     /// the reading is lost.
     fn step(&mut self, command: bool) -> Option<f64>;
     /// The friction now, before film and noise (y).
     fn friction(&self) -> f64;
-}
-
-impl Flow for Rig {
-    fn step(&mut self, command: bool) -> Option<f64> {
-        Some(Plant::step(self, command))
-    }
-    fn friction(&self) -> f64 {
-        Rig::friction(self)
-    }
-}
-
-impl Flow for BenchRig {
-    fn step(&mut self, command: bool) -> Option<f64> {
-        Some(Plant::step(self, command))
-    }
-    fn friction(&self) -> f64 {
-        BenchRig::friction(self)
-    }
 }
 
 /// What can be in charge of the valve.
@@ -82,7 +49,7 @@ pub struct Trace {
 /// The first sample has no reading: nothing has been measured yet.
 pub fn run(
     controller: &mut impl Controller,
-    flow: &mut impl Flow,
+    flow: &mut impl Controlled,
     references: impl IntoIterator<Item = f64>,
 ) -> Trace {
     let mut reading = None;

@@ -12,156 +12,15 @@
 
 use std::path::Path;
 
-use super::error::{DataError, Place};
-use super::folding::Folding;
-use super::raw::{RawReader, Step};
-use super::record::{DataSet, Record, Use};
+use crate::averaging::{AverageError, AverageSummary, Averaging, Defect};
+use crate::error::Place;
+use crate::folding::Folding;
+use crate::raw::{RawReader, Step};
+use crate::record::{Record, Use};
+use crate::set::DataSet;
 
 /// Progress is reported about every so many bytes.
 const PROGRESS_BYTES: u64 = 1 << 22;
-
-/// On what the repeats are laid over each other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Align {
-    /// On the command's rising edges (falls back to [`Align::Grid`] where the command never rises).
-    #[default]
-    Edges,
-    /// On whole periods counted from the start, by the recording's own clock.
-    Grid,
-}
-
-/// How recordings are averaged.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Averaging {
-    /// Length of one repeat of the command sequence, s; at least two samples.
-    pub period_s: f64,
-    /// Time after the first row at which the first period starts, s, ≥ 0. It decides where in the sequence the
-    /// averaged record begins: best at rest, because history before a record counts as 0.
-    pub start_s: f64,
-    /// On what the repeats are aligned.
-    pub align: Align,
-    /// Edges of the command may be this many samples off those of the other repeats, beside the anchor.
-    pub edge_jitter: usize,
-}
-
-impl Averaging {
-    /// Averaging over `period_s` seconds with the usual choices: from the first row, on edges, one sample of jitter.
-    #[must_use]
-    pub fn over(period_s: f64) -> Self {
-        Self {
-            period_s,
-            start_s: 0.0,
-            align: Align::Edges,
-            edge_jitter: 1,
-        }
-    }
-}
-
-/// Why a period was dropped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Defect {
-    /// Samples are missing by the time column.
-    MissingSamples,
-    /// A value is missing, not a number or not finite, or the row is too short or too long.
-    UnreadableValue,
-    /// The time step is no whole number of sampling periods, or the time cannot be read.
-    UnevenTime,
-    /// The command is neither 0 nor 1.
-    CommandNotOnOff,
-    /// No rising edge of the command where the period puts it.
-    NoAnchorEdge,
-    /// The command differs from that of most periods.
-    OtherCommand,
-    /// Time went back: the recording was restarted within the period.
-    Restart,
-}
-
-impl Defect {
-    /// In words.
-    #[must_use]
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::MissingSamples => "samples missing",
-            Self::UnreadableValue => "a value is missing or not a finite number",
-            Self::UnevenTime => "the time step is off the sampling grid",
-            Self::CommandNotOnOff => "the command is neither 0 nor 1",
-            Self::NoAnchorEdge => "no rising edge where the period puts it",
-            Self::OtherCommand => "another command sequence than most periods",
-            Self::Restart => "time goes back",
-        }
-    }
-}
-
-/// Periods dropped for one reason.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-pub struct Dropped {
-    /// The reason.
-    pub defect: Defect,
-    /// How many periods.
-    pub periods: u64,
-    /// Line of the file where it first shows (the line after the gap for missing samples).
-    pub first_line: u64,
-}
-
-/// What became of one recording.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct AverageSummary {
-    /// Name of the record.
-    pub name: String,
-    /// Rows read.
-    pub rows: u64,
-    /// Bytes read.
-    pub bytes: u64,
-    /// Sampling period of the recording, s.
-    pub sample_period_s: f64,
-    /// Samples in one period.
-    pub period_samples: usize,
-    /// Periods in the average. With fewer than two there is no standard error.
-    pub periods_used: u64,
-    /// Periods dropped, by reason.
-    pub dropped: Vec<Dropped>,
-    /// Samples at the end that do not make a whole period.
-    pub left_over_samples: usize,
-    /// Whether the periods were aligned on edges.
-    pub aligned_on_edges: bool,
-    /// Root mean square over the period of the standard error of the mean; `None` with one period.
-    pub mean_standard_error: Option<f64>,
-}
-
-/// Why recordings could not be averaged.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum AverageError {
-    /// A recording cannot be read.
-    #[error(transparent)]
-    Data(#[from] DataError),
-    /// The period does not fit the sampling.
-    #[error(
-        "the period of {period_s} s does not hold a usable number of samples at {sample_period_s} s each; give the length of one repeat of the command sequence in seconds"
-    )]
-    Period {
-        /// As asked for.
-        period_s: f64,
-        /// Of the recording.
-        sample_period_s: f64,
-    },
-    /// Not one good period.
-    #[error(
-        "{place}: no complete period to average ({found}); check --period against the recording and start it with --start at the beginning of a repeat"
-    )]
-    NothingLeft {
-        /// The recording.
-        place: Box<Place>,
-        /// What was found instead.
-        found: String,
-    },
-    /// Two recordings would make records of one name.
-    #[error(
-        "two recordings are named `{0}`; every recording becomes a record named by its file, so rename one"
-    )]
-    DoubledName(String),
-}
 
 /// Phase-averages several recordings into one data set: each file becomes one record named by its stem.
 ///
@@ -274,6 +133,7 @@ fn average<R: std::io::BufRead>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::averaging::Align;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use std::fmt::Write as _;

@@ -4,7 +4,7 @@
 //! as IEEE 754 bits (little-endian), each string and column preceded by its length. It tells data sets apart; it is no
 //! protection against someone who wants two sets to collide. The title is not part of it.
 
-use super::record::{Record, Use};
+use crate::record::{Record, Use};
 
 const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
 const PRIME: u64 = 0x0000_0100_0000_01b3;

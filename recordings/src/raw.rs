@@ -4,9 +4,9 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use super::error::{DataError, Problem};
-use super::rows::{RowReader, number};
-use super::sampling::tidy;
+use crate::error::{DataError, Problem};
+use crate::rows::{RowReader, number};
+use crate::sampling::tidy;
 
 /// Rows at the head of the file from which the sampling period is taken.
 const HEAD_ROWS: usize = 20_000;

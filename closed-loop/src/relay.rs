@@ -1,6 +1,6 @@
 //! The plain relay: what one builds first.
 
-use super::Controller;
+use crate::run::Controller;
 use model_core::control::{Hold, HoldTimes};
 
 /// On below the reference, off above it, with a dead zone and hold times; no

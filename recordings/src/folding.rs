@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::average::{Align, AverageError, AverageSummary, Averaging, Defect, Dropped};
-use super::error::Place;
-use super::raw::RawReader;
-use super::record::{Record, Use};
+use crate::averaging::{Align, AverageError, AverageSummary, Averaging, Defect, Dropped};
+use crate::error::Place;
+use crate::raw::RawReader;
+use crate::record::{Record, Use};
 
 /// Command sequences kept side by side until it is known which one is the rule.
 const MOST_SEQUENCES: usize = 4;

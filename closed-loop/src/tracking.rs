@@ -1,6 +1,6 @@
 //! The law of `model-core` as a controller, in the numbers of the board.
 
-use super::Controller;
+use crate::run::Controller;
 use model_core::control::{Decision, Tracking, TrackingState};
 use model_core::effect::Effect;
 use model_core::history::Memory;
@@ -11,7 +11,7 @@ use model_core::{Parts, Real};
 pub const AHEAD: usize = 640;
 
 /// A tracking law at work.
-pub struct Law<'a, T: Real, M: Parts<T>, Y, J> {
+pub struct TrackingController<'a, T: Real, M: Parts<T>, Y, J> {
     model: &'a M,
     tracking: Tracking<T>,
     state: TrackingState<T, StateOf<T, M, Y, J>, AHEAD>,
@@ -19,7 +19,7 @@ pub struct Law<'a, T: Real, M: Parts<T>, Y, J> {
     decision: Option<Decision<T>>,
 }
 
-impl<'a, T, M, Y, J> Law<'a, T, M, Y, J>
+impl<'a, T, M, Y, J> TrackingController<'a, T, M, Y, J>
 where
     T: Real,
     M: Parts<T>,
@@ -49,7 +49,7 @@ where
     }
 }
 
-impl<T, M, Y, J> Controller for Law<'_, T, M, Y, J>
+impl<T, M, Y, J> Controller for TrackingController<'_, T, M, Y, J>
 where
     T: Real,
     M: Parts<T>,

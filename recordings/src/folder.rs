@@ -4,10 +4,11 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
 
-use super::error::{DataError, Place, Problem, printable};
-use super::record::{DataSet, Origin, Record, Use};
-use super::table::Table;
+use crate::error::{DataError, Place, Problem, printable};
 use crate::output::{OutputError, Staging};
+use crate::record::{Origin, Record, Use};
+use crate::set::DataSet;
+use crate::table::Table;
 
 const MANIFEST: &str = "dataset.toml";
 
@@ -30,20 +31,63 @@ struct Entry {
     role: Use,
 }
 
-/// See [`DataSet::load`].
-pub(crate) fn load(path: &Path) -> Result<DataSet, DataError> {
-    let kind = fs::metadata(path).map_err(|e| DataError::unreadable(path, e))?;
-    if kind.is_dir() {
-        return load_folder(path);
+impl DataSet {
+    /// Loads a folder with `dataset.toml`, or one CSV file (then one `identify` record named by the file's stem).
+    ///
+    /// # Errors
+    /// [`DataError`] naming file, line and column (or TOML key) of the first fault found.
+    pub fn load(path: &Path) -> Result<Self, DataError> {
+        let kind = fs::metadata(path).map_err(|e| DataError::unreadable(path, e))?;
+        if kind.is_dir() {
+            return load_folder(path);
+        }
+        if path.file_name().is_some_and(|n| n == MANIFEST) {
+            return load_folder(folder_of(path));
+        }
+        let name = path
+            .file_stem()
+            .map_or_else(|| "record".into(), |s| s.to_string_lossy().into_owned());
+        let (record, origin) = Table::load(path, None)?.into_record(&name, Use::Identify)?;
+        DataSet::assemble(None, vec![record], vec![origin], &Place::file(path))
     }
-    if path.file_name().is_some_and(|n| n == MANIFEST) {
-        return load_folder(folder_of(path));
+
+    /// Writes `dataset.toml` and one CSV per record into the folder `dir`, all together or not at all.
+    ///
+    /// Numbers are written in the shortest form that reads back to the same bits.
+    ///
+    /// # Errors
+    /// [`OutputError`] when the folder cannot be written; nothing is left behind then.
+    pub fn save(&self, dir: &Path) -> Result<(), OutputError> {
+        let mut staging = Staging::new(dir)?;
+        let mut entries: Vec<Entry> = Vec::with_capacity(self.records.len());
+        for record in &self.records {
+            let stem = file_stem(&record.name);
+            let file = (1..)
+                .map(|i| match i {
+                    1 => format!("{stem}.csv"),
+                    _ => format!("{stem}-{i}.csv"),
+                })
+                .find(|name| entries.iter().all(|e| !e.file.eq_ignore_ascii_case(name)))
+                .unwrap_or_default();
+            staging.write(&file, |w| write_record(record, w))?;
+            entries.push(Entry {
+                name: record.name.clone(),
+                file,
+                role: record.role,
+            });
+        }
+        let manifest = Manifest {
+            title: self.title.clone(),
+            sample_period_s: self.sample_period_s,
+            record: entries,
+        };
+        let text = toml::to_string(&manifest).map_err(|e| OutputError::Io {
+            path: dir.join(MANIFEST),
+            cause: io::Error::other(e),
+        })?;
+        staging.write(MANIFEST, |w| w.write_all(text.as_bytes()))?;
+        staging.commit()
     }
-    let name = path
-        .file_stem()
-        .map_or_else(|| "record".into(), |s| s.to_string_lossy().into_owned());
-    let (record, origin) = Table::load(path, None)?.into_record(&name, Use::Identify)?;
-    DataSet::assemble(None, vec![record], vec![origin], &Place::file(path))
 }
 
 fn folder_of(manifest: &Path) -> &Path {
@@ -131,39 +175,6 @@ fn manifest_error(path: &Path, text: &str, error: &toml::de::Error) -> DataError
     place.error(Problem::Manifest(message))
 }
 
-/// See [`DataSet::save`].
-pub(crate) fn save(set: &DataSet, dir: &Path) -> Result<(), OutputError> {
-    let mut staging = Staging::new(dir)?;
-    let mut entries: Vec<Entry> = Vec::with_capacity(set.records.len());
-    for record in &set.records {
-        let stem = file_stem(&record.name);
-        let file = (1..)
-            .map(|i| match i {
-                1 => format!("{stem}.csv"),
-                _ => format!("{stem}-{i}.csv"),
-            })
-            .find(|name| entries.iter().all(|e| !e.file.eq_ignore_ascii_case(name)))
-            .unwrap_or_default();
-        staging.write(&file, |w| write_record(record, w))?;
-        entries.push(Entry {
-            name: record.name.clone(),
-            file,
-            role: record.role,
-        });
-    }
-    let manifest = Manifest {
-        title: set.title.clone(),
-        sample_period_s: set.sample_period_s,
-        record: entries,
-    };
-    let text = toml::to_string(&manifest).map_err(|e| OutputError::Io {
-        path: dir.join(MANIFEST),
-        cause: io::Error::other(e),
-    })?;
-    staging.write(MANIFEST, |w| w.write_all(text.as_bytes()))?;
-    staging.commit()
-}
-
 /// The record's name as a file name: letters, digits, `-`, `_` and `.` stay, the rest becomes `-`.
 fn file_stem(name: &str) -> String {
     let stem: String = name
@@ -183,7 +194,7 @@ fn file_stem(name: &str) -> String {
 }
 
 /// Writes a record as CSV, numbers in the shortest form that reads back to the same bits.
-pub(crate) fn write_record(record: &Record, w: &mut dyn Write) -> io::Result<()> {
+fn write_record(record: &Record, w: &mut dyn Write) -> io::Result<()> {
     let columns: Vec<(&str, &[f64])> = record.columns().collect();
     let mut csv = csv::Writer::from_writer(w);
     csv.write_field("t")?;

@@ -7,7 +7,7 @@
 use std::io::{BufRead, Read};
 use std::path::{Path, PathBuf};
 
-use super::error::{DataError, Place, Problem, printable};
+use crate::error::{DataError, Place, Problem, printable};
 
 /// The longest line that is still taken for a row of measurements, bytes.
 const LONGEST_LINE: u64 = 1 << 20;

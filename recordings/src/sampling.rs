@@ -1,6 +1,6 @@
 //! Uniform sampling: what period a printed time column has, and whether it holds throughout.
 
-use super::error::Problem;
+use crate::error::Problem;
 
 /// A step may differ from the period by this share of it, beside the rounding of the printed times.
 const STEP_TOLERANCE: f64 = 0.1;
@@ -125,7 +125,7 @@ pub(crate) fn tidy(value: f64, tolerance: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::rows::printed_unit;
+    use crate::rows::printed_unit;
 
     fn printed(n: usize, period: f64, digits: usize) -> PrintedTimes {
         let mut times = PrintedTimes::default();

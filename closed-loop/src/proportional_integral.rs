@@ -1,7 +1,7 @@
 //! PI control of the duty with pulse-width modulation, alone or with a Smith
 //! predictor: what most rigs run.
 
-use super::Controller;
+use crate::run::{Controller, SAMPLE_PERIOD_S};
 use model_core::control::{Hold, HoldTimes};
 use std::collections::VecDeque;
 
@@ -25,8 +25,6 @@ pub struct FirstOrder {
     /// Dead time, s.
     pub delay_s: f64,
 }
-
-const PERIOD_S: f64 = 0.001;
 
 /// A PI controller whose duty a pulse-width modulator plays.
 #[derive(Clone, Debug)]
@@ -73,9 +71,9 @@ impl PulseWidth {
     /// The same with a Smith predictor on the model `flow`.
     #[must_use]
     pub fn with_smith(mut self, flow: FirstOrder) -> Self {
-        let delay = (flow.delay_s / PERIOD_S).round().max(1.0) as usize;
+        let delay = (flow.delay_s / SAMPLE_PERIOD_S).round().max(1.0) as usize;
         self.smith = Some(Smith {
-            kept: (-PERIOD_S / flow.time_s).exp(),
+            kept: (-SAMPLE_PERIOD_S / flow.time_s).exp(),
             gain: flow.gain,
             ahead: 0.0,
             past: VecDeque::from(vec![0.0; delay]),
@@ -127,7 +125,7 @@ impl Controller for PulseWidth {
             self.reading += (y - self.reading) * 2.0 / f64::from(self.carrier + 1);
         }
         if self.at == 0 {
-            let duty = self.duty(f64::from(self.carrier) * PERIOD_S);
+            let duty = self.duty(f64::from(self.carrier) * SAMPLE_PERIOD_S);
             self.width = self.pulse(duty);
         }
         let wanted = self.at < self.width;

@@ -1,0 +1,162 @@
+//! Records that belong together, checked as one.
+
+use crate::error::{DataError, Place, Problem};
+use crate::hash;
+use crate::record::{Origin, Record, Use, indexed};
+
+/// Records of one rig and one sampling period.
+///
+/// Made by [`DataSet::load`] or [`DataSet::from_records`], which check everything said at [`Record`]; code that takes
+/// a `DataSet` relies on it. Records that are to be changed go through [`DataSet::from_records`] again, which also
+/// renews the hash.
+#[derive(Debug, Clone)]
+pub struct DataSet {
+    /// For reports.
+    pub title: Option<String>,
+    /// Sampling period of every record, s.
+    pub sample_period_s: f64,
+    /// At least one; names are unique.
+    pub records: Vec<Record>,
+    /// Hash of names, uses, sampling period and every value, 16 hexadecimal digits: FNV-1a, 64 bits.
+    pub hash: String,
+    /// Where each record was read from (folder or file, line of each sample), for later messages.
+    origin: Vec<Origin>,
+}
+
+impl DataSet {
+    /// A data set from records in memory.
+    ///
+    /// # Errors
+    /// [`DataError`] naming record, sample and column when a record breaks a rule of [`Record`], two records share a
+    /// name, their sampling periods differ, or there is no record.
+    pub fn from_records(title: Option<String>, records: Vec<Record>) -> Result<Self, DataError> {
+        let origin = vec![Origin::default(); records.len()];
+        Self::assemble(title, records, origin, &Place::default())
+    }
+
+    /// Checks the records and what binds them; `whole` is the place for faults of the set itself.
+    pub(crate) fn assemble(
+        title: Option<String>,
+        records: Vec<Record>,
+        origin: Vec<Origin>,
+        whole: &Place,
+    ) -> Result<Self, DataError> {
+        let Some(first) = records.first() else {
+            return Err(whole.clone().error(Problem::NoRecords));
+        };
+        let sample_period_s = first.sample_period_s;
+        for (i, (record, origin)) in records.iter().zip(&origin).enumerate() {
+            record.check(&|sample| origin.place(&record.name, sample))?;
+            if record.sample_period_s != sample_period_s {
+                return Err(origin
+                    .place(&record.name, None)
+                    .error(Problem::PeriodMismatch {
+                        found: record.sample_period_s,
+                        stated: sample_period_s,
+                    }));
+            }
+            if records.iter().take(i).any(|r| r.name == record.name) {
+                return Err(whole
+                    .clone()
+                    .at_key("name")
+                    .error(Problem::DoubledRecord(record.name.clone())));
+            }
+        }
+        Ok(Self {
+            hash: hash::of(sample_period_s, &records),
+            title,
+            sample_period_s,
+            records,
+            origin,
+        })
+    }
+
+    /// The records that parameters are fitted on.
+    pub fn identify(&self) -> impl Iterator<Item = &Record> {
+        self.records.iter().filter(|r| r.role == Use::Identify)
+    }
+
+    /// The records that are held out.
+    pub fn validate(&self) -> impl Iterator<Item = &Record> {
+        self.records.iter().filter(|r| r.role == Use::Validate)
+    }
+
+    /// Whether the command is exactly 0 or 1 throughout.
+    #[must_use]
+    pub fn is_on_off(&self) -> bool {
+        self.records.iter().all(Record::is_on_off)
+    }
+
+    /// Where sample `k` of record `record` stands in the user's files, for messages.
+    #[must_use]
+    pub fn place(&self, record: usize, k: Option<usize>) -> Place {
+        let name = self.records.get(record).map_or("", |r| r.name.as_str());
+        self.origin
+            .get(record)
+            .map_or_else(Place::default, |origin| origin.place(name, k))
+    }
+
+    /// Refuses data whose command is not on/off.
+    ///
+    /// # Errors
+    /// [`DataError`] naming file and line (or record and sample) of the first value that is neither 0 nor 1.
+    pub fn require_on_off(&self) -> Result<(), DataError> {
+        for (i, record) in self.records.iter().enumerate() {
+            if let Some((k, &u)) = indexed(Some(&record.u)).find(|&(_, &u)| u != 0.0 && u != 1.0) {
+                return Err(self
+                    .place(i, Some(k))
+                    .in_column("u")
+                    .error(Problem::NotOnOff(u)));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record() -> Record {
+        Record::new(
+            "a",
+            Use::Identify,
+            0.001,
+            vec![0.0, 1.0, 1.0],
+            vec![0.0, 0.1, 0.2],
+        )
+    }
+
+    #[test]
+    fn sets_need_unique_names_and_one_period() {
+        let error = |records| {
+            DataSet::from_records(None, records)
+                .unwrap_err()
+                .to_string()
+        };
+        assert!(error(vec![]).contains("[[record]]"));
+        assert!(error(vec![record(), record()]).contains("used twice"));
+        let other = Record {
+            name: "b".into(),
+            sample_period_s: 0.002,
+            ..record()
+        };
+        assert!(error(vec![record(), other]).contains("0.002"));
+    }
+
+    #[test]
+    fn on_off_is_asked_for_where_needed() {
+        let mut half = record();
+        half.u[2] = 0.5;
+        let set = DataSet::from_records(None, vec![half]).unwrap();
+        assert!(!set.is_on_off());
+        let text = set.require_on_off().unwrap_err().to_string();
+        assert!(
+            text.contains("sample 2, column `u`") && text.contains("0.5"),
+            "{text}"
+        );
+        let set = DataSet::from_records(None, vec![record()]).unwrap();
+        assert!(set.require_on_off().is_ok());
+        assert_eq!((set.identify().count(), set.validate().count()), (1, 0));
+    }
+}

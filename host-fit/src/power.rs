@@ -12,7 +12,7 @@ use crate::model::{Delay, Model, Rounding};
 use crate::picture::significant;
 use crate::simulate::{Signals, SimulateError, Simulator};
 use model_core::Output;
-use model_core::effect::Spec;
+use model_core::effect::{Parameter, Spec};
 use model_core::effects::SPECS;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -42,36 +42,6 @@ pub struct Detectable {
     pub amplitude: Option<f64>,
     /// The same in words.
     pub words: String,
-}
-
-/// What of an effect is its amplitude, and what to call it.
-struct Amplitude {
-    index: usize,
-    words: &'static str,
-}
-
-/// Effects that vanish as one parameter goes to 0.
-fn amplitude(spec: &Spec) -> Option<Amplitude> {
-    let (parameter, words) = match spec.name {
-        "valve-lag" => ("opening_time", "a lag of the valve"),
-        "plenum-droop" => ("depletion_rate", "a plenum droop"),
-        "free-stream-variation" => ("gain", "a gain of the free stream"),
-        "echo-path" => ("gain", "an echo of the jet"),
-        "starting-vortex" => ("gain", "a starting vortex"),
-        "stopping-vortex" => ("gain", "a stopping vortex"),
-        "attachment-hysteresis" => ("gain", "an attachment hysteresis"),
-        "amplitude-saturation" => ("cubic", "an amplitude saturation"),
-        "vortex-shedding" => ("gain", "vortex shedding"),
-        "hot-film-lag" => ("time_constant", "a lag of the hot film"),
-        "thermal-drift" => ("amplitude", "a thermal drift"),
-        "electrical-pickup" => ("gain", "an electrical pickup"),
-        "dry-friction" => ("level", "dry friction"),
-        "quadratic-drag" => ("coefficient", "quadratic drag"),
-        "bouc-wen-hysteresis" => ("alpha", "a Bouc–Wen hysteresis"),
-        _ => return None,
-    };
-    let index = spec.parameters.iter().position(|p| p.name == parameter)?;
-    Some(Amplitude { index, words })
 }
 
 /// For each effect of the catalogue that has an amplitude, is not in the model
@@ -222,55 +192,46 @@ impl<'a> Bench<'a> {
     }
 
     fn smallest(&self, spec: &'static Spec) -> Option<Detectable> {
-        let Amplitude { index, words } = amplitude(spec)?;
+        let card = spec.amplitude?;
+        let index = spec.parameter(card.parameter)?;
         let parameter = &spec.parameters[index];
-        let middle = |p: &model_core::effect::Parameter| p.starts.get(p.starts.len() / 2).copied();
+        let middle = |p: &Parameter| p.starts.get(p.starts.len() / 2).copied();
         let mut parameters: Vec<f64> = spec.parameters.iter().map(middle).collect::<Option<_>>()?;
-        // A valve without opening time has no closing time either.
-        let together = spec.name == "valve-lag";
+        let set = |parameters: &mut Vec<f64>, value: f64| {
+            if card.together {
+                parameters.fill(value);
+            } else {
+                parameters[index] = value;
+            }
+        };
+        let first = parameters[index];
+        set(&mut parameters, first);
         let mut found = None;
-        if together {
-            let first = parameters[index];
-            parameters.fill(first);
-        }
         for _ in 0..PROBES {
             let seen = self.seen(spec, &parameters, parameters[index].abs());
             found = seen;
             let Some(x) = seen else { break };
             let next = x.clamp(parameter.low.max(1e-9 * parameter.high), parameter.high);
-            if together {
-                parameters.fill(next);
-            } else {
-                parameters[index] = next;
-            }
+            set(&mut parameters, next);
         }
         let amplitude = found.filter(|x| *x <= parameter.high);
-        let rate = amplitude.unwrap_or(0.0);
-        let (value, unit) = match spec.name {
-            // What a plenum loses under steady blowing is easier to imagine than a rate.
-            "plenum-droop" => {
-                let loss = rate * parameters[0];
-                (100.0 * loss / (1.0 + loss), "%")
-            }
-            _ => match parameter.unit {
-                "s" => (1000.0 * rate, "ms"),
-                "-" if spec.name != "bouc-wen-hysteresis" => (100.0 * rate, "%"),
-                "-" => (rate, "(alpha)"),
-                "y" => (rate, "in y"),
-                unit => (rate, unit),
-            },
+        parameters[index] = amplitude.unwrap_or(0.0);
+        let (value, unit) = match card.said {
+            Some(said) => said(&parameters),
+            None => parameter.unit.spoken(parameters[index]),
         };
         let words = match amplitude {
             Some(_) => format!(
-                "{words} above {} {unit} would have been seen",
+                "{} above {} {unit} would have been seen",
+                card.words,
                 significant(value, 2)
             ),
-            None => format!("{words} of any size could have stayed unseen"),
+            None => format!("{} of any size could have stayed unseen", card.words),
         };
         Some(Detectable {
             effect: spec.name.to_owned(),
             parameter: parameter.name.to_owned(),
-            unit: parameter.unit.to_owned(),
+            unit: parameter.unit.to_string(),
             amplitude,
             words,
         })

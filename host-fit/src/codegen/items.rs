@@ -4,7 +4,7 @@ use super::layout::{array, documented, number, numbers};
 use super::{CodegenError, jets, law, outputs, references, spec_of};
 use crate::model::{Added, Delay, Model};
 use crate::user_effect::rust_source;
-use model_core::effect::{Setting, Spec};
+use model_core::effect::{RustType, Setting, Spec};
 use model_core::effects;
 use std::fmt::Write as _;
 
@@ -122,10 +122,10 @@ pub(super) fn effect_type(model: &Model, added: &Added) -> Result<String, Codege
         return Ok(spec.rust.to_owned());
     }
     let name = rust_name(spec);
-    Ok(match spec.name {
-        "echo-path" => format!("{name}<f32, {}>", echo_samples(model, added)),
-        "rectifying-sensor" => name.to_owned(),
-        _ => format!("{name}<f32>"),
+    Ok(match spec.rust_type {
+        RustType::Plain => name.to_owned(),
+        RustType::Numbers => format!("{name}<f32>"),
+        RustType::Buffer(time) => format!("{name}<f32, {}>", buffer(model, added, time)),
     })
 }
 
@@ -537,9 +537,11 @@ pub(super) fn rust_name(spec: &Spec) -> &'static str {
     spec.rust.rsplit("::").next().unwrap_or(spec.rust)
 }
 
-pub(super) fn echo_samples(model: &Model, added: &Added) -> usize {
-    let delay = added.parameters.get(1).copied().unwrap_or(0.0) / model.sample_period_s;
-    delay.clamp(0.0, effects::LONGEST_ECHO as f64) as usize + 3
+/// Samples of memory of an effect that reaches back as long as the parameter
+/// with index `time` is.
+pub(super) fn buffer(model: &Model, added: &Added, time: usize) -> usize {
+    let time = added.parameters.get(time).copied().unwrap_or(0.0) / model.sample_period_s;
+    time.clamp(0.0, effects::LONGEST_BUFFER as f64) as usize + 3
 }
 
 /// `(name1, (name2, ()))`.

@@ -47,7 +47,7 @@ fn place(place: Place) -> &'static str {
 fn entry(spec: &Spec) -> Entry {
     let parameters = spec.parameters.iter().map(|p| ParameterEntry {
         name: p.name,
-        unit: p.unit,
+        unit: p.unit.symbol(),
         low: p.low,
         high: p.high,
     });
@@ -103,7 +103,7 @@ fn words(spec: &Spec) -> String {
         .map(|p| {
             vec![
                 p.name.to_owned(),
-                p.unit.to_owned(),
+                p.unit.to_string(),
                 short(p.low),
                 short(p.high),
             ]

@@ -271,15 +271,7 @@ impl<'a> Bench<'a> {
         if model.effect_names().iter().any(|name| name == spec.name) {
             return Some("it is in the model already".to_owned());
         }
-        match spec.name {
-            "input-nonlinearity" if self.on_off => {
-                Some("the input has two levels only, which any static curve maps on two".to_owned())
-            }
-            "edge-dependent-delay" if !self.on_off => {
-                Some("the input is not on/off: it has no edges".to_owned())
-            }
-            _ => None,
-        }
+        spec.needs.unmet(self.on_off).map(str::to_owned)
     }
 
     /// Refits `current` with each candidate that is `wanted` and judges it on the

@@ -204,7 +204,7 @@ pub(crate) fn estimates(fit: &Fit, spec: &Spec) -> BTreeMap<String, ParameterEst
         };
         let estimate = ParameterEstimate {
             value,
-            unit: parameter.unit.to_owned(),
+            unit: parameter.unit.to_string(),
             low: low.max(parameter.low.min(value)),
             high: high.min(parameter.high.max(value)),
         };

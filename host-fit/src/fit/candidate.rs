@@ -4,7 +4,7 @@ use super::lean::{fresh_starts, settle_fixed_delay, with_law_of};
 use super::{Fit, FitOptions, fit};
 use crate::data::Record;
 use crate::model::{Delay, Model};
-use model_core::effect::{Parameter, Place, Spec};
+use model_core::effect::{Facts, Parameter, Place, Spec, Start, Starts};
 use model_core::recursion::Grading;
 use rayon::prelude::*;
 use std::cmp::Ordering;
@@ -65,13 +65,12 @@ pub fn fit_with_effect(
     options: &FitOptions,
 ) -> Result<Fit, CandidateError> {
     let reference = channel_reference(spec, records)?;
-    let scale = Scale::of(records);
     let with = |base: &Model, parameters: &[f64]| {
         let mut model = base.clone();
         model.add(spec, parameters, reference);
         model
     };
-    let mut models: Vec<Model> = starts(base, spec, &scale, records)
+    let mut models: Vec<Model> = starts(base, spec, records)
         .iter()
         .map(|parameters| with(base, parameters))
         .collect();
@@ -163,91 +162,63 @@ fn channel_reference(spec: &Spec, records: &[&Record]) -> Result<Option<f64>, Ca
     Ok(Some(sum / f64::max(count, 1.0)))
 }
 
-/// The size of the signals: the catalogue's ranges are for signals of order 1.
-struct Scale {
-    y: f64,
-    u: f64,
-    /// Root mean square change of y over a sample.
-    y_per_sample: f64,
+/// The size of a signal: 1 where it is of order 1, as the catalogue's ranges are.
+fn size_of(records: &[&Record], signal: impl Fn(&Record) -> &[f64]) -> f64 {
+    let values = records.iter().flat_map(|record| signal(record));
+    let size = values.fold(0.0, |size: f64, value| size.max(value.abs()));
+    if (0.3..3.0).contains(&size) || size == 0.0 {
+        1.0
+    } else {
+        size
+    }
 }
 
-impl Scale {
-    fn of(records: &[&Record]) -> Self {
-        let largest = |series: &dyn Fn(&Record) -> f64| {
-            let size = records.iter().map(|r| series(r)).fold(0.0, f64::max);
-            if (0.3..3.0).contains(&size) || size == 0.0 {
-                1.0
-            } else {
-                size
-            }
-        };
-        let size = |series: &[f64]| series.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let changes = records
-            .iter()
-            .flat_map(|r| r.y.windows(2).map(|pair| pair[1] - pair[0]));
-        let (sum, count) =
-            changes.fold((0.0, 0.0), |(s, n), change| (s + change * change, n + 1.0));
-        Self {
-            y: largest(&|record| size(&record.y)),
-            u: largest(&|record| size(&record.u)),
-            y_per_sample: (sum / f64::max(count, 1.0)).sqrt(),
-        }
-    }
-
-    fn of_unit(&self, unit: &str) -> f64 {
-        match unit {
-            "y" => self.y,
-            "y per sample" => self.y_per_sample,
-            "1/y" => 1.0 / self.y,
-            "1/y²" => 1.0 / (self.y * self.y),
-            "1/u" => 1.0 / self.u,
-            "1/u²" => 1.0 / (self.u * self.u),
-            _ => 1.0,
-        }
-    }
+/// Root mean square change of y over a sample.
+fn y_per_sample(records: &[&Record]) -> f64 {
+    let changes = records
+        .iter()
+        .flat_map(|r| r.y.windows(2).map(|pair| pair[1] - pair[0]));
+    let (sum, count) = changes.fold((0.0, 0.0), |(s, n), change| (s + change * change, n + 1.0));
+    f64::sqrt(sum / f64::max(count, 1.0))
 }
 
 /// Parameter vectors from which to set out.
-fn starts(base: &Model, spec: &Spec, scale: &Scale, records: &[&Record]) -> Vec<Vec<f64>> {
-    let delay = present_delay(base);
+fn starts(base: &Model, spec: &Spec, records: &[&Record]) -> Vec<Vec<f64>> {
+    let mut sorted_y: Vec<f64> = records.iter().flat_map(|r| r.y.iter().copied()).collect();
+    sorted_y.sort_by(f64::total_cmp);
     let period = base.sample_period_s;
-    match spec.name {
-        "state-dependent-delay" => vec![
-            vec![delay - 3.0, 10.0, 4.0],
-            vec![delay - 1.0, 10.0, 16.0],
-            vec![delay - 6.0, 10.0, 2.0],
-            vec![delay + 3.0, -8.0, 4.0],
-        ],
-        "edge-dependent-delay" => [(6.0, -6.0), (-6.0, 6.0), (18.0, -18.0), (1.0, -1.0)]
-            .iter()
-            .map(|(rise, fall)| {
-                let after = |shift: f64| ((delay + shift) * period).clamp(period, 0.5);
-                vec![after(*rise), after(*fall)]
-            })
-            .collect(),
-        "sensor-saturation" => {
-            let mut y: Vec<f64> = records.iter().flat_map(|r| r.y.iter().copied()).collect();
-            y.sort_by(f64::total_cmp);
-            let quantile = |q: f64| y.get((q * y.len() as f64) as usize).copied().unwrap_or(0.0);
-            let pairs = [(0.05, 0.95), (0.0, 0.9), (0.1, 0.999), (0.2, 0.8)];
-            pairs
-                .iter()
-                .map(|(low, high)| vec![quantile(*low), quantile(*high)])
-                .collect()
+    let longest = records.iter().map(|r| r.len()).max().unwrap_or(0);
+    let facts = Facts {
+        y: size_of(records, |record| &record.y),
+        u: size_of(records, |record| &record.u),
+        time: 1.0,
+        y_per_sample: y_per_sample(records),
+        sorted_y: &sorted_y,
+        delay: present_delay(base),
+        period,
+        record: longest as f64 * period,
+        time_constant: base.time_constant().min(longest as f64 * period),
+    };
+    match spec.starts {
+        Starts::Grid => product(spec.parameters, &facts),
+        Starts::Rows(rows) => {
+            let values = |row: &&[Start]| {
+                let each = row.iter().zip(spec.parameters);
+                each.map(|(start, p)| start.value(p, &facts)).collect()
+            };
+            rows.iter().map(values).collect()
         }
-        _ => product(spec.parameters, scale),
     }
 }
 
 /// Every combination of the catalogue's starting values.
-fn product(parameters: &[Parameter], scale: &Scale) -> Vec<Vec<f64>> {
+fn product(parameters: &[Parameter], facts: &Facts<'_>) -> Vec<Vec<f64>> {
     let mut all = vec![Vec::new()];
     for parameter in parameters {
-        let unit = scale.of_unit(parameter.unit);
         let extended = all.iter().flat_map(|start| {
             parameter.starts.iter().map(move |value| {
                 let mut longer = start.clone();
-                longer.push(value * unit);
+                longer.push(Start::Value(*value).value(parameter, facts));
                 longer
             })
         });

@@ -25,4 +25,42 @@ impl Model {
         }
         Ok(pole_magnitudes(&weights)?.first().copied().unwrap_or(0.0))
     }
+
+    /// How long the flow takes without jets to forget all but 1/e, s: what one
+    /// step of Newton's from a pole of 1 finds, exact for a slow flow. Infinite
+    /// for one that does not forget.
+    pub(crate) fn time_constant(&self) -> f64 {
+        let reach = |lag: &u16| (self.convention.behind_newest(*lag) + 1) as f64;
+        let own = || self.state_lags.iter().zip(&self.a);
+        let forgotten = 1.0 - own().map(|(_, a)| a).sum::<f64>();
+        let held: f64 = own().map(|(lag, a)| a * reach(lag)).sum();
+        if forgotten > 0.0 {
+            self.sample_period_s * held.max(0.0) / forgotten
+        } else {
+            f64::INFINITY
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_constants_are_those_of_slow_poles() {
+        let flow = |lags: &[u16], a: &[f64]| Model {
+            state_lags: lags.to_vec(),
+            a: a.to_vec(),
+            ..Model::default()
+        };
+        let first_order = flow(&[1], &[(-0.01_f64).exp()]).time_constant();
+        assert!((first_order - 0.1).abs() < 1e-3, "{first_order}");
+        // Half of it comes back 20 ms later: as slow as the pole of the whole.
+        let lagged = flow(&[1, 21], &[0.988, 0.010]);
+        let pole = lagged.largest_pole(false).expect("a pole");
+        let slow = -0.001 / pole.ln();
+        let found = lagged.time_constant();
+        assert!((found / slow - 1.0).abs() < 0.05, "{found} {slow}");
+        assert_eq!(flow(&[1], &[1.0]).time_constant(), f64::INFINITY);
+    }
 }

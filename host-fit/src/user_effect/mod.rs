@@ -15,7 +15,7 @@ pub use interpreter::{UserEffect, UserState};
 pub use rust::{module_name, rust_source, type_name};
 
 use expression::{Compiler, Fault, Meaning};
-use model_core::effect::{Influence, Parameter, Place, Spec};
+use model_core::effect::{Needs, Parameter, Place, RustType, Spec, Starts, Unit};
 use program::{Carried, Op, Program, Signal};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -370,22 +370,19 @@ impl Source {
         fn keep(text: &str) -> &'static str {
             String::leak(text.to_owned())
         }
-        let parameters = self
-            .parameter
-            .iter()
-            .enumerate()
-            .map(|(index, parameter)| Parameter {
-                name: keep(&parameter.name),
-                unit: keep(&parameter.unit),
-                low: parameter.low,
-                high: parameter.high,
-                starts: Vec::leak(parameter.starts.clone()),
-                influence: if program.is_compared(index) {
-                    Influence::Stepwise
-                } else {
-                    Influence::Smooth
-                },
-            });
+        let parameters = self.parameter.iter().enumerate().map(|(index, parameter)| {
+            let card = Parameter::new(
+                keep(&parameter.name),
+                Unit::of(keep(&parameter.unit)),
+                [parameter.low, parameter.high],
+                Vec::leak(parameter.starts.clone()),
+            );
+            if program.is_compared(index) {
+                card.stepwise()
+            } else {
+                card
+            }
+        });
         let parameters: Vec<Parameter> = parameters.collect();
         Spec {
             name: keep(&self.name),
@@ -394,11 +391,15 @@ impl Source {
                 module_name(&self.name),
                 type_name(&self.name)
             )),
+            rust_type: RustType::Plain,
             place: self.place(),
             summary: keep(&self.summary),
             equation: keep(&self.equation()),
             parameters: Vec::leak(parameters),
+            starts: Starts::Grid,
+            amplitude: None,
             channel: self.channel.as_deref().map(keep),
+            needs: Needs::Nothing,
             source: keep(self.reference.as_deref().unwrap_or("the user's own effect")),
         }
     }
@@ -449,7 +450,7 @@ mod tests {
     use super::*;
     use crate::dual::Dual;
     use model_core::Real;
-    use model_core::effect::{Effect, Flow, Instant, Setting};
+    use model_core::effect::{Effect, Flow, Influence, Instant, Setting};
     use model_core::effects::AnyEffect;
     use proptest::prelude::*;
 

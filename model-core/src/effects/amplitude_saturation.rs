@@ -1,8 +1,10 @@
 //! The flow resists large amplitudes: a cubic term, hardening or softening.
 
-use crate::effect::{Effect, Flow, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Amplitude, Effect, Flow, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec,
+    Starts, Unit, take,
+};
 use crate::real::Real;
-
 
 /// Adds −γ·s³ to the drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,13 +29,20 @@ impl<T: Real> Physics<T> for AmplitudeSaturation<T> {
     const SPEC: Spec = Spec {
         name: "amplitude-saturation",
         rust: "amplitude_saturation::AmplitudeSaturation",
+        rust_type: RustType::Numbers,
         place: Place::Flow,
         summary: "growth saturates (or stiffens) with amplitude",
         equation: "adds −γ·s³ to the drive",
-        parameters: &[
-            Parameter { name: "cubic", unit: "1/y²", low: -1000.0, high: 1000.0, starts: &[0.1], influence: Influence::Smooth },
-        ],
+        parameters: &[Parameter::new(
+            "cubic",
+            Unit::PerYSquared,
+            [-1000.0, 1000.0],
+            &[0.1],
+        )],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new("cubic", "an amplitude saturation").linear()),
         channel: None,
+        needs: Needs::Nothing,
         source: "Landau's amplitude equation; Stuart, J. Fluid Mech. 9 (1960)",
     };
 

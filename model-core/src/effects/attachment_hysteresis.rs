@@ -1,8 +1,10 @@
 //! Once attached the flow stays attached at a friction at which it would not have attached.
 
-use crate::effect::{Effect, Flow, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Amplitude, Effect, Flow, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec,
+    Starts, Unit, take,
+};
 use crate::real::Real;
-
 
 /// A relay r with memory, 0→1 when s > θ_hi and 1→0 when s < θ_lo, adds g·r to
 /// the drive: in equilibrium it moves the friction by g.
@@ -30,7 +32,11 @@ impl<T: Real> Effect<T> for AttachmentHysteresis<T> {
         } else if flow.now < self.lower {
             *attached = false;
         }
-        if *attached { self.gain * flow.relaxation } else { T::ZERO }
+        if *attached {
+            self.gain * flow.relaxation
+        } else {
+            T::ZERO
+        }
     }
 }
 
@@ -38,15 +44,19 @@ impl<T: Real> Physics<T> for AttachmentHysteresis<T> {
     const SPEC: Spec = Spec {
         name: "attachment-hysteresis",
         rust: "attachment_hysteresis::AttachmentHysteresis",
+        rust_type: RustType::Numbers,
         place: Place::Flow,
         summary: "attachment has memory: it lets go later than it takes hold",
         equation: "relay r: 0→1 when s > θ_hi, 1→0 when s < θ_lo; adds g·r to the drive",
         parameters: &[
-            Parameter { name: "upper_threshold", unit: "y", low: -0.5, high: 2.0, starts: &[0.4, 0.6, 0.8], influence: Influence::Stepwise },
-            Parameter { name: "lower_threshold", unit: "y", low: -0.5, high: 2.0, starts: &[0.15, 0.35], influence: Influence::Stepwise },
-            Parameter { name: "gain", unit: "y", low: -2.0, high: 2.0, starts: &[0.15], influence: Influence::Smooth },
+            Parameter::new("upper_threshold", Unit::Y, [-0.5, 2.0], &[0.4, 0.6, 0.8]).stepwise(),
+            Parameter::new("lower_threshold", Unit::Y, [-0.5, 2.0], &[0.15, 0.35]).stepwise(),
+            Parameter::new("gain", Unit::Y, [-2.0, 2.0], &[0.15]),
         ],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new("gain", "an attachment hysteresis").linear()),
         channel: None,
+        needs: Needs::Nothing,
         source: "Greenblatt & Wygnanski, Prog. Aerosp. Sci. 36 (2000)",
     };
 

@@ -1,8 +1,10 @@
 //! A smooth hysteresis loop between displacement and restoring force.
 
-use crate::effect::{Effect, Flow, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Amplitude, Effect, Flow, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec,
+    Starts, Unit, take,
+};
 use crate::real::Real;
-
 
 /// ż = A·ṡ − β·|ṡ|·z − γ·ṡ·|z|; adds −α·z to the drive. Rate-independent,
 /// so ṡ enters through the change over a sample. Only α·A can be told from data:
@@ -36,20 +38,34 @@ impl<T: Real> Effect<T> for BoucWenHysteresis<T> {
     }
 }
 
+/// α stands for itself: the share of what it multiplies depends on the loop.
+fn alpha(parameters: &[f64]) -> (f64, &'static str) {
+    let [_, _, _, alpha] = take(parameters);
+    (alpha, "(alpha)")
+}
+
 impl<T: Real> Physics<T> for BoucWenHysteresis<T> {
     const SPEC: Spec = Spec {
         name: "bouc-wen-hysteresis",
         rust: "bouc_wen_hysteresis::BoucWenHysteresis",
+        rust_type: RustType::Numbers,
         place: Place::Flow,
         summary: "a smooth hysteresis loop in the restoring force",
         equation: "ż = A·ṡ − β·|ṡ|·z − γ·ṡ·|z|; adds −α·z",
         parameters: &[
-            Parameter { name: "stiffness", unit: "-", low: 1.0, high: 1.0, starts: &[1.0], influence: Influence::Smooth },
-            Parameter { name: "beta", unit: "1/y", low: 0.01, high: 1000.0, starts: &[2.0, 10.0], influence: Influence::Smooth },
-            Parameter { name: "gamma", unit: "1/y", low: -1000.0, high: 1000.0, starts: &[0.5], influence: Influence::Smooth },
-            Parameter { name: "alpha", unit: "-", low: -5.0, high: 5.0, starts: &[0.3], influence: Influence::Smooth },
+            Parameter::new("stiffness", Unit::None, [1.0, 1.0], &[1.0]),
+            Parameter::new("beta", Unit::PerY, [0.01, 1000.0], &[2.0, 10.0]),
+            Parameter::new("gamma", Unit::PerY, [-1000.0, 1000.0], &[0.5]),
+            Parameter::new("alpha", Unit::None, [-5.0, 5.0], &[0.3]),
         ],
+        starts: Starts::Grid,
+        amplitude: Some(
+            Amplitude::new("alpha", "a Bouc–Wen hysteresis")
+                .linear()
+                .said(alpha),
+        ),
         channel: None,
+        needs: Needs::Nothing,
         source: "Wen, J. Eng. Mech. Div. 102 (1976)",
     };
 

@@ -1,8 +1,10 @@
 //! Coulomb friction: a force against the motion, whatever its speed.
 
-use crate::effect::{Effect, Flow, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Amplitude, Effect, Flow, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec,
+    Starts, Unit, take,
+};
 use crate::real::Real;
-
 
 /// Adds −F·sign(ṡ), and holds the flow where the motion would be less than F a
 /// sample: the sign is that of the step being taken, as in continuous time.
@@ -29,13 +31,20 @@ impl<T: Real> Physics<T> for DryFriction<T> {
     const SPEC: Spec = Spec {
         name: "dry-friction",
         rust: "dry_friction::DryFriction",
+        rust_type: RustType::Numbers,
         place: Place::Flow,
         summary: "Coulomb friction acts against the motion",
-        equation: "adds −F·sign(s_k − s_{k−1})",
-        parameters: &[
-            Parameter { name: "level", unit: "y per sample", low: 0.0, high: 1.0, starts: &[0.001, 0.03, 0.3], influence: Influence::Smooth },
-        ],
+        equation: "adds −F·sign(s_{k+1} − s_k)",
+        parameters: &[Parameter::new(
+            "level",
+            Unit::YPerSample,
+            [0.0, 1.0],
+            &[0.001, 0.03, 0.3],
+        )],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new("level", "dry friction")),
         channel: None,
+        needs: Needs::Nothing,
         source: "Coulomb friction; Armstrong-Hélouvry et al., Automatica 30 (1994)",
     };
 

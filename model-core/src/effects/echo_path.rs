@@ -1,10 +1,12 @@
 //! Part of the jet arrives a second time, later.
 
 use crate::delay::Tap;
-use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
-use crate::real::Real;
+use crate::effect::{
+    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
+    Unit, take,
+};
 use crate::history::{DelayLine, Memory};
-
+use crate::real::Real;
 
 /// j(t) = v(t) + g·v(t − d), with d of at most `LEN` − 2 samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,14 +31,23 @@ impl<T: Real, const LEN: usize> Physics<T> for EchoPath<T, LEN> {
     const SPEC: Spec = Spec {
         name: "echo-path",
         rust: "echo_path::EchoPath",
+        rust_type: RustType::Buffer(1),
         place: Place::Jet,
         summary: "the jet arrives a second time, later",
         equation: "j(t) = v(t) + g·v(t − d)",
         parameters: &[
-            Parameter { name: "gain", unit: "-", low: -1.0, high: 1.0, starts: &[-0.2, 0.2], influence: Influence::Smooth },
-            Parameter { name: "echo_delay", unit: "s", low: 0.02, high: 0.5, starts: &[0.04, 0.08, 0.14, 0.22, 0.35], influence: Influence::Smooth },
+            Parameter::new("gain", Unit::None, [-1.0, 1.0], &[-0.2, 0.2]),
+            Parameter::new(
+                "echo_delay",
+                Unit::Second,
+                [0.02, 0.5],
+                &[0.04, 0.08, 0.14, 0.22, 0.35],
+            ),
         ],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new("gain", "an echo of the jet").linear()),
         channel: None,
+        needs: Needs::Nothing,
         source: "a second path of convection or an acoustic reflection",
     };
 

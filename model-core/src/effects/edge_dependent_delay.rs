@@ -2,7 +2,9 @@
 //! attachment has to work its way through the separated flow, release does not.
 
 use crate::delay::{DelayLaw, Tap};
-use crate::effect::{Influence, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Needs, Parameter, Physics, Place, RustType, Setting, Spec, Start, Starts, Unit, take,
+};
 use crate::real::Real;
 
 /// Rising edges arrive after one delay, falling edges after another.
@@ -75,28 +77,23 @@ impl<T: Real> Physics<T> for EdgeDependentDelay<T> {
     const SPEC: Spec = Spec {
         name: "edge-dependent-delay",
         rust: "edge_dependent_delay::EdgeDependentDelay",
+        rust_type: RustType::Numbers,
         place: Place::Delay,
         summary: "rising edges arrive later (or earlier) than falling ones",
         equation: "rising edges arrive after h_r, falling edges after h_f",
         parameters: &[
-            Parameter {
-                name: "rise_delay",
-                unit: "s",
-                low: 0.001,
-                high: 0.5,
-                starts: &[0.045],
-                influence: Influence::Smooth,
-            },
-            Parameter {
-                name: "fall_delay",
-                unit: "s",
-                low: 0.001,
-                high: 0.5,
-                starts: &[0.03],
-                influence: Influence::Smooth,
-            },
+            Parameter::new("rise_delay", Unit::Second, [0.001, 0.5], &[0.045]),
+            Parameter::new("fall_delay", Unit::Second, [0.001, 0.5], &[0.03]),
         ],
+        starts: Starts::Rows(&[
+            &[Start::Delay(6.0), Start::Delay(-6.0)],
+            &[Start::Delay(-6.0), Start::Delay(6.0)],
+            &[Start::Delay(18.0), Start::Delay(-18.0)],
+            &[Start::Delay(1.0), Start::Delay(-1.0)],
+        ]),
+        amplitude: None,
         channel: None,
+        needs: Needs::OnOffInput,
         source: "Darabi & Wygnanski, J. Fluid Mech. 510 (2004): attachment and separation are different processes",
     };
 

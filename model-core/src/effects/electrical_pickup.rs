@@ -1,8 +1,10 @@
 //! The valve's current is seen by the sensor's cable, at once.
 
-use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
+    Unit, take,
+};
 use crate::real::Real;
-
 
 /// y = s + g·u, without delay.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,13 +25,15 @@ impl<T: Real> Physics<T> for ElectricalPickup<T> {
     const SPEC: Spec = Spec {
         name: "electrical-pickup",
         rust: "electrical_pickup::ElectricalPickup",
+        rust_type: RustType::Numbers,
         place: Place::Sensor,
         summary: "the command shows in the reading at once",
         equation: "y = s + g·u",
-        parameters: &[
-            Parameter { name: "gain", unit: "y", low: -0.5, high: 0.5, starts: &[0.05], influence: Influence::Smooth },
-        ],
+        parameters: &[Parameter::new("gain", Unit::Y, [-0.5, 0.5], &[0.05])],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new("gain", "an electrical pickup").linear()),
         channel: None,
+        needs: Needs::Nothing,
         source: "common-impedance coupling",
     };
 

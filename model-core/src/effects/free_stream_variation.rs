@@ -1,8 +1,10 @@
 //! The free stream changes, and with it the strength of the jets relative to it.
 
-use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
+    Unit, take,
+};
 use crate::real::Real;
-
 
 /// j = v·(1 + g·(U∞/U_ref − 1)), U∞ a measured channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +20,11 @@ impl<T: Real> Effect<T> for FreeStreamVariation<T> {
     #[inline]
     fn jet(&self, _state: &mut (), jet: T, at: &Instant<'_, T>) -> T {
         // A channel that is not connected counts as being at its reference.
-        let speed = at.channels.get(self.channel).copied().unwrap_or(self.reference);
+        let speed = at
+            .channels
+            .get(self.channel)
+            .copied()
+            .unwrap_or(self.reference);
         jet * (T::ONE + self.gain * (speed / self.reference - T::ONE))
     }
 }
@@ -27,13 +33,20 @@ impl<T: Real> Physics<T> for FreeStreamVariation<T> {
     const SPEC: Spec = Spec {
         name: "free-stream-variation",
         rust: "free_stream_variation::FreeStreamVariation",
+        rust_type: RustType::Numbers,
         place: Place::Jet,
         summary: "the free stream varies during the run",
         equation: "j = v·(1 + g·(U∞/U_ref − 1))",
-        parameters: &[
-            Parameter { name: "gain", unit: "-", low: -5.0, high: 5.0, starts: &[-1.0, 1.0], influence: Influence::Smooth },
-        ],
+        parameters: &[Parameter::new(
+            "gain",
+            Unit::None,
+            [-5.0, 5.0],
+            &[-1.0, 1.0],
+        )],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new("gain", "a gain of the free stream").linear()),
         channel: Some("u_inf"),
+        needs: Needs::Nothing,
         source: "momentum coefficient c_mu = ρ_j U_j² A_j/(½ ρ U∞² S)",
     };
 

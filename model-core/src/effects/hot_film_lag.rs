@@ -1,8 +1,10 @@
 //! The hot-film and its substrate take time to follow the friction.
 
-use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
+    Unit, take,
+};
 use crate::real::Real;
-
 
 /// τ·ẏ = s − y, exact for a friction that runs straight between samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,13 +42,20 @@ impl<T: Real> Physics<T> for HotFilmLag<T> {
     const SPEC: Spec = Spec {
         name: "hot-film-lag",
         rust: "hot_film_lag::HotFilmLag",
+        rust_type: RustType::Numbers,
         place: Place::Sensor,
         summary: "the hot-film follows the friction with a lag",
         equation: "τ·ẏ = s − y",
-        parameters: &[
-            Parameter { name: "time_constant", unit: "s", low: 0.002, high: 2.0, starts: &[0.006, 0.03, 0.2], influence: Influence::Smooth },
-        ],
+        parameters: &[Parameter::new(
+            "time_constant",
+            Unit::Second,
+            [0.002, 2.0],
+            &[0.006, 0.03, 0.2],
+        )],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new("time_constant", "a lag of the hot film")),
         channel: None,
+        needs: Needs::Nothing,
         source: "Bruun, Hot-wire Anemometry (1995)",
     };
 

@@ -1,8 +1,9 @@
 //! The jet's effect is not proportional to the command (more than two levels).
 
-use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts, Unit, take,
+};
 use crate::real::Real;
-
 
 /// j = v + g2·v² + g3·v³.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,14 +25,18 @@ impl<T: Real> Physics<T> for InputNonlinearity<T> {
     const SPEC: Spec = Spec {
         name: "input-nonlinearity",
         rust: "input_nonlinearity::InputNonlinearity",
+        rust_type: RustType::Numbers,
         place: Place::Jet,
         summary: "the response is not proportional to the input",
         equation: "j = v + g2·v² + g3·v³",
         parameters: &[
-            Parameter { name: "quadratic", unit: "1/u", low: -10.0, high: 10.0, starts: &[0.1], influence: Influence::Smooth },
-            Parameter { name: "cubic", unit: "1/u²", low: -10.0, high: 10.0, starts: &[0.1], influence: Influence::Smooth },
+            Parameter::new("quadratic", Unit::PerU, [-10.0, 10.0], &[0.1]),
+            Parameter::new("cubic", Unit::PerUSquared, [-10.0, 10.0], &[0.1]),
         ],
+        starts: Starts::Grid,
+        amplitude: None,
         channel: None,
+        needs: Needs::GradedInput,
         source: "Hammerstein model",
     };
 

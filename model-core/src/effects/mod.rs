@@ -4,8 +4,27 @@
 //! its discrete form. A new effect is such a file and one line in the
 //! `catalogue!` below.
 
+pub mod amplitude_saturation;
+pub mod attachment_hysteresis;
+pub mod bouc_wen_hysteresis;
+pub mod dry_friction;
+pub mod echo_path;
 pub mod edge_dependent_delay;
+pub mod electrical_pickup;
+pub mod free_stream_variation;
+pub mod hot_film_lag;
+pub mod hot_film_nonlinearity;
+pub mod input_nonlinearity;
+pub mod plenum_droop;
+pub mod quadratic_drag;
+pub mod rectifying_sensor;
+pub mod sensor_saturation;
+pub mod starting_vortex;
 pub mod state_dependent_delay;
+pub mod stopping_vortex;
+pub mod thermal_drift;
+pub mod valve_lag;
+pub mod vortex_shedding;
 
 pub use edge_dependent_delay::EdgeDependentDelay;
 pub use state_dependent_delay::StateDependentDelay;
@@ -13,12 +32,11 @@ pub use state_dependent_delay::StateDependentDelay;
 use crate::effect::{Effect, Flow, Instant, Physics, Setting, Spec};
 use crate::real::Real;
 
-/// Longest echo of [`AnyEffect`], samples.
-pub const LONGEST_ECHO: usize = 2048;
+/// Samples that an effect of [`AnyEffect`] remembers at most.
+pub const LONGEST_BUFFER: usize = 2048;
 
 macro_rules! catalogue {
     ($($file:ident :: $effect:ident : $type:ty),+ $(,)?) => {
-        $(pub mod $file;)+
         $(pub use $file::$effect;)+
 
         /// Any effect of the catalogue but the delay laws, chosen at run time.
@@ -94,7 +112,7 @@ catalogue! {
     plenum_droop::PlenumDroop: PlenumDroop<T>,
     free_stream_variation::FreeStreamVariation: FreeStreamVariation<T>,
     input_nonlinearity::InputNonlinearity: InputNonlinearity<T>,
-    echo_path::EchoPath: EchoPath<T, LONGEST_ECHO>,
+    echo_path::EchoPath: EchoPath<T, LONGEST_BUFFER>,
     starting_vortex::StartingVortex: StartingVortex<T>,
     stopping_vortex::StoppingVortex: StoppingVortex<T>,
     attachment_hysteresis::AttachmentHysteresis: AttachmentHysteresis<T>,

@@ -1,8 +1,10 @@
 //! The plenum empties while the valve is open and fills again afterwards.
 
-use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
+    Unit, take,
+};
 use crate::real::Real;
-
 
 /// Ṗ = (1 − P)/τ_r − κ·v·P, P(0) = 1; the jet is v·P. Crank–Nicolson, which
 /// keeps P positive for every period below 2/(1/τ_r + κ).
@@ -29,18 +31,35 @@ impl<T: Real> Effect<T> for PlenumDroop<T> {
     }
 }
 
+/// What the plenum loses under steady blowing, which is easier to imagine than
+/// a rate.
+fn loss(parameters: &[f64]) -> (f64, &'static str) {
+    let [recovery, depletion] = take(parameters);
+    let loss = depletion * recovery;
+    (100.0 * loss / (1.0 + loss), "%")
+}
+
 impl<T: Real> Physics<T> for PlenumDroop<T> {
     const SPEC: Spec = Spec {
         name: "plenum-droop",
         rust: "plenum_droop::PlenumDroop",
+        rust_type: RustType::Numbers,
         place: Place::Jet,
         summary: "the supply pressure sinks while blowing",
         equation: "Ṗ = (1 − P)/τ_r − κ·v·P, P(0) = 1; j = v·P",
         parameters: &[
-            Parameter { name: "recovery_time", unit: "s", low: 0.05, high: 10.0, starts: &[0.2, 1.0, 5.0], influence: Influence::Smooth },
-            Parameter { name: "depletion_rate", unit: "1/s", low: 0.02, high: 5.0, starts: &[0.3, 1.5], influence: Influence::Smooth },
+            Parameter::new(
+                "recovery_time",
+                Unit::Second,
+                [0.05, 10.0],
+                &[0.2, 1.0, 5.0],
+            ),
+            Parameter::new("depletion_rate", Unit::PerSecond, [0.02, 5.0], &[0.3, 1.5]),
         ],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new("depletion_rate", "a plenum droop").said(loss)),
         channel: None,
+        needs: Needs::Nothing,
         source: "mass balance of an isothermal plenum",
     };
 

@@ -1,8 +1,10 @@
 //! Drag that grows with the square of the speed of change.
 
-use crate::effect::{Effect, Flow, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Amplitude, Effect, Flow, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec,
+    Starts, Unit, take,
+};
 use crate::real::Real;
-
 
 /// Adds −d·Δ·|Δ| with Δ the step being taken, s_{k+1} − s_k: the implicit form,
 /// which is stable for any d ≥ 0 and what continuous time comes to.
@@ -32,13 +34,17 @@ impl<T: Real> Physics<T> for QuadraticDrag<T> {
     const SPEC: Spec = Spec {
         name: "quadratic-drag",
         rust: "quadratic_drag::QuadraticDrag",
+        rust_type: RustType::Numbers,
         place: Place::Flow,
         summary: "drag grows with the square of the speed of change",
-        equation: "adds −d·(s_k − s_{k−1})·|s_k − s_{k−1}|",
+        equation: "adds −d·(s_{k+1} − s_k)·|s_{k+1} − s_k|",
         parameters: &[
-            Parameter { name: "coefficient", unit: "1/y", low: -1000.0, high: 1000.0, starts: &[1.0], influence: Influence::Smooth },
+            Parameter::new("coefficient", Unit::SamplesPerY, [-1000.0, 1000.0], &[1.0]).positive(),
         ],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new("coefficient", "quadratic drag")),
         channel: None,
+        needs: Needs::Nothing,
         source: "Morison et al. (1950)",
     };
 

@@ -1,8 +1,7 @@
 //! The sensor cannot tell the sign.
 
-use crate::effect::{Effect, Instant, Physics, Place, Setting, Spec};
+use crate::effect::{Effect, Instant, Needs, Physics, Place, RustType, Setting, Spec, Starts};
 use crate::real::Real;
-
 
 /// y = |s|.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,13 +20,15 @@ impl<T: Real> Physics<T> for RectifyingSensor {
     const SPEC: Spec = Spec {
         name: "rectifying-sensor",
         rust: "rectifying_sensor::RectifyingSensor",
+        rust_type: RustType::Plain,
         place: Place::Sensor,
         summary: "the sensor cannot tell the sign",
         equation: "y = |s|",
-        parameters: &[
-
-        ],
+        parameters: &[],
+        starts: Starts::Grid,
+        amplitude: None,
         channel: None,
+        needs: Needs::Nothing,
         source: "Bruun, Hot-wire Anemometry (1995)",
     };
 

@@ -1,8 +1,10 @@
 //! The sensor or its amplifier has a limited range.
 
-use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Start, Starts,
+    Unit, take,
+};
 use crate::real::Real;
-
 
 /// y = min(max(s, lo), hi).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,14 +26,23 @@ impl<T: Real> Physics<T> for SensorSaturation<T> {
     const SPEC: Spec = Spec {
         name: "sensor-saturation",
         rust: "sensor_saturation::SensorSaturation",
+        rust_type: RustType::Numbers,
         place: Place::Sensor,
         summary: "the sensor has a limited range",
         equation: "y = min(max(s, lo), hi)",
         parameters: &[
-            Parameter { name: "lower_limit", unit: "y", low: -10.0, high: 10.0, starts: &[-0.05], influence: Influence::Smooth },
-            Parameter { name: "upper_limit", unit: "y", low: -10.0, high: 10.0, starts: &[0.8], influence: Influence::Smooth },
+            Parameter::new("lower_limit", Unit::Y, [-10.0, 10.0], &[-0.05]),
+            Parameter::new("upper_limit", Unit::Y, [-10.0, 10.0], &[0.8]),
         ],
+        starts: Starts::Rows(&[
+            &[Start::Quantile(0.05), Start::Quantile(0.95)],
+            &[Start::Quantile(0.0), Start::Quantile(0.9)],
+            &[Start::Quantile(0.1), Start::Quantile(0.999)],
+            &[Start::Quantile(0.2), Start::Quantile(0.8)],
+        ]),
+        amplitude: None,
         channel: None,
+        needs: Needs::Nothing,
         source: "amplifier limits",
     };
 

@@ -1,8 +1,10 @@
 //! The jet's front rolls up into a vortex that helps for a while.
 
-use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
+    Unit, take,
+};
 use crate::real::Real;
-
 
 /// ẇ = −w/τ + max(dj/dt, 0); the flow receives j + g·w.
 ///
@@ -46,14 +48,23 @@ impl<T: Real> Physics<T> for StartingVortex<T> {
     const SPEC: Spec = Spec {
         name: "starting-vortex",
         rust: "starting_vortex::StartingVortex",
+        rust_type: RustType::Numbers,
         place: Place::Jet,
         summary: "the jet's front rolls up into a vortex that helps for a while",
         equation: "ẇ = −w/τ + max(dj/dt, 0); the flow receives j + g·w",
         parameters: &[
-            Parameter { name: "gain", unit: "-", low: 0.0, high: 3.0, starts: &[0.5], influence: Influence::Smooth },
-            Parameter { name: "decay_time", unit: "s", low: 0.003, high: 0.2, starts: &[0.008, 0.025, 0.08], influence: Influence::Smooth },
+            Parameter::new("gain", Unit::None, [0.0, 3.0], &[0.5]),
+            Parameter::new(
+                "decay_time",
+                Unit::Second,
+                [0.003, 0.2],
+                &[0.008, 0.025, 0.08],
+            ),
         ],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new("gain", "a starting vortex").linear()),
         channel: None,
+        needs: Needs::Nothing,
         source: "Glezer, AIAA J. 26 (1988): starting vortex of a jet",
     };
 

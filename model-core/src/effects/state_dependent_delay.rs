@@ -1,7 +1,9 @@
 //! The transport delay depends on how far the flow is attached, eq. (2).
 
 use crate::delay::{DelayLaw, Tap};
-use crate::effect::{Influence, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Needs, Parameter, Physics, Place, RustType, Setting, Spec, Start, Starts, Unit, take,
+};
 use crate::real::Real;
 
 /// h_l = round(f_l · (p0 + p1·exp(−p2·ỹ))), samples, eqs. (2) and (4); without
@@ -61,36 +63,24 @@ impl<T: Real> Physics<T> for StateDependentDelay<T> {
     const SPEC: Spec = Spec {
         name: "state-dependent-delay",
         rust: "state_dependent_delay::StateDependentDelay",
+        rust_type: RustType::Numbers,
         place: Place::Delay,
         summary: "the delay shortens as the flow attaches",
         equation: "h = p0 + p1·exp(−p2·ỹ)",
         parameters: &[
-            Parameter {
-                name: "delay_floor",
-                unit: "samples",
-                low: 0.0,
-                high: 500.0,
-                starts: &[30.0],
-                influence: Influence::Smooth,
-            },
-            Parameter {
-                name: "delay_rise",
-                unit: "samples",
-                low: -100.0,
-                high: 500.0,
-                starts: &[10.0],
-                influence: Influence::Smooth,
-            },
-            Parameter {
-                name: "delay_rate",
-                unit: "1/y",
-                low: 0.1,
-                high: 200.0,
-                starts: &[4.0, 20.0],
-                influence: Influence::Smooth,
-            },
+            Parameter::new("delay_floor", Unit::Samples, [0.0, 500.0], &[30.0]),
+            Parameter::new("delay_rise", Unit::Samples, [-100.0, 500.0], &[10.0]),
+            Parameter::new("delay_rate", Unit::PerY, [0.1, 200.0], &[4.0, 20.0]),
         ],
+        starts: Starts::Rows(&[
+            &[Start::Delay(-3.0), Start::Value(10.0), Start::Value(4.0)],
+            &[Start::Delay(-1.0), Start::Value(10.0), Start::Value(16.0)],
+            &[Start::Delay(-6.0), Start::Value(10.0), Start::Value(2.0)],
+            &[Start::Delay(3.0), Start::Value(-8.0), Start::Value(4.0)],
+        ]),
+        amplitude: None,
         channel: None,
+        needs: Needs::Nothing,
         source: "Feingesicht et al., ECC 2016, eq. (2)",
     };
 

@@ -1,8 +1,10 @@
 //! A vortex rolls up after switch-off and the friction undershoots.
 
-use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
+    Unit, take,
+};
 use crate::real::Real;
-
 
 /// ẇ = −w/τ + max(−dj/dt, 0); the flow receives j − g·w.
 ///
@@ -46,14 +48,23 @@ impl<T: Real> Physics<T> for StoppingVortex<T> {
     const SPEC: Spec = Spec {
         name: "stopping-vortex",
         rust: "stopping_vortex::StoppingVortex",
+        rust_type: RustType::Numbers,
         place: Place::Jet,
         summary: "a vortex rolls up after switch-off and the friction undershoots",
         equation: "ẇ = −w/τ + max(−dj/dt, 0); the flow receives j − g·w",
         parameters: &[
-            Parameter { name: "gain", unit: "-", low: 0.0, high: 3.0, starts: &[0.5], influence: Influence::Smooth },
-            Parameter { name: "decay_time", unit: "s", low: 0.003, high: 0.3, starts: &[0.008, 0.025, 0.08], influence: Influence::Smooth },
+            Parameter::new("gain", Unit::None, [0.0, 3.0], &[0.5]),
+            Parameter::new(
+                "decay_time",
+                Unit::Second,
+                [0.003, 0.3],
+                &[0.008, 0.025, 0.08],
+            ),
         ],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new("gain", "a stopping vortex").linear()),
         channel: None,
+        needs: Needs::Nothing,
         source: "Darabi & Wygnanski, J. Fluid Mech. 510 (2004): separation of a flow after forcing stops",
     };
 

@@ -1,8 +1,10 @@
 //! The sensor warms up during the record.
 
-use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
+    Unit, take,
+};
 use crate::real::Real;
-
 
 /// y = s + A·(1 − exp(−t/τ)), t from the record's start.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,14 +31,23 @@ impl<T: Real> Physics<T> for ThermalDrift<T> {
     const SPEC: Spec = Spec {
         name: "thermal-drift",
         rust: "thermal_drift::ThermalDrift",
+        rust_type: RustType::Numbers,
         place: Place::Sensor,
         summary: "the reading drifts while the sensor warms up",
         equation: "y = s + A·(1 − exp(−t/τ))",
         parameters: &[
-            Parameter { name: "amplitude", unit: "y", low: -2.0, high: 2.0, starts: &[0.05], influence: Influence::Smooth },
-            Parameter { name: "time_constant", unit: "s", low: 0.5, high: 60.0, starts: &[1.5, 5.0, 20.0], influence: Influence::Smooth },
+            Parameter::new("amplitude", Unit::Y, [-2.0, 2.0], &[0.05]),
+            Parameter::new(
+                "time_constant",
+                Unit::Second,
+                [0.5, 60.0],
+                &[1.5, 5.0, 20.0],
+            ),
         ],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new("amplitude", "a thermal drift").linear()),
         channel: None,
+        needs: Needs::Nothing,
         source: "Bruun, Hot-wire Anemometry (1995), ch. 7",
     };
 

@@ -1,8 +1,10 @@
 //! The valve takes time to open and to close.
 
-use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
+    Unit, take,
+};
 use crate::real::Real;
-
 
 /// v̇ = (u − v)/τ_o while u > v, (u − v)/τ_c otherwise; exact for a held command.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +21,11 @@ impl<T: Real> Effect<T> for ValveLag<T> {
     }
     #[inline]
     fn jet(&self, opening: &mut T, jet: T, _at: &Instant<'_, T>) -> T {
-        let share = if jet > *opening { self.opening } else { self.closing };
+        let share = if jet > *opening {
+            self.opening
+        } else {
+            self.closing
+        };
         *opening = *opening + (jet - *opening) * share;
         *opening
     }
@@ -29,14 +35,18 @@ impl<T: Real> Physics<T> for ValveLag<T> {
     const SPEC: Spec = Spec {
         name: "valve-lag",
         rust: "valve_lag::ValveLag",
+        rust_type: RustType::Numbers,
         place: Place::Jet,
         summary: "the valve opens and closes gradually",
         equation: "v̇ = (u − v)/τ_o while u > v, (u − v)/τ_c otherwise",
         parameters: &[
-            Parameter { name: "opening_time", unit: "s", low: 0.001, high: 0.05, starts: &[0.004, 0.015], influence: Influence::Smooth },
-            Parameter { name: "closing_time", unit: "s", low: 0.001, high: 0.1, starts: &[0.004, 0.025], influence: Influence::Smooth },
+            Parameter::new("opening_time", Unit::Second, [0.001, 0.05], &[0.004, 0.015]),
+            Parameter::new("closing_time", Unit::Second, [0.001, 0.1], &[0.004, 0.025]),
         ],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new("opening_time", "a lag of the valve").together()),
         channel: None,
+        needs: Needs::Nothing,
         source: "first-order valve model; e.g. Topçu et al., Mechatronics 16 (2006)",
     };
 

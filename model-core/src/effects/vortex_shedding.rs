@@ -1,8 +1,10 @@
 //! Jets set off the flow's own oscillation, which the sensor sees on top of the friction.
 
-use crate::effect::{Effect, Influence, Instant, Parameter, Physics, Place, Setting, Spec, take};
+use crate::effect::{
+    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
+    Unit, take,
+};
 use crate::real::Real;
-
 
 /// q̈ + 2ζω·q̇ + ω²·q = ω²·j(t − h); y gets + g·(q − j(t − h)). Exact for a jet
 /// held over the sample; ζ is taken as below 1.
@@ -44,15 +46,24 @@ impl<T: Real> Physics<T> for VortexShedding<T> {
     const SPEC: Spec = Spec {
         name: "vortex-shedding",
         rust: "vortex_shedding::VortexShedding",
+        rust_type: RustType::Numbers,
         place: Place::Sensor,
         summary: "the jets excite the shedding, which rings in the friction",
         equation: "q̈ + 2ζω·q̇ + ω²·q = ω²·j(t − h); y gets + g·(q − j(t − h))",
         parameters: &[
-            Parameter { name: "frequency", unit: "Hz", low: 1.0, high: 200.0, starts: &[3.0, 6.0, 10.0, 16.0, 25.0, 40.0], influence: Influence::Smooth },
-            Parameter { name: "damping_ratio", unit: "-", low: 0.005, high: 0.95, starts: &[0.05, 0.2], influence: Influence::Smooth },
-            Parameter { name: "gain", unit: "y", low: -2.0, high: 2.0, starts: &[0.15], influence: Influence::Smooth },
+            Parameter::new(
+                "frequency",
+                Unit::Hertz,
+                [1.0, 200.0],
+                &[3.0, 6.0, 10.0, 16.0, 25.0, 40.0],
+            ),
+            Parameter::new("damping_ratio", Unit::None, [0.005, 0.95], &[0.05, 0.2]),
+            Parameter::new("gain", Unit::Y, [-2.0, 2.0], &[0.15]),
         ],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new("gain", "vortex shedding").linear()),
         channel: None,
+        needs: Needs::Nothing,
         source: "Cattafesta & Sheplak, Annu. Rev. Fluid Mech. 43 (2011)",
     };
 

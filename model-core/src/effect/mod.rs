@@ -5,77 +5,16 @@
 //! alone: it shapes the jet strength before the delay, adds to what drives the
 //! flow, or changes what the sensor shows of the flow.
 
+mod card;
+mod unit;
+
+pub use card::{
+    Amplitude, Facts, Influence, Needs, Parameter, Place, RustType, Sign, Spec, Start, Starts,
+};
+pub use unit::Unit;
+
 use crate::delay::DelayLaw;
 use crate::real::Real;
-
-/// Where an effect acts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Place {
-    /// Between the command and the jets.
-    Jet,
-    /// In the transport from jets to sensor.
-    Delay,
-    /// In the recursion of the flow.
-    Flow,
-    /// In what is measured; outside the recursion.
-    Sensor,
-}
-
-/// How a parameter enters, for whoever searches it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Influence {
-    /// The output has a derivative in it.
-    Smooth,
-    /// The output changes in steps (a threshold, a rounded delay).
-    Stepwise,
-}
-
-/// A physical parameter of an effect.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parameter {
-    /// Name in model files and reports.
-    pub name: &'static str,
-    /// Unit in words; "-" for none.
-    pub unit: &'static str,
-    /// Lowest value that makes sense.
-    pub low: f64,
-    /// Highest value that makes sense.
-    pub high: f64,
-    /// Values from which a search should set out, for signals of order 1; those
-    /// in "y per sample" are relative to the usual change of y over a sample.
-    pub starts: &'static [f64],
-    /// How it enters.
-    pub influence: Influence,
-}
-
-impl Parameter {
-    /// Whether it spans orders of magnitude and is best searched in its logarithm.
-    #[must_use]
-    pub fn is_logarithmic(&self) -> bool {
-        self.low > 0.0 && self.high > 20.0 * self.low
-    }
-}
-
-/// The identity card of an effect.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spec {
-    /// Name in commands, model files and reports.
-    pub name: &'static str,
-    /// Rust path of the effect below `model_core::effects`, for generated code.
-    pub rust: &'static str,
-    /// Where it acts.
-    pub place: Place,
-    /// The physics in one line.
-    pub summary: &'static str,
-    /// The continuous-time equation.
-    pub equation: &'static str,
-    /// Its parameters, in the order of [`Physics::new`].
-    pub parameters: &'static [Parameter],
-    /// The measured channel it needs besides u and y.
-    pub channel: Option<&'static str>,
-    /// Where to read more.
-    pub source: &'static str,
-}
 
 /// What an effect is told about the rig.
 #[derive(Clone, Copy, Debug, PartialEq)]

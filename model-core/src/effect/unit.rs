@@ -1,0 +1,131 @@
+//! Units of physical parameters, as a type.
+
+use core::fmt;
+
+/// The unit of a parameter. y is the measured friction, u the command, whatever
+/// they are measured in; a sample is one of the record's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// A ratio.
+    None,
+    /// s.
+    Second,
+    /// Hz.
+    Hertz,
+    /// 1/s.
+    PerSecond,
+    /// Samples.
+    Samples,
+    /// That of y.
+    Y,
+    /// 1/y.
+    PerY,
+    /// 1/y².
+    PerYSquared,
+    /// A change of y over a sample.
+    YPerSample,
+    /// What turns a squared change of y over a sample into a change over a sample.
+    SamplesPerY,
+    /// 1/u.
+    PerU,
+    /// 1/u².
+    PerUSquared,
+    /// Of a user's own effect, in words; nothing is known of it.
+    Other(&'static str),
+}
+
+/// What is printed for each unit.
+const SYMBOLS: [(Unit, &str); 12] = [
+    (Unit::None, "-"),
+    (Unit::Second, "s"),
+    (Unit::Hertz, "Hz"),
+    (Unit::PerSecond, "1/s"),
+    (Unit::Samples, "samples"),
+    (Unit::Y, "y"),
+    (Unit::PerY, "1/y"),
+    (Unit::PerYSquared, "1/y²"),
+    (Unit::YPerSample, "y per sample"),
+    (Unit::SamplesPerY, "samples/y"),
+    (Unit::PerU, "1/u"),
+    (Unit::PerUSquared, "1/u²"),
+];
+
+impl Unit {
+    /// The unit in words, as files and reports have it; "-" for a ratio.
+    #[must_use]
+    pub fn symbol(self) -> &'static str {
+        if let Self::Other(words) = self {
+            return words;
+        }
+        let known = SYMBOLS.iter().find(|(unit, _)| *unit == self);
+        known.map_or("-", |(_, symbol)| symbol)
+    }
+
+    /// The unit that `symbol` says.
+    #[must_use]
+    pub fn of(symbol: &'static str) -> Self {
+        let known = SYMBOLS.iter().find(|(_, known)| *known == symbol);
+        known.map_or(Self::Other(symbol), |(unit, _)| *unit)
+    }
+
+    /// By what a value in this unit is multiplied to mean the same when all y
+    /// are multiplied by `y`, all times by `time` (the samples stay) and all u by `u`.
+    #[must_use]
+    pub fn scale(self, y: f64, time: f64, u: f64) -> f64 {
+        match self {
+            Self::None | Self::Samples | Self::Other(_) => 1.0,
+            Self::Second => time,
+            Self::Hertz | Self::PerSecond => 1.0 / time,
+            Self::Y | Self::YPerSample => y,
+            Self::PerY | Self::SamplesPerY => 1.0 / y,
+            Self::PerYSquared => 1.0 / (y * y),
+            Self::PerU => 1.0 / u,
+            Self::PerUSquared => 1.0 / (u * u),
+        }
+    }
+
+    /// `value` as a person would say it, with what is said after the number.
+    #[must_use]
+    pub fn spoken(self, value: f64) -> (f64, &'static str) {
+        match self {
+            Self::Second => (1000.0 * value, "ms"),
+            Self::None => (100.0 * value, "%"),
+            Self::Y => (value, "in y"),
+            unit => (value, unit.symbol()),
+        }
+    }
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.symbol())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn symbols_and_units_belong_together() {
+        for (unit, symbol) in SYMBOLS {
+            assert_eq!(Unit::of(symbol), unit);
+            assert_eq!(unit.symbol(), symbol);
+        }
+        assert_eq!(Unit::of("kg"), Unit::Other("kg"));
+        assert_eq!(Unit::Other("kg").symbol(), "kg");
+    }
+
+    /// A squared change times the drag's coefficient is a change, in any unit of y.
+    #[test]
+    fn scales_follow_the_dimensions() {
+        let (y, time, u) = (50.0, 20.0, 3.0);
+        let scale = |unit: Unit| unit.scale(y, time, u);
+        assert_eq!(scale(Unit::Y) * scale(Unit::PerY), 1.0);
+        assert_eq!(scale(Unit::Second) * scale(Unit::Hertz), 1.0);
+        let change = scale(Unit::YPerSample);
+        assert!((scale(Unit::SamplesPerY) * change * change - change).abs() < 1e-12);
+        assert!((scale(Unit::PerUSquared) * u * u - 1.0).abs() < 1e-12);
+        assert_eq!(scale(Unit::Samples), 1.0);
+    }
+}

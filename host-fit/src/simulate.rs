@@ -1,15 +1,17 @@
 //! Free runs and one-step predictions of a model over recorded signals.
 
 use crate::data::Record;
-use crate::model::{Delay, Model, Prepared, Rounding, Start};
+use crate::model::{Delay, Footprint, Model, Prepared, Rounding, Start};
 use model_core::history::{Memory, Past};
-use model_core::model::{Averaging, StateOf, observe};
+use model_core::model::{StateOf, observe};
 use model_core::{Input, Output, Parts, Real, State};
 use std::ops::ControlFlow;
 use thiserror::Error;
 
 /// A free run whose flow exceeds this many times the measured range has diverged.
 const DIVERGED: f64 = 1e3;
+/// A search may move a delay law up to this many samples.
+const ROOM: usize = 1020;
 
 /// Why a free run could not be made or finished.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -122,13 +124,24 @@ impl<T: Real> Memory<T> for Ring<T> {
     }
 }
 
+/// The state of a model on the host.
+pub type HostState<T> = StateOf<T, Prepared<T>, Ring<T>, Ring<T>>;
+
+impl Footprint {
+    /// The state of `prepared` at rest, with memories that hold what is needed.
+    #[must_use]
+    pub fn at_rest<T: Real>(&self, prepared: &Prepared<T>) -> HostState<T> {
+        let (outputs, jets) = (Ring::reaching(self.outputs), Ring::reaching(self.jets));
+        State::at_rest(prepared, outputs, jets)
+    }
+}
+
 /// A model ready to be run over records, in numbers of type `T`.
 #[derive(Clone, Debug)]
 pub struct Simulator<T: Real> {
     prepared: Prepared<T>,
     start: Start,
-    outputs: usize,
-    jets: usize,
+    memory: Footprint,
     followed: usize,
 }
 
@@ -137,26 +150,17 @@ impl<T: Real> Simulator<T> {
     /// [`Model::coordinates`]).
     #[must_use]
     pub fn with_values(model: &Model, values: &[T], rounding: Rounding) -> Self {
-        let Averaging {
-            window,
-            averaged_model,
-        } = model.averaging;
-        let mut jets = model.longest_delay() + 2;
-        if matches!(
-            model.delay,
-            Delay::StateDependent { .. } | Delay::EdgeDependent { .. }
-        ) {
+        let memory = match model.delay {
+            Delay::Fixed { .. } => model.memory(),
             // Room for a search to move the law.
-            jets = jets.max(1023);
-        }
-        if averaged_model {
-            jets += window as usize;
-        }
+            Delay::StateDependent { .. } | Delay::EdgeDependent { .. } => {
+                model.memory_for(model.longest_delay().max(ROOM))
+            }
+        };
         Self {
             prepared: model.prepare_with(values, rounding),
             start: model.start,
-            outputs: model.longest_lag().max(window as usize),
-            jets,
+            memory,
             followed: model.warm_up(),
         }
     }
@@ -217,16 +221,15 @@ impl<T: Real> Simulator<T> {
         }
     }
 
-    fn state(&self) -> StateOf<T, Prepared<T>, Ring<T>, Ring<T>> {
-        let (outputs, jets) = (Ring::reaching(self.outputs), Ring::reaching(self.jets));
-        State::at_rest(&self.prepared, outputs, jets)
+    fn state(&self) -> HostState<T> {
+        self.memory.at_rest(&self.prepared)
     }
 
     #[inline]
     fn observe(
         &self,
         signals: &Signals<'_>,
-        state: &mut StateOf<T, Prepared<T>, Ring<T>, Ring<T>>,
+        state: &mut HostState<T>,
         channels: &mut [T],
         k: usize,
         u: f64,
@@ -242,17 +245,12 @@ impl<T: Real> Simulator<T> {
     }
 
     /// Lives through the first sample until the memories are full of it.
-    fn hold_first(
-        &self,
-        signals: &Signals<'_>,
-        state: &mut StateOf<T, Prepared<T>, Ring<T>, Ring<T>>,
-        channels: &mut [T],
-    ) {
+    fn hold_first(&self, signals: &Signals<'_>, state: &mut HostState<T>, channels: &mut [T]) {
         let (Some(u), Some(y)) = (signals.u.first(), signals.y.and_then(<[f64]>::first)) else {
             return;
         };
         let window = self.prepared.averaging().window;
-        for _ in 0..self.outputs.max(self.jets) {
+        for _ in 0..self.memory.outputs.max(self.memory.jets) {
             state.advance(T::from_f64(*y), window);
             self.observe(signals, state, channels, 0, *u);
         }

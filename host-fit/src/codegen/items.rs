@@ -1,8 +1,8 @@
 //! The items of the generated file.
 
 use super::layout::{array, documented, number, numbers};
-use super::{CodegenError, jets, law, outputs, references, spec_of};
-use crate::model::{Added, Delay, Model};
+use super::{CodegenError, law, spec_of};
+use crate::model::{Added, Delay, Footprint, Model};
 use crate::user_effect::rust_source;
 use model_core::effect::{RustType, Setting, Spec};
 use model_core::effects;
@@ -68,7 +68,7 @@ fn is_frozen(model: &Model) -> bool {
     !matches!(model.delay, Delay::EdgeDependent { .. })
 }
 
-pub(super) fn sizes(out: &mut String, model: &Model, graded: bool) {
+pub(super) fn sizes(out: &mut String, model: &Model, memory: &Footprint) {
     let _ = write!(
         out,
         "
@@ -78,15 +78,15 @@ pub const SAMPLE_PERIOD_S: f32 = {};
 pub const OUTPUTS: usize = {};
 ",
         number(model.sample_period_s),
-        outputs(model)
+        memory.outputs
     );
-    if graded {
+    if memory.graded {
         let _ = write!(
             out,
             "/// Jet strengths kept: more than the longest input delay.
 pub const JETS: usize = {};
 ",
-            jets(model)
+            memory.jets
         );
     } else {
         let _ = write!(
@@ -94,11 +94,12 @@ pub const JETS: usize = {};
             "/// Commands kept, in words of 32: more than the longest input delay.
 pub const WORDS: usize = {};
 ",
-            jets(model).div_ceil(32)
+            memory.words()
         );
     }
-    let (channels, references) = (model.channels(), references(model));
-    let names: Vec<String> = channels.iter().map(|name| format!("{name:?}")).collect();
+    let references: Vec<f32> = memory.references();
+    let names = memory.channels.iter();
+    let names: Vec<String> = names.map(|channel| format!("{:?}", channel.name)).collect();
     let _ = writeln!(
         out,
         "/// Measured channels that the effects need, in the order in which they are passed."

@@ -1,11 +1,9 @@
 //! The items of the designed law: `[law]` of the model file as constants.
 
+use super::CodegenError;
 use super::layout::number;
-use super::{CodegenError, jets, outputs, references};
 use crate::model::{Delay, Law, Maximise, Model, Track};
-use crate::simulate::Ring;
 use closed_loop::AHEAD;
-use model_core::State;
 use model_core::control::{Tracking, golden};
 use std::fmt::Write as _;
 
@@ -166,16 +164,12 @@ fn golden_value(model: &Model, law: &Tracking<f32>) -> Result<u32, CodegenError>
     let prepared = model.prepare::<f32>();
     let longest = u16::try_from(model.longest_delay()).unwrap_or(u16::MAX);
     law.validate::<_, AHEAD>(&prepared, longest)?;
-    let at_rest = State::at_rest(
-        &prepared,
-        Ring::reaching(outputs(model)),
-        Ring::reaching(jets(model)),
-    );
+    let memory = model.memory();
     golden::run(
         law,
         &prepared,
-        law.start::<_, AHEAD>(at_rest),
-        &references(model),
+        law.start::<_, AHEAD>(memory.at_rest(&prepared)),
+        &memory.references(),
         GOLDEN_SAMPLES,
     )
     .ok_or(CodegenError::Unstable {

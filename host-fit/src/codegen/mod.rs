@@ -9,10 +9,9 @@ mod law;
 mod layout;
 
 use crate::model::{Added, Delay, Model};
-use crate::simulate::Ring;
 use model_core::control::tracking::Unusable;
-use model_core::effect::{Place, Spec};
-use model_core::{State, self_test};
+use model_core::effect::Spec;
+use model_core::self_test;
 use std::fmt::Write as _;
 use thiserror::Error;
 
@@ -65,9 +64,10 @@ pub fn generate(model: &Model) -> Result<String, CodegenError> {
     check(model)?;
     let mut out = String::new();
     header(&mut out, model);
-    let graded = needs_graded_jets(model);
+    let memory = model.memory();
+    let graded = memory.graded;
     items::imports(&mut out, model, graded);
-    items::sizes(&mut out, model, graded);
+    items::sizes(&mut out, model, &memory);
     items::types(&mut out, model, graded)?;
     items::coefficients(&mut out, model);
     items::compile_time_checks(&mut out, model, graded);
@@ -126,43 +126,6 @@ fn spec_of(model: &Model, added: &Added) -> Result<&'static Spec, CodegenError> 
         .ok_or_else(|| CodegenError::UnknownEffect {
             name: added.name.clone(),
         })
-}
-
-/// One bit a sample serves unless jets take strengths between on and off.
-fn needs_graded_jets(model: &Model) -> bool {
-    let shapes_jet = |added: &Added| {
-        model
-            .spec(&added.name)
-            .is_none_or(|spec| spec.place == Place::Jet)
-    };
-    matches!(model.delay, Delay::EdgeDependent { .. }) || model.effects.iter().any(shapes_jet)
-}
-
-/// Outputs to keep.
-fn outputs(model: &Model) -> usize {
-    let needed = (model.longest_lag() + 1).max(model.averaging.window as usize);
-    needed.max(2)
-}
-
-/// Jet strengths to keep: the delay, a sample to interpolate to, one for what
-/// single precision may round up, and the window of an averaged input.
-fn jets(model: &Model) -> usize {
-    let window = if model.averaging.averaged_model {
-        model.averaging.window as usize
-    } else {
-        0
-    };
-    model.longest_delay() + 3 + window
-}
-
-/// Usual values of the measured channels, in the order in which they are passed.
-fn references(model: &Model) -> Vec<f32> {
-    let of_channel = |channel: &String| {
-        let mut owners = model.effects.iter();
-        let added = owners.find(|added| added.channel.as_ref() == Some(channel));
-        added.and_then(|added| added.reference).unwrap_or(1.0) as f32
-    };
-    model.channels().iter().map(of_channel).collect()
 }
 
 fn header(out: &mut String, model: &Model) {
@@ -229,21 +192,17 @@ fn header(out: &mut String, model: &Model) {
 /// Checksum and golden run, by the code that the host simulates with.
 fn golden(out: &mut String, model: &Model) -> Result<(), CodegenError> {
     let prepared = model.prepare::<f32>();
-    let references = references(model);
+    let size = model.memory();
     // Long enough for what is sent to arrive, twice over.
     let memory = model.longest_lag().max(model.longest_delay());
     let every = (2 * memory).div_ceil(GOLDEN_VALUES).clamp(32, 4096) as u32;
-    let state = State::at_rest(
-        &prepared,
-        Ring::reaching(outputs(model)),
-        Ring::reaching(jets(model)),
-    );
+    let state = size.at_rest(&prepared);
     let mut values = Vec::with_capacity(GOLDEN_VALUES);
     let mut unstable = None;
     self_test::run(
         &prepared,
         state,
-        &references,
+        &size.references(),
         every,
         GOLDEN_VALUES,
         |i, bits| {
@@ -280,6 +239,7 @@ pub const GOLDEN: Golden<{GOLDEN_VALUES}> = Golden {{
 #[cfg(test)]
 mod tests {
     use super::*;
+    use model_core::effect::Place;
 
     fn with_effects(extra: &str) -> Model {
         let text = include_str!("../../../firmware/identified/models/full.toml");

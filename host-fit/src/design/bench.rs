@@ -1,52 +1,28 @@
 //! A model set up to be played commands.
 
-use crate::model::{Model, Prepared};
-use crate::simulate::Ring;
-use model_core::model::StateOf;
-use model_core::{Input, Output, Parts, Real, State, step};
-
-/// The state of a model on the host.
-pub(super) type HostState<T> = StateOf<T, Prepared<T>, Ring<T>, Ring<T>>;
+use crate::model::{Footprint, Model, Prepared};
+use crate::simulate::HostState;
+use model_core::{Input, Output, Parts, Real, step};
 
 /// A prepared model with memories that fit it and channels at their references.
 pub(super) struct Bench<T: Real> {
     pub(super) prepared: Prepared<T>,
     pub(super) channels: Vec<T>,
-    outputs: usize,
-    jets: usize,
+    memory: Footprint,
 }
 
 impl<T: Real> Bench<T> {
     pub(super) fn of(model: &Model) -> Self {
-        let window = model.averaging.window as usize;
-        let averaged = if model.averaging.averaged_model {
-            window
-        } else {
-            0
-        };
-        let references = model.channels().into_iter().map(|name| {
-            let owner = |added: &&crate::model::Added| added.channel.as_ref() == Some(&name);
-            let reference = model
-                .effects
-                .iter()
-                .find(owner)
-                .and_then(|added| added.reference);
-            T::from_f64(reference.unwrap_or(0.0))
-        });
+        let memory = model.memory();
         Self {
             prepared: model.prepare(),
-            channels: references.collect(),
-            outputs: model.longest_lag().max(window) + 1,
-            jets: model.longest_delay() + averaged + 2,
+            channels: memory.references(),
+            memory,
         }
     }
 
     pub(super) fn at_rest(&self) -> HostState<T> {
-        State::at_rest(
-            &self.prepared,
-            Ring::reaching(self.outputs),
-            Ring::reaching(self.jets),
-        )
+        self.memory.at_rest(&self.prepared)
     }
 
     /// One sample of a free run.

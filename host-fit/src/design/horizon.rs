@@ -6,8 +6,9 @@
 //! gives, the best one met is the answer, and what is still in flight counts.
 //! Where the beam never had to drop a command, all were tried: the answer is exact.
 
-use super::bench::{Bench, HostState};
+use super::bench::Bench;
 use crate::model::Hold;
+use crate::simulate::HostState;
 use rayon::prelude::*;
 
 /// What to search.

@@ -7,9 +7,10 @@
 //! over a finite horizon ([`super::horizon`]) can propose further ones.
 
 use super::DesignError;
-use super::bench::{Bench, HostState};
+use super::bench::Bench;
 use super::horizon::{self, Flow, Horizon};
 use crate::model::{Hold, Maximise, Model, Start};
+use crate::simulate::HostState;
 use rayon::prelude::*;
 use serde::Serialize;
 

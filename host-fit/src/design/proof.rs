@@ -2,8 +2,9 @@
 //! The program brings the nearest physical plant, with effects that the law does not
 //! know of and under worse conditions than designed for.
 
-use super::bench::{Bench, HostState};
+use super::bench::Bench;
 use crate::model::{Maximise, Model, Track};
+use crate::simulate::HostState;
 use closed_loop::{
     Controlled, Controller, Figures, ModelFlow, OpenLoop, Relay, Trace, TrackingController, run,
 };

@@ -4,6 +4,7 @@ mod chain;
 mod envelope;
 mod file;
 mod law;
+mod memory;
 mod parameters;
 mod poles;
 mod prepared;
@@ -11,6 +12,7 @@ mod prepared;
 pub use chain::{Chain, HostEffect, HostState};
 pub use file::{FORMAT_VERSION, ModelError};
 pub use law::{Hold, Law, Maximise, Track};
+pub use memory::{Channel, Footprint};
 pub use parameters::{Coordinate, Kind};
 pub use prepared::{AnyDelay, Prepared, Rounding};
 

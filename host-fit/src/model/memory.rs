@@ -1,0 +1,166 @@
+//! What a model has to remember, and what it has to be told besides the command.
+//!
+//! The one place that knows: the simulator, the design of laws and the generated
+//! code all keep what is said here.
+
+use super::{Delay, Model};
+use model_core::Real;
+use model_core::effect::Place;
+
+/// Words of the board's memory for commands hold this many samples.
+const BITS: usize = 32;
+
+/// The memory of a model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Footprint {
+    /// Outputs kept, samples: more than the longest lag, no less than the
+    /// averaging window.
+    pub outputs: usize,
+    /// Jet strengths kept, samples: more than the longest input delay.
+    pub jets: usize,
+    /// Whether jets take strengths between on and off; one bit a sample serves
+    /// where they do not.
+    pub graded: bool,
+    /// Measured channels that the effects need, in the order in which they are
+    /// passed.
+    pub channels: Vec<Channel>,
+}
+
+/// A measured channel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel {
+    /// Its name in records and model files.
+    pub name: String,
+    /// Its usual value, in its unit: 1 where the model file says nothing.
+    pub reference: f64,
+}
+
+impl Model {
+    /// What the model has to remember.
+    #[must_use]
+    pub fn memory(&self) -> Footprint {
+        self.memory_for(self.longest_delay())
+    }
+
+    /// The same where input delays may become as long as `delay` samples.
+    #[must_use]
+    pub fn memory_for(&self, delay: usize) -> Footprint {
+        let window = self.averaging.window as usize;
+        let averaged = if self.averaging.averaged_model {
+            window
+        } else {
+            0
+        };
+        let shapes_jet = |name: &str| self.spec(name).is_none_or(|spec| spec.place == Place::Jet);
+        let names = self.effects.iter().map(|added| added.name.as_str());
+        Footprint {
+            outputs: (self.longest_lag() + 1).max(window).max(2),
+            // A sample to interpolate to, one for what single precision may round
+            // up, and the newest itself.
+            jets: delay + 3 + averaged,
+            graded: matches!(self.delay, Delay::EdgeDependent { .. })
+                || names.into_iter().any(shapes_jet),
+            channels: self.measured(),
+        }
+    }
+
+    fn measured(&self) -> Vec<Channel> {
+        let of = |name: String| {
+            let owner = self
+                .effects
+                .iter()
+                .find(|added| added.channel.as_ref() == Some(&name));
+            Channel {
+                reference: owner.and_then(|added| added.reference).unwrap_or(1.0),
+                name,
+            }
+        };
+        self.channels().into_iter().map(of).collect()
+    }
+}
+
+impl Footprint {
+    /// Jet strengths that a board keeps: whole words where a sample is one bit.
+    #[must_use]
+    pub fn jets_on_board(&self) -> usize {
+        if self.graded {
+            self.jets
+        } else {
+            self.words() * BITS
+        }
+    }
+
+    /// Words for jets that are on or off.
+    #[must_use]
+    pub fn words(&self) -> usize {
+        self.jets.div_ceil(BITS)
+    }
+
+    /// The usual values of the channels.
+    #[must_use]
+    pub fn references<T: Real>(&self) -> Vec<T> {
+        let each = self.channels.iter();
+        each.map(|channel| T::from_f64(channel.reference)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Added;
+
+    #[test]
+    fn lags_delays_and_windows_are_kept() {
+        let mut model = Model {
+            state_lags: vec![1, 300],
+            delay: Delay::Fixed {
+                delays: vec![40, 60],
+            },
+            ..Model::default()
+        };
+        model.averaging.window = 250;
+        let memory = model.memory();
+        // Lag 300 of the one-step convention is 299 behind the newest.
+        assert_eq!((memory.outputs, memory.jets), (300, 63));
+        assert_eq!((memory.graded, memory.words()), (false, 2));
+        assert_eq!(memory.jets_on_board(), 64);
+        model.averaging.averaged_model = true;
+        assert_eq!(model.memory().jets, 313);
+        model.state_lags = vec![1, 2];
+        assert_eq!(model.memory().outputs, 250);
+    }
+
+    #[test]
+    fn jets_between_on_and_off_are_numbers() {
+        let mut model = Model::default();
+        let add = |model: &mut Model, name: &str| {
+            let spec = model_core::effects::spec(name).expect("in the catalogue");
+            model.add(spec, &[0.1, 0.1], None);
+        };
+        add(&mut model, "hot-film-lag");
+        assert!(!model.memory().graded);
+        add(&mut model, "plenum-droop");
+        assert!(model.memory().graded);
+        assert_eq!(model.memory().jets_on_board(), model.memory().jets);
+    }
+
+    #[test]
+    fn a_channel_has_one_reference_for_all() {
+        let added = |reference| Added {
+            name: "free-stream-variation".to_owned(),
+            parameters: vec![-1.0],
+            channel: Some("u_inf".to_owned()),
+            reference,
+        };
+        let mut model = Model::default();
+        model.effects = vec![added(Some(10.0)), added(Some(10.0))];
+        let channels = model.memory().channels;
+        assert_eq!(channels.len(), 1);
+        assert_eq!(
+            (channels[0].name.as_str(), channels[0].reference),
+            ("u_inf", 10.0)
+        );
+        model.effects = vec![added(None)];
+        assert_eq!(model.memory().references::<f32>(), [1.0]);
+    }
+}

@@ -159,35 +159,47 @@ pub(crate) fn words(lines: &[&str]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::Value;
+    use super::*;
+    use std::collections::BTreeSet;
 
-    rules! {
-        /// What the
-        /// tests decide.
-        pub struct Example in "example";
-
-        /// Less than this
-        /// is nothing.
-        least_share: f64 = 0.5, "share", "convention";
-        /// Time constants.
-        starts_s: [f64; 2] = [0.1, 0.2], "s", "convention";
-        /// Most of them.
-        most: usize = 3, "", "convention";
+    #[test]
+    fn every_rule_says_what_it_decides_and_where_its_value_comes_from() {
+        for book in books() {
+            let mut names = BTreeSet::new();
+            assert!(book.about.ends_with('.'), "{}", book.room);
+            for rule in &book.rules {
+                assert!(
+                    names.insert(&rule.name),
+                    "{} twice in {}",
+                    rule.name,
+                    book.room
+                );
+                let ends = [".", "…", ":"];
+                assert!(ends.iter().any(|e| rule.meaning.ends_with(e)), "{rule:?}");
+                assert!(!rule.calibrated.is_empty(), "{rule:?}");
+                // The name ends in the unit of a time, so that code reads right.
+                assert_eq!(rule.name.ends_with("-s"), rule.unit == "s", "{rule:?}");
+            }
+        }
     }
 
     #[test]
-    fn a_rule_is_said_once_and_serves_code_and_page() {
-        assert_eq!(RULES.most, 3);
-        let book = RULES.book();
+    fn the_words_of_a_rule_are_its_documentation() {
+        let book = crate::residual::RULES.book();
+        let least = book
+            .rules
+            .iter()
+            .find(|r| r.name == "least-excess")
+            .unwrap();
         assert_eq!(
-            (book.room, book.about.as_str()),
-            ("example", "What the tests decide.")
+            least.value,
+            Value::Number(crate::residual::RULES.least_excess)
         );
-        let rule = &book.rules[0];
-        assert_eq!(rule.name, "least-share");
-        assert_eq!(rule.meaning, "Less than this is nothing.");
-        assert_eq!(rule.value, Value::Number(0.5));
-        let values: Vec<String> = book.rules.iter().map(|r| r.value.to_string()).collect();
-        assert_eq!(values, ["0.5", "0.1, 0.2", "3"]);
+        assert_eq!(
+            least.meaning,
+            "… and is at least this share of the noise energy: `y_sd` is not known better."
+        );
+        let values = [Value::from(3_usize), 0.5.into(), [0.1, 0.2].into()];
+        assert_eq!(values.map(|v| v.to_string()), ["3", "0.5", "0.1, 0.2"]);
     }
 }

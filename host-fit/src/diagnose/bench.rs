@@ -7,7 +7,7 @@ use super::{DiagnoseError, NotTried, Rung};
 use crate::data::Record;
 use crate::fit::{Fit, FitOptions, fit, fit_with_effect, lean_base, pieces};
 use crate::model::Model;
-use crate::residual::{NoiseSource, examine, noise_floor};
+use crate::residual::{FailureCoordinate, NoiseSource, examine, noise_floor};
 use crate::simulate::SimulateError;
 use model_core::effect::{Place, Spec};
 use rayon::prelude::*;
@@ -388,6 +388,7 @@ impl<'a> Bench<'a> {
         failures
             .by
             .iter()
-            .any(|place| place.coordinate != "frequency" && place.explained_fraction > DEPENDS)
+            .filter(|place| place.coordinate != FailureCoordinate::FrequencyBand)
+            .any(|place| place.explained_fraction > DEPENDS)
     }
 }

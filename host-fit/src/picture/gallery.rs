@@ -153,7 +153,7 @@ fn pictures() -> Vec<(&'static str, String)> {
     let (clock, frequency) = (bins(&time, 2, 0.004), bins(&bands, 3, 0.05));
     let channel = bins(&[9.8, 9.9, 9.95, 10.0, 10.05, 10.1, 10.2], 0, 0.003);
     let view = |coordinate, unit, share, bins| FailureView {
-        coordinate,
+        coordinate: str::to_owned(coordinate),
         unit,
         explained_fraction: Some(share),
         bins,

@@ -22,10 +22,10 @@ pub struct FailureBin {
 }
 
 /// The residual along one coordinate.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct FailureView<'a> {
     /// What the coordinate is, for example `"time since rising edge"`.
-    pub coordinate: &'a str,
+    pub coordinate: String,
     /// Its unit; empty for none.
     pub unit: &'a str,
     /// Share of the excess error the coordinate explains, cross-validated, 0 to 1.
@@ -157,7 +157,7 @@ fn title(canvas: &mut Canvas<'_>, panel: &Panel, view: &FailureView<'_>) {
         room -= text_width(&text, 13.5) + 10.0;
     }
     let name = match view.unit {
-        "" => view.coordinate.to_owned(),
+        "" => view.coordinate.clone(),
         unit => format!("{} ({unit})", view.coordinate),
     };
     let name = fit(&name, 14.5, room);
@@ -242,7 +242,7 @@ mod tests {
         let bins = [bin(0.0, 0.02), bin(10.0, 0.09), bin(20.0, 0.03)];
         let svg = where_it_fails(&WhereItFails {
             views: &[FailureView {
-                coordinate: "time since rising edge",
+                coordinate: "time since rising edge".to_owned(),
                 unit: "ms",
                 explained_fraction: Some(0.74),
                 bins: &bins,
@@ -287,13 +287,13 @@ mod tests {
                 })
                 .collect();
             let view = FailureView {
-                coordinate: "<u>",
+                coordinate: "<u>".to_owned(),
                 unit: "&",
                 explained_fraction: values.first().copied(),
                 bins: &bins,
             };
             check(&where_it_fails(&WhereItFails {
-                views: &[view; 3],
+                views: &std::array::from_fn::<_, 3, _>(|_| view.clone()),
                 ..WhereItFails::default()
             }));
         }

@@ -1,349 +1,202 @@
-//! The coordinates along which a residual is split.
+//! What an error can be split along.
+
+use serde::ser::{Serialize, SerializeMap, Serializer};
+use std::fmt;
 
 use super::rules::RULES;
-use crate::data::Record;
+use crate::picture::significant;
 
-/// Names of slow coordinates begin so, besides those of long windows.
-const SLOW: [&str; 3] = ["time in the record", "pulse number", "channel "];
-
-/// How a coordinate is learned on some samples and tested on others.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Folds {
-    /// Half-second blocks in turn: the coordinate comes back within a record.
-    Blocks,
-    /// Whole records: what happens at one time in one record only is no
-    /// function of time.
-    Records,
+/// A coordinate along which the error of a free run is split.
+///
+/// Serialises to the keys `coordinate` (its name, as [`Display`](fmt::Display) writes it) and `unit`.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FailureCoordinate {
+    /// Time since the last rise of the command, s.
+    SinceRisingEdge,
+    /// Time since the last fall of the command, s.
+    SinceFallingEdge,
+    /// The model's output, y.
+    LevelOfY,
+    /// The command, u; for graded commands.
+    LevelOfU,
+    /// Rate of change of the model's output, y/s; for graded commands.
+    RateOfY,
+    /// Share of the last so many seconds in which the valve was open.
+    Blowing {
+        /// How far back, s.
+        window_s: f64,
+    },
+    /// Mean of the command over the last so many seconds; for graded commands.
+    MeanInput {
+        /// How far back, s.
+        window_s: f64,
+    },
+    /// Time since the record began, s.
+    TimeInRecord,
+    /// A measured channel, in its own unit.
+    Channel(
+        /// Its column.
+        String,
+    ),
+    /// Number of the pulse that the flow feels, from 1.
+    PulseNumber,
+    /// That number modulo a cycle.
+    PulseInCycle {
+        /// Pulses of a cycle, at least 2.
+        cycle: usize,
+    },
+    /// The error's own frequency, Hz: says what the error is like, not what it depends on.
+    FrequencyBand,
 }
 
-/// One coordinate over all records.
-#[derive(Clone, Debug)]
-pub(super) struct Coordinate {
-    pub(super) name: String,
-    /// Unit; empty for none.
-    pub(super) unit: &'static str,
-    pub(super) folds: Folds,
-    /// Bin of every sample, per record; none where the coordinate has no value.
-    pub(super) bin: Vec<Vec<Option<u16>>>,
-    /// Ends of the bins.
-    pub(super) ranges: Vec<(f64, f64)>,
-    /// n, for the pulse number modulo n.
-    pub(super) cycle: Option<usize>,
-    /// Whether it changes slower than y, so that a gain may follow it: the error
-    /// may then be a proportion of y that depends on it.
-    pub(super) slow: bool,
-    /// For the time since an edge: ln of the dwell before it, in samples.
-    pub(super) dwell: Option<Vec<Vec<f64>>>,
+impl FailureCoordinate {
+    /// Unit of its values; empty for a pure number and for channels.
+    #[must_use]
+    pub fn unit(&self) -> &'static str {
+        match self {
+            Self::SinceRisingEdge | Self::SinceFallingEdge | Self::TimeInRecord => "s",
+            Self::LevelOfY => "y",
+            Self::LevelOfU => "u",
+            Self::RateOfY => "y/s",
+            Self::FrequencyBand => "Hz",
+            Self::Blowing { .. }
+            | Self::MeanInput { .. }
+            | Self::Channel(_)
+            | Self::PulseNumber
+            | Self::PulseInCycle { .. } => "",
+        }
+    }
+
+    /// Whether it changes slower than y, so that a gain may follow it: the error may then be a proportion of y that
+    /// depends on it.
+    #[must_use]
+    pub fn is_slow(&self) -> bool {
+        match self {
+            Self::TimeInRecord
+            | Self::Channel(_)
+            | Self::PulseNumber
+            | Self::PulseInCycle { .. } => true,
+            Self::Blowing { window_s } | Self::MeanInput { window_s } => {
+                *window_s >= RULES.slow_window_s
+            }
+            Self::SinceRisingEdge
+            | Self::SinceFallingEdge
+            | Self::LevelOfY
+            | Self::LevelOfU
+            | Self::RateOfY
+            | Self::FrequencyBand => false,
+        }
+    }
+
+    /// Whether it is the place of a pulse in a cycle.
+    #[must_use]
+    pub fn is_cycle(&self) -> bool {
+        matches!(self, Self::PulseInCycle { .. })
+    }
+
+    /// Whether the edges it counts from are the rising ones; none for coordinates that count from no edge.
+    #[must_use]
+    pub fn counts_from_rising(&self) -> Option<bool> {
+        match self {
+            Self::SinceRisingEdge => Some(true),
+            Self::SinceFallingEdge => Some(false),
+            _ => None,
+        }
+    }
+
+    /// A stretch of it in words, for example `within 80 ms after rising edges`.
+    #[must_use]
+    pub fn stretch(&self, from: f64, to: f64) -> String {
+        let (low, high) = (significant(from, 3), significant(to, 3));
+        match self {
+            Self::SinceRisingEdge => after_edges("rising", from, to),
+            Self::SinceFallingEdge => after_edges("falling", from, to),
+            Self::LevelOfY => format!("at y between {low} and {high}"),
+            Self::TimeInRecord => format!("between {low} and {high} s into the records"),
+            Self::FrequencyBand => format!("between {low} and {high} Hz"),
+            Self::PulseNumber => format!("between pulses {low} and {high} of the records"),
+            Self::PulseInCycle { cycle } => {
+                // Remainder 0 stands for the last pulse of a cycle.
+                let n = *cycle as f64;
+                let first = if from == 0.0 { n } else { from };
+                format!(
+                    "at one pulse in {cycle} (numbers {first}, {}, {} …)",
+                    first + n,
+                    first + 2.0 * n
+                )
+            }
+            Self::LevelOfU
+            | Self::RateOfY
+            | Self::Blowing { .. }
+            | Self::MeanInput { .. }
+            | Self::Channel(_) => format!("at {self} between {low} and {high}"),
+        }
+    }
 }
 
-/// What the coordinates are made from; samples before `warm_up` are not judged.
-pub(super) struct Source<'a> {
-    pub(super) records: &'a [&'a Record],
-    /// y_sim per record.
-    pub(super) simulated: &'a [Vec<f64>],
-    pub(super) warm_up: usize,
-    /// Samples from the command to the flow.
-    pub(super) delay: usize,
-}
-
-/// Every coordinate that the records have.
-pub(super) fn coordinates(source: &Source<'_>) -> Vec<Coordinate> {
-    let period = source.records.first().map_or(1.0, |r| r.sample_period_s);
-    let each = |values: &dyn Fn(&Record) -> Vec<f64>| -> Vec<Vec<f64>> {
-        source.records.iter().map(|r| values(r)).collect()
-    };
-    let time_folds = if source.records.len() > 1 {
-        Folds::Records
+fn after_edges(which: &str, from: f64, to: f64) -> String {
+    let milliseconds = |s: f64| significant(1000.0 * s, 3);
+    let to = milliseconds(to);
+    if from <= 0.0 {
+        format!("within {to} ms after {which} edges")
     } else {
-        Folds::Blocks
-    };
-    let mut all = Vec::new();
-    let switches = source.records.iter().all(|r| has_edges(&r.u));
-    if switches {
-        let since = |rising| each(&|r| since_edge(&r.u, rising, period));
-        for (name, rising) in [
-            ("time since rising edge", true),
-            ("time since falling edge", false),
-        ] {
-            let found = binned(source, name, "s", Folds::Blocks, &since(rising));
-            all.extend(found.map(|found| Coordinate {
-                dwell: Some(each(&|r| dwell_before_edge(&r.u, rising))),
-                ..found
-            }));
+        format!("{} to {to} ms after {which} edges", milliseconds(from))
+    }
+}
+
+impl fmt::Display for FailureCoordinate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::SinceRisingEdge => f.write_str("time since rising edge"),
+            Self::SinceFallingEdge => f.write_str("time since falling edge"),
+            Self::LevelOfY => f.write_str("level of y"),
+            Self::LevelOfU => f.write_str("level of u"),
+            Self::RateOfY => f.write_str("rate of change of y"),
+            Self::Blowing { window_s } => write!(f, "blowing in the last {window_s} s"),
+            Self::MeanInput { window_s } => write!(f, "mean input over the last {window_s} s"),
+            Self::TimeInRecord => f.write_str("time in the record"),
+            Self::Channel(name) => write!(f, "channel {name}"),
+            Self::PulseNumber => f.write_str("pulse number"),
+            Self::PulseInCycle { cycle } => write!(f, "pulse number modulo {cycle}"),
+            Self::FrequencyBand => f.write_str("frequency band"),
         }
     }
-    let mut add = |name: &str, unit, folds, values: Vec<Vec<f64>>| {
-        all.extend(binned(source, name, unit, folds, &values));
-    };
-    add("level of y", "y", Folds::Blocks, source.simulated.to_vec());
-    let on_off = source.records.iter().all(|r| r.is_on_off());
-    if !on_off {
-        add("level of u", "u", Folds::Blocks, each(&|r| r.u.clone()));
-        let slope = |sim: &Vec<f64>| {
-            let mut slope = vec![0.0];
-            slope.extend(sim.windows(2).map(|pair| (pair[1] - pair[0]) / period));
-            slope
-        };
-        let slopes = source.simulated.iter().map(slope).collect();
-        add("rate of change of y", "y/s", Folds::Blocks, slopes);
-    }
-    for window in RULES.windows_s {
-        let samples = (window / period).round().max(1.0) as usize;
-        if source.records.iter().any(|r| r.len() > 2 * samples) {
-            let name = if on_off {
-                format!("blowing in the last {window} s")
-            } else {
-                format!("mean input over the last {window} s")
-            };
-            let mean = each(&|r| moving_mean(&r.u, samples));
-            add(&name, "", Folds::Blocks, mean);
-        }
-    }
-    let time = each(&|r| (0..r.len()).map(|k| k as f64 * period).collect());
-    add("time in the record", "s", time_folds, time);
-    let channels = source.records.first().map(|r| r.channels.keys());
-    for channel in channels.into_iter().flatten() {
-        if source
-            .records
-            .iter()
-            .all(|r| r.channels.contains_key(channel))
-        {
-            let values = each(&|r| r.channels.get(channel).cloned().unwrap_or_default());
-            add(&format!("channel {channel}"), "", Folds::Blocks, values);
-        }
-    }
-    if switches {
-        let numbers = each(&|r| pulse_number(&r.u, source.delay));
-        add("pulse number", "", time_folds, numbers.clone());
-        for cycle in 2..=RULES.longest_cycle {
-            all.push(modulo(source, &numbers, cycle));
-        }
-    }
-    for coordinate in &mut all {
-        let name = &coordinate.name;
-        coordinate.slow |= SLOW.iter().any(|slow| name.starts_with(slow))
-            || RULES.windows_s[1..]
-                .iter()
-                .any(|w| name.ends_with(&format!("last {w} s")));
-    }
-    all
 }
 
-/// Whether the input is piecewise constant.
-fn has_edges(u: &[f64]) -> bool {
-    let changes = u.windows(2).filter(|pair| pair[0] != pair[1]).count();
-    changes > 0 && (changes as f64) < RULES.most_changes * u.len() as f64
-}
-
-/// Time since the last rise (or fall) of the input; NaN before the first.
-pub(super) fn since_edge(u: &[f64], rising: bool, period: f64) -> Vec<f64> {
-    let mut before = 0.0;
-    let mut last = None;
-    let mut since = Vec::with_capacity(u.len());
-    for (k, now) in u.iter().enumerate() {
-        if (rising && *now > before) || (!rising && *now < before) {
-            last = Some(k);
-        }
-        before = *now;
-        since.push(last.map_or(f64::NAN, |edge| (k - edge) as f64 * period));
+impl Serialize for FailureCoordinate {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(2))?;
+        map.serialize_entry("coordinate", &self.to_string())?;
+        map.serialize_entry("unit", self.unit())?;
+        map.end()
     }
-    since
-}
-
-/// ln of the samples between the last rise (or fall) of the input and the edge
-/// before it; 0 before the first.
-fn dwell_before_edge(u: &[f64], rising: bool) -> Vec<f64> {
-    let (mut before, mut edge, mut dwell) = (0.0, 0, 0.0);
-    u.iter()
-        .enumerate()
-        .map(|(k, now)| {
-            if *now != before {
-                if (*now > before) == rising {
-                    dwell = f64::ln((k - edge).max(1) as f64);
-                }
-                edge = k;
-            }
-            before = *now;
-            dwell
-        })
-        .collect()
-}
-
-/// Mean of the last `samples` inputs; before the record the input was 0.
-fn moving_mean(u: &[f64], samples: usize) -> Vec<f64> {
-    let mut sum = 0.0;
-    u.iter()
-        .enumerate()
-        .map(|(k, now)| {
-            sum += now;
-            if let Some(old) = k.checked_sub(samples) {
-                sum -= u[old];
-            }
-            sum / samples as f64
-        })
-        .collect()
-}
-
-/// Number of the pulse that the flow feels, from 1; NaN before the first.
-fn pulse_number(u: &[f64], delay: usize) -> Vec<f64> {
-    let mut before = 0.0;
-    let mut count = 0.0;
-    let mut numbers = vec![f64::NAN; delay.min(u.len())];
-    for now in u {
-        if *now > before {
-            count += 1.0;
-        }
-        before = *now;
-        numbers.push(if count > 0.0 { count } else { f64::NAN });
-    }
-    numbers.truncate(u.len());
-    numbers
-}
-
-fn modulo(source: &Source<'_>, numbers: &[Vec<f64>], cycle: usize) -> Coordinate {
-    let class = |number: &f64| {
-        number
-            .is_finite()
-            .then(|| (*number as usize % cycle) as u16)
-    };
-    let mut bin: Vec<Vec<Option<u16>>> = numbers
-        .iter()
-        .map(|record| record.iter().map(class).collect())
-        .collect();
-    blank(&mut bin, source.warm_up);
-    Coordinate {
-        name: format!("pulse number modulo {cycle}"),
-        unit: "",
-        folds: Folds::Blocks,
-        bin,
-        ranges: (0..cycle).map(|c| (c as f64, c as f64)).collect(),
-        cycle: Some(cycle),
-        slow: true,
-        dwell: None,
-    }
-}
-
-fn blank(bin: &mut [Vec<Option<u16>>], warm_up: usize) {
-    for record in bin {
-        record.iter_mut().take(warm_up).for_each(|b| *b = None);
-    }
-}
-
-/// Leaves out bins that one record alone reaches: they would name the record,
-/// not the coordinate.
-fn keep_shared(bin: &mut [Vec<Option<u16>>], bins: usize) {
-    let mut reached = vec![0; bins];
-    for record in bin.iter() {
-        let mut here = vec![false; bins];
-        for b in record.iter().flatten() {
-            here[usize::from(*b)] = true;
-        }
-        for (count, here) in reached.iter_mut().zip(here) {
-            *count += usize::from(here);
-        }
-    }
-    for b in bin.iter_mut().flatten() {
-        *b = b.filter(|b| reached[usize::from(*b)] > 1);
-    }
-}
-
-/// Bins with about equally many samples; `None` for a coordinate without spread.
-fn binned(
-    source: &Source<'_>,
-    name: &str,
-    unit: &'static str,
-    folds: Folds,
-    values: &[Vec<f64>],
-) -> Option<Coordinate> {
-    let mut sorted: Vec<f64> = values
-        .iter()
-        .flat_map(|record| record.iter().skip(source.warm_up))
-        .copied()
-        .filter(|v| v.is_finite())
-        .collect();
-    sorted.sort_by(f64::total_cmp);
-    let (low, high) = (*sorted.first()?, *sorted.last()?);
-    if high - low <= 1e-12 * high.abs().max(low.abs()) {
-        return None;
-    }
-    // Limits with few digits, so that sentences and axes read well.
-    let step = 10f64.powf(((high - low) / 500.0).log10().floor());
-    let tidy = |value: f64| (value / step).round() * step;
-    let mut limits: Vec<f64> = (1..RULES.bins)
-        .filter_map(|i| sorted.get(i * sorted.len() / RULES.bins))
-        .map(|value| tidy(*value))
-        .filter(|limit| *limit > low && *limit < high)
-        .collect();
-    limits.dedup_by(|a, b| (*a - *b).abs() < 0.5 * step);
-    let edges: Vec<f64> = [&[low][..], &limits, &[high]].concat();
-    let ranges: Vec<(f64, f64)> = edges.windows(2).map(|pair| (pair[0], pair[1])).collect();
-    let place = |value: &f64| {
-        value
-            .is_finite()
-            .then(|| limits.partition_point(|limit| limit <= value) as u16)
-    };
-    let mut bin: Vec<Vec<Option<u16>>> = values
-        .iter()
-        .map(|record| record.iter().map(place).collect())
-        .collect();
-    blank(&mut bin, source.warm_up);
-    if folds == Folds::Records {
-        keep_shared(&mut bin, ranges.len());
-    }
-    (ranges.len() > 1).then(|| Coordinate {
-        name: name.to_owned(),
-        unit,
-        folds,
-        bin,
-        ranges,
-        cycle: None,
-        slow: false,
-        dwell: None,
-    })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::data::Use;
+    use super::FailureCoordinate as C;
 
     #[test]
-    fn time_since_edges_pulse_numbers_and_past_blowing() {
-        let u = [0.0, 1.0, 1.0, 0.0, 0.0, 1.0];
-        let rising = since_edge(&u, true, 0.5);
-        assert!(rising[0].is_nan());
-        assert_eq!(rising[1..], [0.0, 0.5, 1.0, 1.5, 0.0]);
-        let falling = since_edge(&u, false, 0.5);
-        assert!(falling[..3].iter().all(|t| t.is_nan()));
-        assert_eq!(falling[3..], [0.0, 0.5, 1.0]);
-        let felt = pulse_number(&u, 1);
-        assert!(felt[..2].iter().all(|n| n.is_nan()));
-        assert_eq!(felt[2..], [1.0, 1.0, 1.0, 1.0]);
-        assert_eq!(moving_mean(&u, 2), [0.0, 0.5, 1.0, 0.5, 0.0, 0.5]);
-    }
-
-    #[test]
-    fn bins_hold_about_equally_many_samples_and_cover_the_range() {
-        let u: Vec<f64> = (0..4000).map(|k| f64::from((k / 50) % 2)).collect();
-        let record = Record::new("r", Use::Validate, 0.001, u, vec![0.0; 4000]);
-        let simulated: Vec<f64> = (0..4000).map(|k| (f64::from(k) * 0.1).sin()).collect();
-        let source = Source {
-            records: &[&record],
-            simulated: &[simulated],
-            warm_up: 0,
-            delay: 3,
-        };
-        let all = coordinates(&source);
-        let level = all.iter().find(|c| c.name == "level of y").unwrap();
-        assert_eq!(level.ranges.len(), RULES.bins);
-        for bin in 0..RULES.bins {
-            let count = level.bin[0]
-                .iter()
-                .filter(|b| **b == Some(bin as u16))
-                .count();
-            assert!((80..220).contains(&count), "{count}");
-        }
-        assert!(level.ranges.windows(2).all(|pair| pair[0].1 == pair[1].0));
-        assert!(!all.iter().any(|c| c.name.ends_with("4 s")), "too short");
+    fn names_and_stretches_read_well() {
+        let long = C::Blowing { window_s: 4.0 };
+        assert_eq!(long.to_string(), "blowing in the last 4 s");
+        assert!(long.is_slow() && !C::Blowing { window_s: 0.25 }.is_slow());
+        assert_eq!(
+            long.stretch(0.25, 1.0),
+            "at blowing in the last 4 s between 0.25 and 1"
+        );
+        let rising = C::SinceRisingEdge;
+        assert_eq!(rising.stretch(0.0, 0.08), "within 80 ms after rising edges");
+        assert_eq!(rising.stretch(0.02, 0.08), "20 to 80 ms after rising edges");
+        let third = C::PulseInCycle { cycle: 3 };
+        assert_eq!(
+            third.stretch(0.0, 0.0),
+            "at one pulse in 3 (numbers 3, 6, 9 …)"
+        );
+        let json = serde_json::to_value(C::Channel("u_inf".into())).unwrap();
+        assert_eq!(
+            json,
+            serde_json::json!({"coordinate": "channel u_inf", "unit": ""})
+        );
     }
 }

@@ -1,7 +1,7 @@
 //! How much of an error is a function of a coordinate: learned on some samples,
 //! tested on others.
 
-use super::coordinate::{Coordinate, Folds};
+use super::binned::{Binned, Folds};
 use super::rules::RULES;
 use crate::fit::dot;
 use std::collections::BTreeMap;
@@ -69,7 +69,7 @@ impl Errors {
         .sum()
     }
 
-    fn samples(&self, coordinate: &Coordinate) -> Vec<Sample> {
+    fn samples(&self, binned: &Binned) -> Vec<Sample> {
         let mut samples = Vec::new();
         let mut blocks = 0;
         for record in 0..self.residual.len() {
@@ -79,16 +79,16 @@ impl Errors {
                 let of_record = k / block;
                 let residual = self.residual[record][k];
                 samples.push(Sample {
-                    fold: match coordinate.folds {
+                    fold: match binned.folds {
                         Folds::Blocks => (of_record + record) % RULES.turns,
                         Folds::Records => record,
                     },
                     block: blocks + of_record,
-                    bin: coordinate.bin[record][k].map(usize::from),
+                    bin: binned.bin[record][k].map(usize::from),
                     residual,
                     covariates: [
                         self.simulated[record][k],
-                        coordinate.dwell.as_ref().map_or(0.0, |d| d[record][k]),
+                        binned.dwell.as_ref().map_or(0.0, |d| d[record][k]),
                     ],
                     excess: residual * residual - self.noise[record][k],
                 });
@@ -155,18 +155,15 @@ impl Moments {
 
 /// The share of the excess error that is a function of the coordinate; none
 /// when it is not beyond chance.
-pub(super) fn explained(errors: &Errors, coordinate: &Coordinate, excess: f64) -> Option<Share> {
-    let samples = errors.samples(coordinate);
-    let by_y = gains(&samples, coordinate, excess, 0)?;
+pub(super) fn explained(errors: &Errors, binned: &Binned, excess: f64) -> Option<Share> {
+    let samples = errors.samples(binned);
+    let by_y = gains(&samples, binned, excess, 0)?;
     let mut ways = vec![(Dependence::Mean, by_y[0]), (Dependence::Size, by_y[2])];
-    if coordinate.slow {
+    if binned.coordinate.is_slow() {
         ways.push((Dependence::Proportion, by_y[1]));
     }
-    if coordinate.dwell.is_some() {
-        ways.push((
-            Dependence::Dwell,
-            gains(&samples, coordinate, excess, 1)?[1],
-        ));
+    if binned.dwell.is_some() {
+        ways.push((Dependence::Dwell, gains(&samples, binned, excess, 1)?[1]));
     }
     let mut best: Option<Share> = None;
     for (dependence, gain) in ways {
@@ -183,14 +180,9 @@ pub(super) fn explained(errors: &Errors, coordinate: &Coordinate, excess: f64) -
 
 /// Energy that knowing the coordinate takes off the error: by mean, by line in
 /// the covariate, by size.
-fn gains(
-    samples: &[Sample],
-    coordinate: &Coordinate,
-    excess: f64,
-    covariate: usize,
-) -> Option<[f64; 3]> {
+fn gains(samples: &[Sample], binned: &Binned, excess: f64, covariate: usize) -> Option<[f64; 3]> {
     let folds = samples.iter().map(|s| s.fold + 1).max()?;
-    let bins = coordinate.ranges.len();
+    let bins = binned.ranges.len();
     let mut by_bin = vec![vec![Moments::default(); bins]; folds];
     let mut overall = vec![Moments::default(); folds];
     for sample in samples {
@@ -216,7 +208,7 @@ fn gains(
             gains[sample.block] += gain;
         }
     }
-    Some(match coordinate.folds {
+    Some(match binned.folds {
         Folds::Blocks => gains.map(|gains| beyond_chance(&gains, RULES.share_standard_errors)),
         // A single event per record has no steady mean; that it comes at the
         // same place in most records is the evidence.

@@ -1,6 +1,7 @@
 //! Where a model fails: its free-run error on held-out records, split along one
 //! coordinate after another and judged against the noise.
 
+mod binned;
 mod coordinate;
 mod explained;
 mod noise;
@@ -11,6 +12,7 @@ mod spectrum;
 mod trend;
 mod words;
 
+pub use coordinate::FailureCoordinate;
 pub use explained::Dependence;
 pub use noise::NoiseSource;
 pub use rules::{RULES, Rules};
@@ -20,17 +22,16 @@ use crate::data::{Record, Use};
 use crate::model::Model;
 use crate::picture::{FailureBin, FailureView};
 use crate::simulate::SimulateError;
-use coordinate::{Coordinate, Source, coordinates};
+use binned::{Binned, Source, coordinates};
 use explained::{Errors, beyond_chance, explained};
 use serde::Serialize;
 
 /// The error along one coordinate. Serialises to the keys of `compare --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Where {
-    /// What the coordinate is, for example `time since rising edge`.
-    pub coordinate: String,
-    /// Unit of `worst_from` and `worst_to`; empty for none.
-    pub unit: &'static str,
+    /// The coordinate; its unit is that of `worst_from` and `worst_to`.
+    #[serde(flatten)]
+    pub coordinate: FailureCoordinate,
     /// Share of the excess error energy Σ(e² − σ²) that is a function of the
     /// coordinate, cross-validated, 0–1; 0 unless beyond chance.
     pub explained_fraction: f64,
@@ -95,8 +96,8 @@ impl Failures {
         let view = |found| {
             let found: &Where = found;
             FailureView {
-                coordinate: &found.coordinate,
-                unit: found.unit,
+                coordinate: found.coordinate.to_string(),
+                unit: found.coordinate.unit(),
                 explained_fraction: Some(found.explained_fraction),
                 bins: &found.bins,
             }
@@ -169,22 +170,23 @@ pub fn examine(
     let excess = errors.excess().max(f64::MIN_POSITIVE);
     let mut by: Vec<Where> = Vec::new();
     let mut cycles: Vec<Where> = Vec::new();
-    for coordinate in coordinates(&source) {
-        let found = along(&errors, &coordinate, excess, above_noise);
-        if coordinate.cycle.is_some() {
+    for binned in coordinates(&source) {
+        let found = along(&errors, &binned, excess, above_noise);
+        if found.coordinate.is_cycle() {
             cycles.push(found);
         } else {
             by.push(found);
         }
     }
     by.extend(shortest_cycle(cycles));
-    let share = |name: &str| {
+    let share = |coordinate: FailureCoordinate| {
         by.iter()
-            .find(|w| w.coordinate == name)
+            .find(|w| w.coordinate == coordinate)
             .map_or(0.0, |w| w.explained_fraction)
     };
-    if share("pulse number") <= RULES.pulses_are_a_clock * share("time in the record") {
-        by.retain(|w| w.coordinate != "pulse number");
+    let by_time = share(FailureCoordinate::TimeInRecord);
+    if share(FailureCoordinate::PulseNumber) <= RULES.pulses_are_a_clock * by_time {
+        by.retain(|w| w.coordinate != FailureCoordinate::PulseNumber);
     }
     if above_noise {
         by.extend(spectrum::by_frequency(&errors, excess));
@@ -277,10 +279,10 @@ impl Tally {
     }
 }
 
-fn along(errors: &Errors, coordinate: &Coordinate, excess: f64, above_noise: bool) -> Where {
-    let mut tallies = vec![Tally::default(); coordinate.ranges.len()];
+fn along(errors: &Errors, binned: &Binned, excess: f64, above_noise: bool) -> Where {
+    let mut tallies = vec![Tally::default(); binned.ranges.len()];
     let mut samples = 0.0;
-    for (record, bins) in coordinate.bin.iter().enumerate() {
+    for (record, bins) in binned.bin.iter().enumerate() {
         for (k, bin) in bins.iter().enumerate().skip(errors.warm_up) {
             samples += 1.0;
             if let Some(bin) = bin {
@@ -294,11 +296,11 @@ fn along(errors: &Errors, coordinate: &Coordinate, excess: f64, above_noise: boo
         }
     }
     let share = if above_noise {
-        explained(errors, coordinate, excess)
+        explained(errors, binned, excess)
     } else {
         None
     };
-    let bins = coordinate
+    let bins = binned
         .ranges
         .iter()
         .zip(&tallies)
@@ -309,18 +311,17 @@ fn along(errors: &Errors, coordinate: &Coordinate, excess: f64, above_noise: boo
             noise_rmse: tally.rms(tally.noise),
         })
         .collect();
-    let (first, last, worst) = worst(&tallies, samples, coordinate.cycle.is_some());
+    let (first, last, worst) = worst(&tallies, samples, binned.coordinate.is_cycle());
     Where {
-        coordinate: coordinate.name.clone(),
-        unit: coordinate.unit,
+        coordinate: binned.coordinate.clone(),
         explained_fraction: share.map_or(0.0, |s| s.fraction),
-        worst_from: coordinate.ranges[first].0,
-        worst_to: coordinate.ranges[last].1,
+        worst_from: binned.ranges[first].0,
+        worst_to: binned.ranges[last].1,
         worst_rmse: worst.rms(worst.square),
         bias: worst.error / worst.count.max(1.0),
         dependence: share.map(|s| s.dependence),
         concentration: above_noise
-            .then(|| concentration(&tallies, coordinate, excess, samples))
+            .then(|| concentration(&tallies, &binned.ranges, excess, samples))
             .flatten(),
         trend: None,
         bins,
@@ -353,7 +354,7 @@ fn worst(tallies: &[Tally], samples: f64, single: bool) -> (usize, usize, Tally)
 /// The run of bins with the fewest samples that holds three quarters of the excess.
 fn concentration(
     tallies: &[Tally],
-    coordinate: &Coordinate,
+    ranges: &[(f64, f64)],
     excess: f64,
     samples: f64,
 ) -> Option<Interval> {
@@ -365,8 +366,8 @@ fn concentration(
             if sum.excess() >= RULES.concentration * excess {
                 if best.as_ref().is_none_or(|(count, _)| sum.count < *count) {
                     let interval = Interval {
-                        from: coordinate.ranges[first].0,
-                        to: coordinate.ranges[last].1,
+                        from: ranges[first].0,
+                        to: ranges[last].1,
                         share: (sum.excess() / excess).min(1.0),
                         of_samples: sum.count / samples.max(1.0),
                     };

@@ -1,6 +1,6 @@
 //! Plants with something hidden in them: does the split point at it?
 
-use super::{Failures, where_it_fails};
+use super::{FailureCoordinate, Failures, where_it_fails};
 use crate::data::{Record, Use};
 use crate::fit::lean_base;
 use crate::model::{Delay, Model, Start, Training};
@@ -58,11 +58,12 @@ pub(crate) fn split(effects: &[&str], faults: &[&str], seed: u64) -> Failures {
 fn faults_are_pointed_at() {
     for seed in 100..103 {
         let pulses = split(&[], &["missing-pulse"], seed);
-        assert!(pulses.by[0].coordinate.starts_with("pulse number modulo"));
+        assert!(pulses.by[0].coordinate.is_cycle());
         let frozen = split(&[], &["freezing-sensor"], seed);
-        assert_eq!(frozen.by[0].coordinate, "time in the record", "{seed}");
+        let time = FailureCoordinate::TimeInRecord;
+        assert_eq!(frozen.by[0].coordinate, time, "{seed}");
         let stuck = split(&[], &["sticking-valve"], seed);
-        let falling = |w: &&super::Where| w.coordinate == "time since falling edge";
+        let falling = |w: &&super::Where| w.coordinate == FailureCoordinate::SinceFallingEdge;
         let falling = stuck.by.iter().find(falling).expect("the coordinate");
         assert!(
             falling.explained_fraction > 0.8 * stuck.by[0].explained_fraction,
@@ -120,7 +121,8 @@ fn pure_noise_explains_nothing() {
         let found = super::examine(&noisy, runs.clone(), 0, 40);
         assert!(found.above_noise, "four times the stated noise");
         // Coloured noise is in a band of its own: that much is true.
-        let other = found.by.iter().filter(|w| w.coordinate != "frequency band");
+        let itself = FailureCoordinate::FrequencyBand;
+        let other = found.by.iter().filter(|w| w.coordinate != itself);
         coordinates += other.clone().count();
         alarms += other.filter(|w| w.explained_fraction > 0.05).count();
     }

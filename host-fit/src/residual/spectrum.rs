@@ -1,5 +1,6 @@
 //! The excess error by frequency band.
 
+use super::coordinate::FailureCoordinate;
 use super::explained::Errors;
 use super::rules::RULES;
 use super::{Interval, Where};
@@ -101,8 +102,7 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
     let worst = (0..bands).max_by(|a, b| surplus(a).total_cmp(&surplus(b)))?;
     let share = (sum(&|p| p.error[worst]) - floor[worst]) / excess;
     Some(Where {
-        coordinate: "frequency band".to_owned(),
-        unit: "Hz",
+        coordinate: FailureCoordinate::FrequencyBand,
         explained_fraction: fraction.min(1.0),
         worst_from: bins[worst].from,
         worst_to: bins[worst].to,

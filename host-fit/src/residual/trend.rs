@@ -22,11 +22,7 @@ pub(super) fn from_edge_to_edge(
     records: &[&Record],
     found: &Where,
 ) -> Option<Trend> {
-    let rising = match found.coordinate.as_str() {
-        "time since rising edge" => true,
-        "time since falling edge" => false,
-        _ => return None,
-    };
+    let rising = found.coordinate.counts_from_rising()?;
     if found.explained_fraction == 0.0 {
         return None;
     }

@@ -1,5 +1,6 @@
 //! The split of an error, read out in plain language.
 
+use super::coordinate::FailureCoordinate;
 use super::rules::RULES;
 use super::{Dependence, Failures, NoiseSource, Where};
 
@@ -53,12 +54,14 @@ impl Failures {
 /// What one coordinate says.
 fn sentence(found: &Where) -> String {
     let explained = percent(found.explained_fraction);
+    let coordinate = &found.coordinate;
     let mut text = match found.concentration {
         Some(held)
-            if held.share > RULES.worth_saying_interval * held.of_samples && !is_cycle(found) =>
+            if held.share > RULES.worth_saying_interval * held.of_samples
+                && !coordinate.is_cycle() =>
         {
-            let place = place(found, held.from, held.to);
-            let more = if found.unit == "Hz" {
+            let place = coordinate.stretch(held.from, held.to);
+            let more = if *coordinate == FailureCoordinate::FrequencyBand {
                 format!("{} of y's own energy", percent(held.of_samples))
             } else {
                 format!("{} of the time", percent(held.of_samples))
@@ -70,7 +73,7 @@ fn sentence(found: &Where) -> String {
         }
         _ => format!(
             "The error is worst {}, {} in y rms",
-            place(found, found.worst_from, found.worst_to),
+            coordinate.stretch(found.worst_from, found.worst_to),
             number(found.worst_rmse)
         ),
     };
@@ -100,60 +103,7 @@ fn sentence(found: &Where) -> String {
         Some(Dependence::Dwell) => ", together with the dwell before the edge",
         Some(Dependence::Mean) | None => "",
     };
-    format!(
-        "{text}. The {} explains {explained} of the excess{how}.",
-        found.coordinate
-    )
-}
-
-fn is_cycle(found: &Where) -> bool {
-    found.coordinate.starts_with("pulse number modulo")
-}
-
-/// A stretch of a coordinate in words.
-fn place(found: &Where, from: f64, to: f64) -> String {
-    let name = found.coordinate.as_str();
-    let milliseconds = |s: f64| number(1000.0 * s);
-    let within = |what: &str| {
-        if from <= 0.0 {
-            format!("within {} ms after {what} edges", milliseconds(to))
-        } else {
-            format!(
-                "{} to {} ms after {what} edges",
-                milliseconds(from),
-                milliseconds(to)
-            )
-        }
-    };
-    match name {
-        "time since rising edge" => within("rising"),
-        "time since falling edge" => within("falling"),
-        "level of y" => format!("at y between {} and {}", number(from), number(to)),
-        "time in the record" => format!(
-            "between {} and {} s into the records",
-            number(from),
-            number(to)
-        ),
-        "frequency band" => format!("between {} and {} Hz", number(from), number(to)),
-        "pulse number" => format!(
-            "between pulses {} and {} of the records",
-            number(from),
-            number(to)
-        ),
-        _ => match name.strip_prefix("pulse number modulo ") {
-            Some(cycle) => {
-                // Remainder 0 stands for the last pulse of a cycle.
-                let n = cycle.parse().unwrap_or(0.0);
-                let first = if from == 0.0 { n } else { from };
-                format!(
-                    "at one pulse in {cycle} (numbers {first}, {}, {} …)",
-                    first + n,
-                    first + 2.0 * n
-                )
-            }
-            None => format!("at {name} between {} and {}", number(from), number(to)),
-        },
-    }
+    format!("{text}. The {coordinate} explains {explained} of the excess{how}.")
 }
 
 fn percent(fraction: f64) -> String {

@@ -1,0 +1,331 @@
+//! Records cut into the bins of each coordinate.
+
+use super::coordinate::FailureCoordinate;
+use super::rules::RULES;
+use crate::data::Record;
+
+/// How a coordinate is learned on some samples and tested on others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Folds {
+    /// Half-second blocks in turn: the coordinate comes back within a record.
+    Blocks,
+    /// Whole records: what happens at one time in one record only is no
+    /// function of time.
+    Records,
+}
+
+/// One coordinate over all records.
+#[derive(Clone, Debug)]
+pub(super) struct Binned {
+    pub(super) coordinate: FailureCoordinate,
+    pub(super) folds: Folds,
+    /// Bin of every sample, per record; none where the coordinate has no value.
+    pub(super) bin: Vec<Vec<Option<u16>>>,
+    /// Ends of the bins.
+    pub(super) ranges: Vec<(f64, f64)>,
+    /// For the time since an edge: ln of the dwell before it, in samples.
+    pub(super) dwell: Option<Vec<Vec<f64>>>,
+}
+
+/// What the coordinates are made from; samples before `warm_up` are not judged.
+pub(super) struct Source<'a> {
+    pub(super) records: &'a [&'a Record],
+    /// y_sim per record.
+    pub(super) simulated: &'a [Vec<f64>],
+    pub(super) warm_up: usize,
+    /// Samples from the command to the flow.
+    pub(super) delay: usize,
+}
+
+/// Every coordinate that the records have.
+pub(super) fn coordinates(source: &Source<'_>) -> Vec<Binned> {
+    let period = source.records.first().map_or(1.0, |r| r.sample_period_s);
+    let each = |values: &dyn Fn(&Record) -> Vec<f64>| -> Vec<Vec<f64>> {
+        source.records.iter().map(|r| values(r)).collect()
+    };
+    let time_folds = if source.records.len() > 1 {
+        Folds::Records
+    } else {
+        Folds::Blocks
+    };
+    let mut all = Vec::new();
+    let switches = source.records.iter().all(|r| has_edges(&r.u));
+    if switches {
+        let since = |rising| each(&|r| since_edge(&r.u, rising, period));
+        for (coordinate, rising) in [
+            (FailureCoordinate::SinceRisingEdge, true),
+            (FailureCoordinate::SinceFallingEdge, false),
+        ] {
+            let found = binned(source, coordinate, Folds::Blocks, &since(rising));
+            all.extend(found.map(|found| Binned {
+                dwell: Some(each(&|r| dwell_before_edge(&r.u, rising))),
+                ..found
+            }));
+        }
+    }
+    let mut add = |coordinate, folds, values: Vec<Vec<f64>>| {
+        all.extend(binned(source, coordinate, folds, &values));
+    };
+    let level = source.simulated.to_vec();
+    add(FailureCoordinate::LevelOfY, Folds::Blocks, level);
+    let on_off = source.records.iter().all(|r| r.is_on_off());
+    if !on_off {
+        let level = each(&|r| r.u.clone());
+        add(FailureCoordinate::LevelOfU, Folds::Blocks, level);
+        let slope = |sim: &Vec<f64>| {
+            let mut slope = vec![0.0];
+            slope.extend(sim.windows(2).map(|pair| (pair[1] - pair[0]) / period));
+            slope
+        };
+        let slopes = source.simulated.iter().map(slope).collect();
+        add(FailureCoordinate::RateOfY, Folds::Blocks, slopes);
+    }
+    for window in RULES.windows_s {
+        let samples = (window / period).round().max(1.0) as usize;
+        if source.records.iter().any(|r| r.len() > 2 * samples) {
+            let coordinate = if on_off {
+                FailureCoordinate::Blowing { window_s: window }
+            } else {
+                FailureCoordinate::MeanInput { window_s: window }
+            };
+            let mean = each(&|r| moving_mean(&r.u, samples));
+            add(coordinate, Folds::Blocks, mean);
+        }
+    }
+    let time = each(&|r| (0..r.len()).map(|k| k as f64 * period).collect());
+    add(FailureCoordinate::TimeInRecord, time_folds, time);
+    let channels = source.records.first().map(|r| r.channels.keys());
+    for channel in channels.into_iter().flatten() {
+        if source
+            .records
+            .iter()
+            .all(|r| r.channels.contains_key(channel))
+        {
+            let values = each(&|r| r.channels.get(channel).cloned().unwrap_or_default());
+            let coordinate = FailureCoordinate::Channel(channel.clone());
+            add(coordinate, Folds::Blocks, values);
+        }
+    }
+    if switches {
+        let numbers = each(&|r| pulse_number(&r.u, source.delay));
+        add(FailureCoordinate::PulseNumber, time_folds, numbers.clone());
+        for cycle in 2..=RULES.longest_cycle {
+            all.push(modulo(source, &numbers, cycle));
+        }
+    }
+    all
+}
+
+/// Whether the input is piecewise constant.
+fn has_edges(u: &[f64]) -> bool {
+    let changes = u.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    changes > 0 && (changes as f64) < RULES.most_changes * u.len() as f64
+}
+
+/// Time since the last rise (or fall) of the input; NaN before the first.
+pub(super) fn since_edge(u: &[f64], rising: bool, period: f64) -> Vec<f64> {
+    let mut before = 0.0;
+    let mut last = None;
+    let mut since = Vec::with_capacity(u.len());
+    for (k, now) in u.iter().enumerate() {
+        if (rising && *now > before) || (!rising && *now < before) {
+            last = Some(k);
+        }
+        before = *now;
+        since.push(last.map_or(f64::NAN, |edge| (k - edge) as f64 * period));
+    }
+    since
+}
+
+/// ln of the samples between the last rise (or fall) of the input and the edge
+/// before it; 0 before the first.
+fn dwell_before_edge(u: &[f64], rising: bool) -> Vec<f64> {
+    let (mut before, mut edge, mut dwell) = (0.0, 0, 0.0);
+    u.iter()
+        .enumerate()
+        .map(|(k, now)| {
+            if *now != before {
+                if (*now > before) == rising {
+                    dwell = f64::ln((k - edge).max(1) as f64);
+                }
+                edge = k;
+            }
+            before = *now;
+            dwell
+        })
+        .collect()
+}
+
+/// Mean of the last `samples` inputs; before the record the input was 0.
+fn moving_mean(u: &[f64], samples: usize) -> Vec<f64> {
+    let mut sum = 0.0;
+    u.iter()
+        .enumerate()
+        .map(|(k, now)| {
+            sum += now;
+            if let Some(old) = k.checked_sub(samples) {
+                sum -= u[old];
+            }
+            sum / samples as f64
+        })
+        .collect()
+}
+
+/// Number of the pulse that the flow feels, from 1; NaN before the first.
+fn pulse_number(u: &[f64], delay: usize) -> Vec<f64> {
+    let mut before = 0.0;
+    let mut count = 0.0;
+    let mut numbers = vec![f64::NAN; delay.min(u.len())];
+    for now in u {
+        if *now > before {
+            count += 1.0;
+        }
+        before = *now;
+        numbers.push(if count > 0.0 { count } else { f64::NAN });
+    }
+    numbers.truncate(u.len());
+    numbers
+}
+
+fn modulo(source: &Source<'_>, numbers: &[Vec<f64>], cycle: usize) -> Binned {
+    let class = |number: &f64| {
+        number
+            .is_finite()
+            .then(|| (*number as usize % cycle) as u16)
+    };
+    let mut bin: Vec<Vec<Option<u16>>> = numbers
+        .iter()
+        .map(|record| record.iter().map(class).collect())
+        .collect();
+    blank(&mut bin, source.warm_up);
+    Binned {
+        coordinate: FailureCoordinate::PulseInCycle { cycle },
+        folds: Folds::Blocks,
+        bin,
+        ranges: (0..cycle).map(|c| (c as f64, c as f64)).collect(),
+        dwell: None,
+    }
+}
+
+fn blank(bin: &mut [Vec<Option<u16>>], warm_up: usize) {
+    for record in bin {
+        record.iter_mut().take(warm_up).for_each(|b| *b = None);
+    }
+}
+
+/// Leaves out bins that one record alone reaches: they would name the record,
+/// not the coordinate.
+fn keep_shared(bin: &mut [Vec<Option<u16>>], bins: usize) {
+    let mut reached = vec![0; bins];
+    for record in bin.iter() {
+        let mut here = vec![false; bins];
+        for b in record.iter().flatten() {
+            here[usize::from(*b)] = true;
+        }
+        for (count, here) in reached.iter_mut().zip(here) {
+            *count += usize::from(here);
+        }
+    }
+    for b in bin.iter_mut().flatten() {
+        *b = b.filter(|b| reached[usize::from(*b)] > 1);
+    }
+}
+
+/// Bins with about equally many samples; `None` for a coordinate without spread.
+fn binned(
+    source: &Source<'_>,
+    coordinate: FailureCoordinate,
+    folds: Folds,
+    values: &[Vec<f64>],
+) -> Option<Binned> {
+    let mut sorted: Vec<f64> = values
+        .iter()
+        .flat_map(|record| record.iter().skip(source.warm_up))
+        .copied()
+        .filter(|v| v.is_finite())
+        .collect();
+    sorted.sort_by(f64::total_cmp);
+    let (low, high) = (*sorted.first()?, *sorted.last()?);
+    if high - low <= 1e-12 * high.abs().max(low.abs()) {
+        return None;
+    }
+    // Limits with few digits, so that sentences and axes read well.
+    let step = 10f64.powf(((high - low) / 500.0).log10().floor());
+    let tidy = |value: f64| (value / step).round() * step;
+    let mut limits: Vec<f64> = (1..RULES.bins)
+        .filter_map(|i| sorted.get(i * sorted.len() / RULES.bins))
+        .map(|value| tidy(*value))
+        .filter(|limit| *limit > low && *limit < high)
+        .collect();
+    limits.dedup_by(|a, b| (*a - *b).abs() < 0.5 * step);
+    let edges: Vec<f64> = [&[low][..], &limits, &[high]].concat();
+    let ranges: Vec<(f64, f64)> = edges.windows(2).map(|pair| (pair[0], pair[1])).collect();
+    let place = |value: &f64| {
+        value
+            .is_finite()
+            .then(|| limits.partition_point(|limit| limit <= value) as u16)
+    };
+    let mut bin: Vec<Vec<Option<u16>>> = values
+        .iter()
+        .map(|record| record.iter().map(place).collect())
+        .collect();
+    blank(&mut bin, source.warm_up);
+    if folds == Folds::Records {
+        keep_shared(&mut bin, ranges.len());
+    }
+    (ranges.len() > 1).then_some(Binned {
+        coordinate,
+        folds,
+        bin,
+        ranges,
+        dwell: None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Use;
+
+    #[test]
+    fn time_since_edges_pulse_numbers_and_past_blowing() {
+        let u = [0.0, 1.0, 1.0, 0.0, 0.0, 1.0];
+        let rising = since_edge(&u, true, 0.5);
+        assert!(rising[0].is_nan());
+        assert_eq!(rising[1..], [0.0, 0.5, 1.0, 1.5, 0.0]);
+        let falling = since_edge(&u, false, 0.5);
+        assert!(falling[..3].iter().all(|t| t.is_nan()));
+        assert_eq!(falling[3..], [0.0, 0.5, 1.0]);
+        let felt = pulse_number(&u, 1);
+        assert!(felt[..2].iter().all(|n| n.is_nan()));
+        assert_eq!(felt[2..], [1.0, 1.0, 1.0, 1.0]);
+        assert_eq!(moving_mean(&u, 2), [0.0, 0.5, 1.0, 0.5, 0.0, 0.5]);
+    }
+
+    #[test]
+    fn bins_hold_about_equally_many_samples_and_cover_the_range() {
+        let u: Vec<f64> = (0..4000).map(|k| f64::from((k / 50) % 2)).collect();
+        let record = Record::new("r", Use::Validate, 0.001, u, vec![0.0; 4000]);
+        let simulated: Vec<f64> = (0..4000).map(|k| (f64::from(k) * 0.1).sin()).collect();
+        let source = Source {
+            records: &[&record],
+            simulated: &[simulated],
+            warm_up: 0,
+            delay: 3,
+        };
+        let all = coordinates(&source);
+        let level = FailureCoordinate::LevelOfY;
+        let level = all.iter().find(|b| b.coordinate == level).unwrap();
+        assert_eq!(level.ranges.len(), RULES.bins);
+        for bin in 0..RULES.bins {
+            let count = level.bin[0]
+                .iter()
+                .filter(|b| **b == Some(bin as u16))
+                .count();
+            assert!((80..220).contains(&count), "{count}");
+        }
+        assert!(level.ranges.windows(2).all(|pair| pair[0].1 == pair[1].0));
+        let long = FailureCoordinate::Blowing { window_s: 4.0 };
+        assert!(all.iter().all(|b| b.coordinate != long), "too short");
+    }
+}

@@ -12,7 +12,7 @@ use crate::command::Command;
 use crate::instrument::{Instrument, InstrumentError};
 use crate::plant::{
     BasePlant, DelayLaw, Effect, EffectError, Fault, FreeStream, PlantError, PlantSpec, RateLaw,
-    Rig, SAMPLE_PERIOD_S,
+    Rig, SAMPLE_PERIOD_S, ShowsWith,
 };
 
 /// Why a data set could not be made.
@@ -96,9 +96,7 @@ impl HiddenSetPlan {
                     .ok_or_else(|| HiddenSetError::UnknownFault((*name).to_owned()))
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let wanders = hidden
-            .iter()
-            .any(|e| matches!(e, Effect::FreeStreamVariation { .. }));
+        let wanders = hidden.iter().any(|e| e.channel().is_some());
         Ok(Self {
             plant: PlantSpec {
                 base,
@@ -130,8 +128,7 @@ impl HiddenSetPlan {
         if !effects.iter().any(Effect::needs_levels) {
             return on_off.into();
         }
-        // A rectifier only folds what goes below zero.
-        let signed = effects.contains(&Effect::RectifyingSensor {});
+        let signed = (effects.iter()).any(|e| e.shows_with() == ShowsWith::SignedLevels);
         let low = if signed { -1.0 } else { 0.0 };
         on_off
             .into_iter()

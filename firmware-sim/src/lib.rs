@@ -6,7 +6,6 @@ mod waveform;
 
 pub mod bench;
 pub mod command;
-pub mod dde;
 pub mod hidden_set;
 pub mod instrument;
 pub mod paper_like;

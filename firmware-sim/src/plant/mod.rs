@@ -4,20 +4,21 @@
 //! discretisation. The signals run command → valve → plenum → jet → transport → flow → film → reading.
 
 mod base;
-mod draw;
-mod effect;
+pub mod effects;
 mod fault;
 mod flow;
 mod free_stream;
 mod jet;
+mod part;
 mod rig;
 mod sensor;
 mod transport;
 
 pub use base::{BasePlant, BasePlantError, DelayLaw, RateLaw};
-pub use effect::{Effect, EffectError, Parameter};
+pub use effects::{Effect, EffectError, Parameter, ShowsWith};
 pub use fault::Fault;
 pub use free_stream::{FreeStream, MEAN_FREE_STREAM};
+pub use part::Place;
 pub use rig::{PlantError, PlantSpec, Rig};
 
 /// Sample period of commands and readings (s).

@@ -1,0 +1,87 @@
+//! The jet matters more or less as the measured free stream varies.
+
+use rand_chacha::ChaCha8Rng;
+
+use super::{Card, Limits, Physics, signed};
+use crate::plant::base::BasePlant;
+use crate::plant::free_stream::FreeStream;
+use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
+
+/// The jet's strength times 1 + gain·(U/Ū − 1).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FreeStreamVariation {
+    /// Relative change of the jet per relative change of the free stream (-).
+    pub gain: f64,
+}
+
+impl Physics for FreeStreamVariation {
+    const NAME: &'static str = "free-stream-variation";
+    const PLACE: Place = Place::FreeStream;
+    const PARAMETERS: &'static [Card<Self>] =
+        &[Card::new("gain", "-", Limits::FINITE, |e| &mut e.gain)];
+    const CHANNEL: Option<&'static str> = Some("u_inf");
+
+    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
+        Self {
+            gain: signed(rng, 1.0, 3.0),
+        }
+    }
+
+    fn part(&self, surroundings: &Surroundings<'_>) -> Part {
+        Part::Jet(Box::new(Stream {
+            gain: self.gain,
+            free_stream: surroundings.free_stream.cloned(),
+        }))
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Stream {
+    gain: f64,
+    free_stream: Option<FreeStream>,
+}
+
+impl Stream {
+    fn factor(&self, t: f64) -> f64 {
+        let relative = self.free_stream.as_ref().map_or(0.0, |u| u.relative(t));
+        1.0 + self.gain * relative
+    }
+}
+
+impl JetPart for Stream {
+    fn jump(&mut self, t: f64, _from: f64, to: f64) -> f64 {
+        to * self.factor(t)
+    }
+
+    fn advance(&mut self, t: f64, piece: &Piece) -> f64 {
+        piece.to * self.factor(t)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::rig::bench::base;
+    use crate::plant::{DelayLaw, PlantSpec, Rig};
+    use rand::SeedableRng;
+
+    #[test]
+    fn free_stream_changes_the_level_by_its_gain() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let stream = FreeStream::draw(&mut rng, 10_000);
+        let spec = PlantSpec::new(
+            BasePlant {
+                attach_s: 0.002,
+                ..base(DelayLaw::Fixed { delay_s: 0.02 })
+            },
+            &[FreeStreamVariation { gain: -2.0 }.into()],
+        );
+        let mut rig = Rig::new(&spec, Some(stream.clone())).unwrap();
+        let y = rig.play(&vec![1.0; 10_000]);
+        for k in (100..10_000).step_by(100) {
+            // A 2 ms flow follows the jet of 22 ms ago closely.
+            let expected = 1.0 - 2.0 * (stream.velocity(k as f64 * 1e-3 - 0.022) / 10.0 - 1.0);
+            assert!((y[k] - expected).abs() < 1e-4);
+        }
+    }
+}

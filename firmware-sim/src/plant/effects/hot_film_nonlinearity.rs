@@ -1,0 +1,83 @@
+//! King's law of the hot film.
+
+use rand_chacha::ChaCha8Rng;
+
+use super::{Card, Limits, Physics};
+use crate::plant::base::{BasePlant, log_uniform};
+use crate::plant::part::{Part, Place, SensorPart, Surroundings};
+
+/// Bridge voltage E = √(1 + κ·(s + s0)^⅓), normalised to keep 0 and 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HotFilmNonlinearity {
+    /// κ, forced against natural convection (-).
+    pub king_ratio: f64,
+    /// Friction at which the convection would vanish, s0 (y).
+    pub king_offset: f64,
+}
+
+impl Physics for HotFilmNonlinearity {
+    const NAME: &'static str = "hot-film-nonlinearity";
+    const PLACE: Place = Place::Film;
+    const PARAMETERS: &'static [Card<Self>] = &[
+        Card::new(
+            "king_ratio",
+            "-",
+            Limits::new(
+                f64::MIN_POSITIVE,
+                f64::MAX,
+                "above 0 (at 0 the film feels no flow)",
+            ),
+            |e| &mut e.king_ratio,
+        ),
+        Card::new("king_offset", "y", Limits::NOT_NEGATIVE, |e| {
+            &mut e.king_offset
+        }),
+    ];
+
+    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
+        Self {
+            king_ratio: log_uniform(rng, 0.4, 4.0),
+            king_offset: log_uniform(rng, 0.02, 0.2),
+        }
+    }
+
+    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+        Part::Sensor(Box::new(*self))
+    }
+}
+
+impl HotFilmNonlinearity {
+    /// Reversed flow cools no less than none.
+    fn voltage(&self, s: f64) -> f64 {
+        (1.0 + self.king_ratio * (s + self.king_offset).max(0.0).cbrt()).sqrt()
+    }
+}
+
+impl SensorPart for HotFilmNonlinearity {
+    fn jump(&mut self, to: f64) -> f64 {
+        let (zero, one) = (self.voltage(0.0), self.voltage(1.0));
+        (self.voltage(to) - zero) / (one - zero)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::sensor::bench::{reading, sensor};
+
+    #[test]
+    fn kings_law_keeps_zero_and_one_and_bulges_between() {
+        let (king_ratio, king_offset) = (2.0, 0.1);
+        let king = HotFilmNonlinearity {
+            king_ratio,
+            king_offset,
+        };
+        let mut film = sensor(&[king.into()]);
+        assert!(reading(&mut film, 0.0).abs() < 1e-12);
+        assert!((reading(&mut film, 1.0) - 1.0).abs() < 1e-12);
+        let e = |s: f64| (1.0 + king_ratio * (s + king_offset).powf(1.0 / 3.0)).sqrt();
+        let expected = (e(0.4) - e(0.0)) / (e(1.0) - e(0.0));
+        assert!((reading(&mut film, 0.4) - expected).abs() < 1e-12);
+        assert!(expected > 0.5, "steep where the flow is slow: {expected}");
+    }
+}

@@ -1,0 +1,412 @@
+//! The physical effects a plant can hide: one file each, with name, parameters, units, limits, usual
+//! values and physics in continuous time.
+//!
+//! A new effect is such a file, its `mod` and one line in `catalogue!`.
+
+mod amplitude_saturation;
+mod attachment_hysteresis;
+mod bouc_wen_hysteresis;
+mod dry_friction;
+mod echo_path;
+mod edge_dependent_delay;
+mod electrical_pickup;
+mod free_stream_variation;
+mod hot_film_lag;
+mod hot_film_nonlinearity;
+mod input_nonlinearity;
+mod plenum_droop;
+mod quadratic_drag;
+mod rectifying_sensor;
+mod sensor_saturation;
+mod starting_vortex;
+mod state_dependent_delay;
+mod stopping_vortex;
+mod thermal_drift;
+mod valve_lag;
+mod vortex;
+mod vortex_shedding;
+
+use std::fmt::Debug;
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use thiserror::Error;
+
+use super::base::BasePlant;
+use super::part::{Part, Place, Surroundings};
+
+/// Why an effect could not be made.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum EffectError {
+    /// No effect of that name.
+    #[error("there is no effect `{0}`; the names are: {names}", names = Effect::NAMES.join(", "))]
+    UnknownEffect(String),
+    /// The effect has no such parameter.
+    #[error("`{effect}` has no parameter `{parameter}`; it has: {known}")]
+    UnknownParameter {
+        /// Name of the effect.
+        effect: &'static str,
+        /// The parameter asked for.
+        parameter: String,
+        /// What the effect does have.
+        known: String,
+    },
+    /// A parameter is not a usable number.
+    #[error("`{parameter}` of `{effect}` is {value}, it must be {requirement}; give another value")]
+    OutOfRange {
+        /// Name of the effect.
+        effect: &'static str,
+        /// Name of the parameter.
+        parameter: &'static str,
+        /// The value refused.
+        value: f64,
+        /// What is allowed.
+        requirement: &'static str,
+    },
+}
+
+/// A parameter of an effect: name, value, unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// Name as in model files and reports.
+    pub name: &'static str,
+    /// Value in `unit`.
+    pub value: f64,
+    /// Symbol of the unit; "-" when dimensionless.
+    pub unit: &'static str,
+}
+
+/// What the physics admits (not what is usual).
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Limits {
+    low: f64,
+    high: f64,
+    requirement: &'static str,
+}
+
+impl Limits {
+    const FINITE: Self = Self::new(f64::MIN, f64::MAX, "finite");
+    const NOT_NEGATIVE: Self = Self::new(0.0, f64::MAX, "0 or positive");
+    const TIME: Self = Self::new(1e-4, 100.0, "between 0.0001 and 100 s");
+    const TRAVEL: Self = Self::new(1e-4, 1.0, "between 0.0001 and 1 s");
+
+    const fn new(low: f64, high: f64, requirement: &'static str) -> Self {
+        Self {
+            low,
+            high,
+            requirement,
+        }
+    }
+
+    /// NaN is nowhere.
+    fn contain(&self, value: f64) -> bool {
+        (self.low..=self.high).contains(&value)
+    }
+}
+
+/// The card of one parameter of the effect `E`.
+pub(crate) struct Card<E: 'static> {
+    name: &'static str,
+    unit: &'static str,
+    limits: Limits,
+    field: fn(&mut E) -> &mut f64,
+}
+
+impl<E: Copy> Card<E> {
+    const fn new(
+        name: &'static str,
+        unit: &'static str,
+        limits: Limits,
+        field: fn(&mut E) -> &mut f64,
+    ) -> Self {
+        Self {
+            name,
+            unit,
+            limits,
+            field,
+        }
+    }
+
+    fn value(&self, effect: &E) -> f64 {
+        let mut copy = *effect;
+        *(self.field)(&mut copy)
+    }
+}
+
+/// Commands with which an effect shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ShowsWith {
+    /// Off and on are enough.
+    OnOff,
+    /// Levels between off and on.
+    Levels,
+    /// Levels of both signs.
+    SignedLevels,
+}
+
+/// What one file of the catalogue defines.
+pub(crate) trait Physics: Copy + Debug + PartialEq + Sized + 'static {
+    /// Name in model files and reports.
+    const NAME: &'static str;
+    /// Where it sits.
+    const PLACE: Place;
+    /// Its parameters, in the catalogue's order.
+    const PARAMETERS: &'static [Card<Self>];
+    /// Commands with which it shows.
+    const SHOWS_WITH: ShowsWith = ShowsWith::OnOff;
+    /// The measured channel without which it cannot be told.
+    const CHANNEL: Option<&'static str> = None;
+
+    /// Visible, physically sensible, neither tiny nor extreme, for the rig `base`.
+    ///
+    /// The ranges were fixed from the physics (flow times 20–150 ms, friction of order 1) before any
+    /// diagnosis was run on these plants.
+    fn draw(base: &BasePlant, rng: &mut ChaCha8Rng) -> Self;
+
+    /// What the parameters must be to each other, beyond their own limits: the first that is not, and
+    /// what it must be.
+    fn conflict(&self) -> Option<(&'static str, &'static str)> {
+        None
+    }
+
+    /// The effect at rest, ready to run.
+    fn part(&self, surroundings: &Surroundings<'_>) -> Part;
+}
+
+fn parameters<E: Physics>(effect: &E) -> Vec<Parameter> {
+    let each = E::PARAMETERS.iter().map(|card| Parameter {
+        name: card.name,
+        value: card.value(effect),
+        unit: card.unit,
+    });
+    each.collect()
+}
+
+fn with<E: Physics>(mut effect: E, parameter: &str, value: f64) -> Result<E, EffectError> {
+    let Some(card) = E::PARAMETERS.iter().find(|card| card.name == parameter) else {
+        let known: Vec<&str> = E::PARAMETERS.iter().map(|card| card.name).collect();
+        return Err(EffectError::UnknownParameter {
+            effect: E::NAME,
+            parameter: parameter.to_owned(),
+            known: known.join(", "),
+        });
+    };
+    *(card.field)(&mut effect) = value;
+    Ok(effect)
+}
+
+fn validate<E: Physics>(effect: &E) -> Result<(), EffectError> {
+    let refuse = |card: &Card<E>, requirement| EffectError::OutOfRange {
+        effect: E::NAME,
+        parameter: card.name,
+        value: card.value(effect),
+        requirement,
+    };
+    for card in E::PARAMETERS {
+        if !card.limits.contain(card.value(effect)) {
+            return Err(refuse(card, card.limits.requirement));
+        }
+    }
+    if let Some((parameter, requirement)) = effect.conflict()
+        && let Some(card) = E::PARAMETERS.iter().find(|card| card.name == parameter)
+    {
+        return Err(refuse(card, requirement));
+    }
+    Ok(())
+}
+
+macro_rules! catalogue {
+    ($($file:ident :: $effect:ident),+ $(,)?) => {
+        $(pub use $file::$effect;)+
+
+        /// One physical mechanism of the catalogue with its parameters.
+        ///
+        /// A "sample" is 1 ms here, whatever the integrator's step.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub enum Effect {
+            $(#[doc = concat!("See [`", stringify!($effect), "`].")] $effect($effect),)+
+        }
+
+        $(impl From<$effect> for Effect {
+            fn from(effect: $effect) -> Self {
+                Self::$effect(effect)
+            }
+        })+
+
+        impl Effect {
+            /// Every name of the catalogue, in its order.
+            pub const NAMES: &'static [&'static str] = &[$($effect::NAME,)+];
+
+            /// The effect `name` with random parameters that suit the rig `base`.
+            ///
+            /// # Errors
+            /// [`EffectError::UnknownEffect`] when the catalogue has no such name.
+            pub fn draw(
+                name: &str,
+                base: &BasePlant,
+                rng: &mut ChaCha8Rng,
+            ) -> Result<Self, EffectError> {
+                match name {
+                    $($effect::NAME => Ok($effect::draw(base, rng).into()),)+
+                    _ => Err(EffectError::UnknownEffect(name.to_owned())),
+                }
+            }
+
+            /// The name used in model files and reports.
+            pub fn name(&self) -> &'static str {
+                match self { $(Self::$effect(_) => $effect::NAME,)+ }
+            }
+
+            /// Where it sits in the plant.
+            pub fn place(&self) -> Place {
+                match self { $(Self::$effect(_) => $effect::PLACE,)+ }
+            }
+
+            /// Commands with which it shows.
+            pub fn shows_with(&self) -> ShowsWith {
+                match self { $(Self::$effect(_) => $effect::SHOWS_WITH,)+ }
+            }
+
+            /// The measured channel without which it cannot be told.
+            pub fn channel(&self) -> Option<&'static str> {
+                match self { $(Self::$effect(_) => $effect::CHANNEL,)+ }
+            }
+
+            /// The parameters, in the catalogue's order and units.
+            pub fn parameters(&self) -> Vec<Parameter> {
+                match self { $(Self::$effect(effect) => parameters(effect),)+ }
+            }
+
+            /// The same effect with one parameter changed.
+            ///
+            /// # Errors
+            /// [`EffectError::UnknownParameter`] when the effect has no such parameter.
+            pub fn with(self, parameter: &str, value: f64) -> Result<Self, EffectError> {
+                match self {
+                    $(Self::$effect(effect) => with(effect, parameter, value).map(Self::from),)+
+                }
+            }
+
+            /// Checks the parameters against what the physics admits (not against what is usual).
+            ///
+            /// # Errors
+            /// [`EffectError::OutOfRange`] naming the first bad parameter.
+            pub fn validate(&self) -> Result<(), EffectError> {
+                match self { $(Self::$effect(effect) => validate(effect),)+ }
+            }
+
+            pub(crate) fn part(&self, surroundings: &Surroundings<'_>) -> Part {
+                match self { $(Self::$effect(effect) => effect.part(surroundings),)+ }
+            }
+        }
+    };
+}
+
+catalogue! {
+    state_dependent_delay::StateDependentDelay,
+    edge_dependent_delay::EdgeDependentDelay,
+    valve_lag::ValveLag,
+    plenum_droop::PlenumDroop,
+    free_stream_variation::FreeStreamVariation,
+    echo_path::EchoPath,
+    starting_vortex::StartingVortex,
+    stopping_vortex::StoppingVortex,
+    attachment_hysteresis::AttachmentHysteresis,
+    amplitude_saturation::AmplitudeSaturation,
+    vortex_shedding::VortexShedding,
+    hot_film_nonlinearity::HotFilmNonlinearity,
+    hot_film_lag::HotFilmLag,
+    thermal_drift::ThermalDrift,
+    sensor_saturation::SensorSaturation,
+    electrical_pickup::ElectricalPickup,
+    dry_friction::DryFriction,
+    quadratic_drag::QuadraticDrag,
+    rectifying_sensor::RectifyingSensor,
+    input_nonlinearity::InputNonlinearity,
+    bouc_wen_hysteresis::BoucWenHysteresis,
+}
+
+impl Effect {
+    /// Whether the effect only shows with commands of more levels than off and on.
+    pub fn needs_levels(&self) -> bool {
+        self.shows_with() != ShowsWith::OnOff
+    }
+
+    /// Whether `other` acts on the same part of the rig so that the two exclude each other.
+    pub fn excludes(&self, other: &Self) -> bool {
+        let transport = |e: &Self| e.place() == Place::Transport;
+        self.name() == other.name() || (transport(self) && transport(other))
+    }
+
+    /// Effects in the order in which the signals run; within a place in the catalogue's.
+    pub(crate) fn in_order(effects: &[Self]) -> Vec<Self> {
+        let mut sorted = effects.to_vec();
+        sorted.sort_by_key(|e| (e.place(), Self::NAMES.iter().position(|n| *n == e.name())));
+        sorted
+    }
+}
+
+/// A size of either sign.
+fn signed(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
+    let size = rng.random_range(low..high);
+    if rng.random_bool(0.5) { size } else { -size }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+
+    #[test]
+    fn the_catalogue_has_its_21_names_once_each() {
+        assert_eq!(Effect::NAMES.len(), 21);
+        let mut sorted = Effect::NAMES.to_vec();
+        sorted.sort_unstable();
+        sorted.dedup();
+        assert_eq!(sorted.len(), 21);
+    }
+
+    #[test]
+    fn parameters_are_changed_by_name_and_checked() {
+        let lag = Effect::from(ValveLag {
+            opening_time: 0.01,
+            closing_time: 0.02,
+        });
+        let slow = lag.with("closing_time", 0.03).unwrap();
+        assert_eq!(slow.parameters()[1].value, 0.03);
+        let message = lag.with("gain", 1.0).unwrap_err().to_string();
+        assert!(
+            message.contains("opening_time, closing_time"),
+            "names the choices: {message}"
+        );
+        for bad in [-1.0, f64::NAN, f64::INFINITY] {
+            let message = lag.with("closing_time", bad).unwrap().validate();
+            let message = message.unwrap_err().to_string();
+            assert!(message.contains("between 0.0001 and 100 s"), "{message}");
+        }
+    }
+
+    #[test]
+    fn every_draw_is_valid_and_repeats() {
+        for name in Effect::NAMES {
+            for seed in 0..200 {
+                let mut rng = ChaCha8Rng::seed_from_u64(seed);
+                let base = BasePlant::draw(&mut rng);
+                let effect = Effect::draw(name, &base, &mut rng.clone()).unwrap();
+                assert_eq!(effect.name(), *name);
+                effect.validate().unwrap();
+                assert_eq!(effect, Effect::draw(name, &base, &mut rng).unwrap());
+            }
+        }
+    }
+
+    #[test]
+    fn the_order_of_the_signals_does_not_depend_on_the_order_of_the_list() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let base = BasePlant::draw(&mut rng);
+        let draw = |name: &&str| Effect::draw(name, &base, &mut ChaCha8Rng::seed_from_u64(2));
+        let all: Vec<Effect> = Effect::NAMES.iter().map(draw).map(Result::unwrap).collect();
+        let backwards: Vec<Effect> = all.iter().rev().copied().collect();
+        assert_eq!(Effect::in_order(&all), Effect::in_order(&backwards));
+    }
+}

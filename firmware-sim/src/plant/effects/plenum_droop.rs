@@ -1,0 +1,94 @@
+//! Blowing empties the plenum.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::{Card, Limits, Physics};
+use crate::plant::base::{BasePlant, log_uniform};
+use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
+
+/// Ṗ = (1 − P)/τ_r − κ·v·P, j = v·P, P = 1 at the start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlenumDroop {
+    /// Refill time constant τ_r (s).
+    pub recovery_time: f64,
+    /// Emptying rate κ at full opening (1/s).
+    pub depletion_rate: f64,
+}
+
+impl Physics for PlenumDroop {
+    const NAME: &'static str = "plenum-droop";
+    const PLACE: Place = Place::Plenum;
+    const PARAMETERS: &'static [Card<Self>] = &[
+        Card::new("recovery_time", "s", Limits::TIME, |e| &mut e.recovery_time),
+        Card::new("depletion_rate", "1/s", Limits::NOT_NEGATIVE, |e| {
+            &mut e.depletion_rate
+        }),
+    ];
+
+    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
+        let recovery_time = log_uniform(rng, 0.3, 2.5);
+        // Pressure lost under steady blowing.
+        let lost = rng.random_range(0.15..0.40);
+        Self {
+            recovery_time,
+            depletion_rate: lost / ((1.0 - lost) * recovery_time),
+        }
+    }
+
+    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+        Part::Jet(Box::new(Plenum {
+            droop: *self,
+            pressure: 1.0,
+        }))
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Plenum {
+    droop: PlenumDroop,
+    pressure: f64,
+}
+
+impl JetPart for Plenum {
+    fn jump(&mut self, _t: f64, _from: f64, to: f64) -> f64 {
+        to * self.pressure
+    }
+
+    /// Exact for an opening that stays at its mean over the piece.
+    fn advance(&mut self, _t: f64, piece: &Piece) -> f64 {
+        let PlenumDroop {
+            recovery_time,
+            depletion_rate,
+        } = self.droop;
+        let v = 0.5 * (piece.from + piece.to);
+        let rate = 1.0 / recovery_time + depletion_rate * v;
+        let rest = 1.0 / (recovery_time * rate);
+        self.pressure = rest + (self.pressure - rest) * (-rate * piece.dt).exp();
+        piece.to * self.pressure
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::jet::bench::{jet, run};
+
+    #[test]
+    fn the_plenum_settles_where_supply_meets_demand_and_recovers() {
+        let (recovery_time, depletion_rate) = (0.5, 0.8);
+        let droop = PlenumDroop {
+            recovery_time,
+            depletion_rate,
+        };
+        let mut jet = jet(&[droop.into()]);
+        jet.command(1.0);
+        let rest = 1.0 / (1.0 + recovery_time * depletion_rate);
+        assert!((run(&mut jet, 10.0) - rest).abs() < 1e-9);
+        jet.command(0.0);
+        assert_eq!(run(&mut jet, 10.5), 0.0, "a closed valve blows nothing");
+        let recovered = 1.0 - (1.0 - rest) * (-1.0_f64).exp();
+        jet.command(1.0);
+        assert!((run(&mut jet, 10.5) - recovered).abs() < 1e-9);
+    }
+}

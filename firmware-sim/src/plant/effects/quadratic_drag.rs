@@ -1,0 +1,68 @@
+//! Fast changes are resisted more than in proportion.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::{Card, Limits, Physics};
+use crate::plant::SAMPLE_PERIOD_S;
+use crate::plant::base::BasePlant;
+use crate::plant::part::{FlowPart, Part, Place, Resistance, Surroundings};
+
+/// −d·Δs·|Δs| with Δs the change per sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct QuadraticDrag {
+    /// d (samples/y).
+    pub coefficient: f64,
+}
+
+impl Physics for QuadraticDrag {
+    const NAME: &'static str = "quadratic-drag";
+    const PLACE: Place = Place::Flow;
+    const PARAMETERS: &'static [Card<Self>] =
+        &[Card::new("coefficient", "samples/y", Limits::NOT_NEGATIVE, |e| {
+            &mut e.coefficient
+        })];
+
+    fn draw(base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
+        let fast = base.attach_s.min(base.separate_s);
+        Self {
+            // Resistance against the fastest motion, relative to the flow's own.
+            coefficient: rng.random_range(0.5..1.5) * fast / SAMPLE_PERIOD_S,
+        }
+    }
+
+    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+        Part::Flow(Box::new(*self))
+    }
+}
+
+impl FlowPart for QuadraticDrag {
+    fn resistance(&self) -> Resistance {
+        Resistance {
+            dry: 0.0,
+            drag: self.coefficient * SAMPLE_PERIOD_S,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::flow::bench::{flow, hold};
+
+    #[test]
+    fn quadratic_drag_slows_fast_changes_by_its_closed_form() {
+        // Speed per sample over the first or the next 50 µs.
+        let speed = |flow: &mut _, jet| {
+            let before = hold(flow, jet, 0.0);
+            20.0 * (hold(flow, jet, 5e-5) - before)
+        };
+        let mut flow = flow(&[QuadraticDrag { coefficient: 30.0 }.into()]);
+        // First sample of a step: v + d·v² = 1/40 per sample.
+        let rising: f64 = speed(&mut flow, 1.0);
+        assert!((rising + 30.0 * rising * rising - 0.025).abs() < 2e-5);
+        hold(&mut flow, 1.0, 5.0);
+        let falling = speed(&mut flow, 0.0);
+        assert!((falling - 30.0 * falling * falling + 0.01).abs() < 1e-5);
+    }
+}

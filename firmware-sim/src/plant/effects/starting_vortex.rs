@@ -1,0 +1,79 @@
+//! Switching on sheds a vortex that adds to the jet.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::vortex::Vortex;
+use super::{Card, Limits, Physics};
+use crate::plant::base::{BasePlant, log_uniform};
+use crate::plant::part::{Part, Place, Surroundings};
+
+/// ẇ = −w/τ + max(dj/dt, 0); the flow receives j + gain·w.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StartingVortex {
+    /// Strength (-).
+    pub gain: f64,
+    /// Time constant of its decay (s).
+    pub decay_time: f64,
+}
+
+impl Physics for StartingVortex {
+    const NAME: &'static str = "starting-vortex";
+    const PLACE: Place = Place::Shedding;
+    const PARAMETERS: &'static [Card<Self>] = &[
+        Card::new("gain", "-", Limits::FINITE, |e| &mut e.gain),
+        Card::new("decay_time", "s", Limits::TIME, |e| &mut e.decay_time),
+    ];
+
+    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
+        Self {
+            gain: rng.random_range(0.4..1.0),
+            decay_time: log_uniform(rng, 0.020, 0.080),
+        }
+    }
+
+    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+        Part::Jet(Box::new(Vortex::starting(self.gain, self.decay_time)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::effects::ValveLag;
+    use crate::plant::jet::bench::{jet, run};
+
+    #[test]
+    fn switching_on_sheds_a_decaying_vortex_and_switching_off_none() {
+        let vortex = StartingVortex {
+            gain: 0.8,
+            decay_time: 0.02,
+        };
+        let mut jet = jet(&[vortex.into()]);
+        jet.command(1.0);
+        assert!((run(&mut jet, 0.02) - (1.0 + 0.8 * (-1.0_f64).exp())).abs() < 1e-9);
+        run(&mut jet, 1.0);
+        jet.command(0.0);
+        assert!(run(&mut jet, 1.001).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_lagging_valve_feeds_it_more_slowly() {
+        // ẇ = −w/τ + v̇ with v = 1 − exp(−t/τo): w = τ/(τ − τo)·(exp(−t/τ) − exp(−t/τo)).
+        let (tau, opening) = (0.03, 0.01);
+        let valve = ValveLag {
+            opening_time: opening,
+            closing_time: 0.01,
+        };
+        let vortex = StartingVortex {
+            gain: 1.0,
+            decay_time: tau,
+        };
+        let mut jet = jet(&[valve.into(), vortex.into()]);
+        jet.command(1.0);
+        let t = 0.025_f64;
+        let v = 1.0 - (-t / opening).exp();
+        let w = tau / (tau - opening) * ((-t / tau).exp() - (-t / opening).exp());
+        assert!((run(&mut jet, t) - v - w).abs() < 1e-5);
+    }
+}

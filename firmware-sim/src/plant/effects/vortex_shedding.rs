@@ -1,0 +1,117 @@
+//! A damped oscillation, excited by the arriving jet, is superposed on the friction.
+
+use std::f64::consts::TAU;
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::{Card, Limits, Physics};
+use crate::plant::base::{BasePlant, log_uniform};
+use crate::plant::part::{FlowPart, Part, Piece, Place, Surroundings};
+
+/// q̈ = ω²·(j − q) − 2ζω·q̇; the film feels s + gain·(q − j).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VortexShedding {
+    /// Undamped natural frequency (Hz).
+    pub frequency: f64,
+    /// ζ, below 1 for a ringing flow (-).
+    pub damping_ratio: f64,
+    /// Size of the ringing (y).
+    pub gain: f64,
+}
+
+impl Physics for VortexShedding {
+    const NAME: &'static str = "vortex-shedding";
+    const PLACE: Place = Place::Flow;
+    const PARAMETERS: &'static [Card<Self>] = &[
+        Card::new(
+            "frequency",
+            "Hz",
+            Limits::new(0.01, 1000.0, "between 0.01 and 1000 Hz"),
+            |e| &mut e.frequency,
+        ),
+        Card::new("damping_ratio", "-", Limits::NOT_NEGATIVE, |e| {
+            &mut e.damping_ratio
+        }),
+        Card::new("gain", "y", Limits::FINITE, |e| &mut e.gain),
+    ];
+
+    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
+        Self {
+            frequency: log_uniform(rng, 5.0, 30.0),
+            damping_ratio: rng.random_range(0.06..0.25),
+            gain: rng.random_range(0.12..0.30),
+        }
+    }
+
+    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+        Part::Flow(Box::new(Ringing {
+            omega: TAU * self.frequency,
+            damping_ratio: self.damping_ratio,
+            gain: self.gain,
+            q: 0.0,
+            q_dot: 0.0,
+        }))
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Ringing {
+    /// ω (rad/s)
+    omega: f64,
+    damping_ratio: f64,
+    gain: f64,
+    q: f64,
+    q_dot: f64,
+}
+
+impl FlowPart for Ringing {
+    /// Runge–Kutta of order 4; nothing else acts on it.
+    fn passed(&mut self, jet: &Piece, _s: f64) {
+        let (dt, j0, j1) = (jet.dt, jet.from, jet.to);
+        let jm = 0.5 * (j0 + j1);
+        let pull = |q: f64, v: f64, j: f64| {
+            self.omega * (self.omega * (j - q) - 2.0 * self.damping_ratio * v)
+        };
+        let (q, v) = (self.q, self.q_dot);
+        let k1 = (v, pull(q, v, j0));
+        let k2 = (
+            v + 0.5 * dt * k1.1,
+            pull(q + 0.5 * dt * k1.0, v + 0.5 * dt * k1.1, jm),
+        );
+        let k3 = (
+            v + 0.5 * dt * k2.1,
+            pull(q + 0.5 * dt * k2.0, v + 0.5 * dt * k2.1, jm),
+        );
+        let k4 = (v + dt * k3.1, pull(q + dt * k3.0, v + dt * k3.1, j1));
+        self.q = q + dt / 6.0 * (k1.0 + 2.0 * (k2.0 + k3.0) + k4.0);
+        self.q_dot = v + dt / 6.0 * (k1.1 + 2.0 * (k2.1 + k3.1) + k4.1);
+    }
+
+    fn at_the_film(&self, jet: f64) -> f64 {
+        self.gain * (self.q - jet)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::flow::bench::{flow, hold};
+
+    #[test]
+    fn shedding_rings_at_its_frequency_around_the_arriving_jet() {
+        let effect = VortexShedding {
+            frequency: 12.0,
+            damping_ratio: 0.1,
+            gain: 0.2,
+        };
+        let mut flow = flow(&[effect.into()]);
+        let t = 0.053_f64;
+        let s = hold(&mut flow, 1.0, t);
+        let omega = TAU * 12.0;
+        let damped = omega * (1.0_f64 - 0.01).sqrt();
+        let error = -(-0.1 * omega * t).exp()
+            * ((damped * t).cos() + 0.1 * omega / damped * (damped * t).sin());
+        assert!((flow.at_the_film() - s - 0.2 * error).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,47 @@
+//! The catalogue of the model and that of the plants are the same, though they share no code.
+
+use firmware_sim::plant::{BasePlant, Effect};
+use model_core::effects::SPECS;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+#[test]
+fn names_parameters_units_and_channels_are_the_same() {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let base = BasePlant::draw(&mut rng);
+    let mut names: Vec<&str> = SPECS.iter().map(|spec| spec.name).collect();
+    let mut plants = Effect::NAMES.to_vec();
+    names.sort_unstable();
+    plants.sort_unstable();
+    assert_eq!(names, plants);
+    for spec in SPECS {
+        let effect = Effect::draw(spec.name, &base, &mut rng).expect("a plant's effect");
+        let model = spec.parameters.iter().map(|p| (p.name, p.unit.to_string()));
+        let plant = effect.parameters().into_iter();
+        let plant = plant.map(|p| (p.name, p.unit.to_owned()));
+        let [model, plant]: [Vec<_>; 2] = [model.collect(), plant.collect()];
+        assert_eq!(model, plant, "{}", spec.name);
+        assert_eq!(spec.channel, effect.channel(), "{}", spec.name);
+    }
+}
+
+/// What a rig usually has must be what the model may search.
+#[test]
+fn usual_values_lie_within_the_range_that_the_model_searches() {
+    for spec in SPECS {
+        for seed in 0..100 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let base = BasePlant::draw(&mut rng);
+            let effect = Effect::draw(spec.name, &base, &mut rng).expect("a plant's effect");
+            for (found, card) in effect.parameters().iter().zip(spec.parameters) {
+                assert!(
+                    (card.low..=card.high).contains(&found.value),
+                    "{}: {found:?} outside {} to {}",
+                    spec.name,
+                    card.low,
+                    card.high
+                );
+            }
+        }
+    }
+}

@@ -72,7 +72,7 @@ pub(crate) struct Piece {
 }
 
 /// A link of the chain from the coil to the jet. It does not feel the flow.
-pub(crate) trait JetPart: Debug + BoxedJet {
+pub(crate) trait JetPart: Debug + Send + Sync + BoxedJet {
     /// What comes out at `t`, after what goes in has jumped between two levels without taking time.
     fn jump(&mut self, t: f64, from: f64, to: f64) -> f64;
 
@@ -103,7 +103,7 @@ pub(crate) struct Resistance {
 }
 
 /// Something in the flow. Each part has one continuous memory z, which is integrated with the flow.
-pub(crate) trait FlowPart: Debug + BoxedFlow {
+pub(crate) trait FlowPart: Debug + Send + Sync + BoxedFlow {
     /// What it adds to the level that the flow goes to, at friction `s` (y).
     fn drive(&self, _s: f64, _z: f64) -> f64 {
         0.0
@@ -138,7 +138,7 @@ pub(crate) struct Moment {
 }
 
 /// A link of the chain from what the film feels to the reading.
-pub(crate) trait SensorPart: Debug + BoxedSensor {
+pub(crate) trait SensorPart: Debug + Send + Sync + BoxedSensor {
     /// Whether [`advance`](Self::advance) differs from [`jump`](Self::jump) to the end of the piece.
     fn takes_time(&self) -> bool {
         false

@@ -18,10 +18,12 @@ pub struct QuadraticDrag {
 impl Physics for QuadraticDrag {
     const NAME: &'static str = "quadratic-drag";
     const PLACE: Place = Place::Flow;
-    const PARAMETERS: &'static [Card<Self>] =
-        &[Card::new("coefficient", "samples/y", Limits::NOT_NEGATIVE, |e| {
-            &mut e.coefficient
-        })];
+    const PARAMETERS: &'static [Card<Self>] = &[Card::new(
+        "coefficient",
+        "samples/y",
+        Limits::NOT_NEGATIVE,
+        |e| &mut e.coefficient,
+    )];
 
     fn draw(base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
         let fast = base.attach_s.min(base.separate_s);

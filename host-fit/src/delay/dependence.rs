@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::law::{DelayPoint, best_rate, rate_grid};
-use super::study::{Spread, spread};
+use super::spread::{Spread, spread};
 
 /// Shuffles of the permutation tests.
 const SHUFFLES: usize = 1999;

@@ -6,7 +6,7 @@
 //! the other sign and do not add up.
 
 use super::edge::Edge;
-use super::onset::mean;
+use super::spread::mean;
 
 /// Of the peaks at least this high against the highest, the soonest is the front.
 const HIGH: f64 = 0.8;

@@ -17,6 +17,7 @@
 
 use super::edge::Edge;
 use super::front::{Expectation, expect, level_filter, own_front};
+use super::spread::mean;
 
 /// Time constants of the course before and of the response, samples; 0 stands for a straight line.
 const BEFORE_SHAPES: [f64; 9] = [0.0, 8.0, 12.0, 17.0, 25.0, 36.0, 55.0, 90.0, 180.0];
@@ -267,10 +268,6 @@ impl Column {
             values,
         }
     }
-}
-
-pub(super) fn mean(x: &[f64]) -> f64 {
-    x.iter().sum::<f64>() / x.len().max(1) as f64
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -4,6 +4,7 @@ use super::dependence::{DelayVerdict, Tests, words};
 use super::edge::{Edge, edges, mean_output};
 use super::law::{DelayLawFit, DelayPoint, fit_delay_law};
 use super::onset::{Onset, Unmeasured, measure_all};
+use super::spread::{Spread, correlation, spread};
 use crate::data::{DataError, DataSet, Use};
 
 /// How delays are measured.
@@ -46,17 +47,6 @@ pub struct EdgeDelay {
     pub onset: Result<Onset, Unmeasured>,
     /// ỹ (1) at the start of the response, where that was measured.
     pub mean_output: Option<f64>,
-}
-
-/// Mean and standard deviation of some delays, samples.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Spread {
-    /// How many.
-    pub count: usize,
-    /// Mean, samples.
-    pub mean: f64,
-    /// Standard deviation (n − 1), samples.
-    pub sd: f64,
 }
 
 /// The statistics of the paper (III.A).
@@ -176,33 +166,6 @@ pub fn study_delays(set: &DataSet, options: &DelayOptions) -> Result<DelayStudy,
         p_direction: tests.direction,
         direction_offset: tests.offset,
     })
-}
-
-pub(super) fn spread(values: &[f64]) -> Spread {
-    let n = values.len();
-    let mean = values.iter().sum::<f64>() / n.max(1) as f64;
-    let square: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
-    Spread {
-        count: n,
-        mean,
-        sd: if n > 1 {
-            (square / (n - 1) as f64).sqrt()
-        } else {
-            0.0
-        },
-    }
-}
-
-/// Pearson's correlation; `None` if either side does not vary.
-fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
-    let (ma, mb) = (spread(a).mean, spread(b).mean);
-    let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
-    for (a, b) in a.iter().zip(b) {
-        ab += (a - ma) * (b - mb);
-        aa += (a - ma).powi(2);
-        bb += (b - mb).powi(2);
-    }
-    (aa > 0.0 && bb > 0.0).then(|| ab / (aa * bb).sqrt())
 }
 
 fn statistics(

@@ -4,10 +4,7 @@ use model_core::average::WindowSum;
 use model_core::delay::DelayLaw as _;
 use model_core::effects::StateDependentDelay;
 
-use super::structure::{DelayLaw, InputDelay, Series, Structure, WINDOW};
-
-/// Step in which factors f are searched.
-pub(crate) const FACTOR_STEP: f64 = 1e-4;
+use super::structure::{DelayLaw, FACTOR_STEP, InputDelay, Series, Structure, WINDOW};
 
 /// Strength with which samples enter a sum of products.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,7 @@
 //! The free-run objective ε, eq. (9): least squares for the coefficients, then
 //! a simulation of every record.
 
+use super::coefficients::Coefficients;
 use super::free_runner::{FreeRunner, Outcome, Trajectory};
 use super::layout::Delays;
 use super::linearised::Linearised;
@@ -10,36 +11,6 @@ use crate::search::{Evaluation, Point, Problem, Variable};
 /// Value of a candidate that diverges at once; one that diverges at the very
 /// end gets half of it, so that a search can leave the unstable region.
 pub(crate) const DIVERGED_VALUE: f64 = 1e9;
-
-/// Coefficients of a candidate, in the order of eq. (3).
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Coefficients {
-    pub(crate) a: Vec<f64>,
-    pub(crate) b: Vec<f64>,
-    /// The N2 coefficients of input 1 first.
-    pub(crate) c: Vec<f64>,
-    pub(crate) constant: f64,
-}
-
-impl Coefficients {
-    /// Sorts the solution of a regression, in the order of its columns.
-    pub(crate) fn new(solution: &[f64], delays: &Delays) -> Self {
-        let mut rest = solution.iter().copied();
-        let mut next = || rest.next().unwrap_or(0.0);
-        let a = delays.state.iter().map(|_| next()).collect();
-        let (mut b, mut c) = (Vec::new(), Vec::new());
-        for _ in &delays.ticks {
-            b.push(next());
-            c.extend(delays.product.iter().map(|_| next()));
-        }
-        Self {
-            a,
-            b,
-            c,
-            constant: next(),
-        }
-    }
-}
 
 /// ε of the free run as a function of the delays.
 pub(crate) struct FreeRun {

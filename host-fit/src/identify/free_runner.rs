@@ -11,7 +11,7 @@
 use model_core::delay::DelayLaw as _;
 
 use super::arrival::{Signals, core_law, factor};
-use super::free_run::Coefficients;
+use super::coefficients::Coefficients;
 use super::layout::Delays;
 use super::structure::{DelayLaw, InputDelay, Structure, WINDOW};
 

@@ -2,9 +2,8 @@
 
 use model_core::recursion::LagConvention;
 
-use super::arrival::FACTOR_STEP;
 use super::lagged_products::{Element, behind_newest};
-use super::structure::{InputDelay, Structure};
+use super::structure::{FACTOR_STEP, InputDelay, Structure};
 use crate::search::{Point, Variable};
 
 /// The delays of one candidate model, each list sorted and without repeats.

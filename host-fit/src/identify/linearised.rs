@@ -9,7 +9,7 @@
 //! least-squares coefficients of the candidate, in microseconds.
 
 use super::arrival::Signals;
-use super::free_run::Coefficients;
+use super::coefficients::Coefficients;
 use super::free_runner::Trajectory;
 use super::lagged_products::ONE;
 use super::layout::{Column, Delays, Layout};

@@ -7,6 +7,7 @@
 
 mod arrival;
 mod cholesky;
+mod coefficients;
 mod delay_search;
 mod error;
 mod exchange;

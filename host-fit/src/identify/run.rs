@@ -7,9 +7,10 @@ use model_core::model::Averaging;
 use model_core::recursion::Grading;
 
 use super::arrival::factor;
+use super::coefficients::Coefficients;
 use super::delay_search::search;
 use super::error::{IdentifyError, check};
-use super::free_run::{Coefficients, DIVERGED_VALUE};
+use super::free_run::DIVERGED_VALUE;
 use super::layout::Delays;
 use super::options::{IdentifyOptions, Objective};
 use super::refinement::{Refinement, refine};

@@ -2,11 +2,13 @@
 
 use model_core::recursion::LagConvention;
 
-use super::arrival::FACTOR_STEP;
 use crate::model::Start;
 
 /// Samples W of the averages, eqs. (1), (12) and (13).
 pub const WINDOW: u32 = 250;
+
+/// Step in which factors f are searched.
+pub(crate) const FACTOR_STEP: f64 = 1e-4;
 
 /// The three numbers of the delay law h̃(ỹ) = p0 + p1·exp(−p2·ỹ), eq. (2).
 #[derive(Debug, Clone, Copy, PartialEq)]

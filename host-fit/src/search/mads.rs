@@ -193,7 +193,8 @@ mod tests {
 
     use super::super::problem::Evaluation;
     use super::super::settings::PollKind;
-    use super::super::step::{Shake, Speculative};
+    use super::super::shake::Shake;
+    use super::super::step::Speculative;
     use super::super::variable::Variable;
     use super::*;
 

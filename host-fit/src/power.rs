@@ -7,7 +7,7 @@
 
 use crate::data::{Record, Use};
 use crate::dual::Dual;
-use crate::fit::dot;
+use crate::linalg::dot;
 use crate::model::{Delay, Model, Rounding};
 use crate::picture::significant;
 use crate::simulate::{Signals, SimulateError, Simulator};

@@ -18,6 +18,7 @@
 use super::edge::Edge;
 use super::front::{Expectation, expect, level_filter, own_front};
 use super::spread::mean;
+use crate::linalg::dot;
 
 /// Time constants of the course before and of the response, samples; 0 stands for a straight line.
 const BEFORE_SHAPES: [f64; 9] = [0.0, 8.0, 12.0, 17.0, 25.0, 36.0, 55.0, 90.0, 180.0];
@@ -268,10 +269,6 @@ impl Column {
             values,
         }
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// The response from `arrival` (in samples of the stretch) on, written into `out`.

@@ -1,7 +1,7 @@
 //! What held-out records say about two models: effect size, significance under
 //! correlated errors, and what chance would have given.
 
-use crate::fit::dot;
+use crate::linalg::dot;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Length of the blocks whose errors count as independent: this many correlation

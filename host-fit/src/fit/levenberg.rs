@@ -1,299 +1,191 @@
-//! Levenberg–Marquardt on the free run, ε of eq. (9), with exact sensitivities
-//! of everything smooth and secants for what acts in steps.
+//! Levenberg–Marquardt within bounds, on sums of squares that come in parts.
+//!
+//! Damped by the diagonal of JᵀJ (Marquardt 1963); a coordinate that would leave its
+//! bounds is held there and the others are solved again. A [`LeastSquares`] problem
+//! linearises itself one part (one record) at a time, so that parts can be run side by
+//! side and a cost that is too high is given up early.
 
-use crate::data::Record;
-use crate::dual::Dual;
-use crate::linalg;
-use crate::model::{Coordinate, Delay, Kind, Model, Rounding};
-use crate::simulate::{Signals, SimulateError, Simulator};
-use model_core::Output;
-use rayon::prelude::*;
-use std::ops::ControlFlow;
+use crate::linalg::{dot, solve_symmetric};
 
-/// Derivatives carried by one run: up to eight …
-const FEW: usize = 8;
-/// … or, where more are wanted, up to twelve.
-const MANY: usize = 12;
+/// First damping, as a share of the diagonal of JᵀJ.
+const FIRST_DAMPING: f64 = 1e-3;
+/// Damping after a step that helped, as a share of what it was, and its least value.
+const LESS_DAMPING: f64 = 0.2;
+const LEAST_DAMPING: f64 = 1e-9;
+/// Damping after a step that did not help, as a multiple of what it was; beyond the
+/// largest value a step is too short to matter.
+const MORE_DAMPING: f64 = 6.0;
+const LARGEST_DAMPING: f64 = 1e8;
+/// Steps tried from one linearisation.
+const TRIES: usize = 10;
+/// Added to the diagonal, so that a coordinate without influence stays where it is.
+const FLOOR: f64 = 1e-12;
+/// The residual is orthogonal to a column of J when the cosine between them is below this.
+const ORTHOGONAL: f64 = 1e-6;
 
-/// How to fit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FitOptions {
-    /// Most iterations.
-    pub iterations: usize,
-    /// Stop when an iteration lowers the sum of squares by less than this fraction.
-    pub tolerance: f64,
-    /// Whether the constant d may differ from 0.
-    pub constant: bool,
-    /// Whether coefficients a, b, c and d move.
-    pub linear: bool,
-    /// Whether the delay law moves.
-    pub delay: bool,
+/// Why a fit ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum StopReason {
+    /// An iteration lowered the sum of squares by less than the tolerance.
+    Converged,
+    /// The residual is orthogonal to everything that the free coordinates can do.
+    Stationary,
+    /// No coordinate is free to move.
+    NothingToFit,
+    /// As many iterations as allowed.
+    IterationLimit,
+    /// No step lowers the sum of squares, and yet it is not stationary: it is rougher
+    /// than its derivatives say.
+    NoDescent,
+    /// The derivatives grow without bound.
+    Diverged,
 }
 
-impl Default for FitOptions {
-    fn default() -> Self {
-        Self {
-            iterations: 30,
-            tolerance: 1e-5,
-            constant: false,
-            linear: true,
-            delay: true,
-        }
-    }
-}
-
-/// What a fit gives.
-#[derive(Clone, Debug)]
-pub struct Fit {
-    /// The model with its fitted parameters.
-    pub model: Model,
-    /// Σ (y − y_sim)² over the records.
-    pub sum_of_squares: f64,
-    /// Samples that were judged.
-    pub samples: usize,
-    /// Indices of the coordinates that moved.
-    pub free: Vec<usize>,
-    /// Covariance of the free coordinates that allows for correlated residuals,
-    /// row-major; NaN on the diagonal for those that the records leave unknown.
-    pub covariance: Vec<f64>,
-    /// Iterations made.
-    pub iterations: usize,
-}
-
-impl Fit {
-    /// Mean square error over the samples that were judged: comparable between
-    /// models that need warm-ups of different lengths. Infinite if none was.
+impl StopReason {
+    /// Whether the parameters are those of a minimum.
     #[must_use]
-    pub fn mean_square(&self) -> f64 {
-        if self.samples == 0 {
-            return f64::INFINITY;
-        }
-        self.sum_of_squares / self.samples as f64
+    pub fn was_successful(self) -> bool {
+        matches!(
+            self,
+            Self::Converged | Self::Stationary | Self::NothingToFit
+        )
     }
 
-    /// Standard error of the coordinate with index `index`, if it is known.
+    /// In words.
     #[must_use]
-    pub fn standard_error(&self, index: usize) -> Option<f64> {
-        let n = self.free.len();
-        let at = self.free.iter().position(|free| *free == index)?;
-        let variance = self.covariance.get(at * n + at)?;
-        (*variance >= 0.0).then(|| variance.sqrt())
-    }
-}
-
-/// How a coordinate is searched.
-#[derive(Clone, Copy, Debug)]
-struct Axis {
-    index: usize,
-    logarithmic: bool,
-    low: f64,
-    high: f64,
-    /// Half width of the secant, for coordinates that act in steps.
-    secant: Option<f64>,
-    /// The index of a coordinate that moves against this one, so that their sum stays.
-    against: Option<usize>,
-}
-
-impl Axis {
-    fn of(index: usize, coordinate: &Coordinate) -> Self {
-        match coordinate.parameter() {
-            None => Self {
-                index,
-                logarithmic: false,
-                low: f64::NEG_INFINITY,
-                high: f64::INFINITY,
-                secant: None,
-                against: None,
-            },
-            Some(parameter) => Self {
-                index,
-                logarithmic: parameter.is_logarithmic(),
-                low: parameter.low,
-                high: parameter.high,
-                secant: (!coordinate.is_smooth())
-                    .then_some(0.01 * (parameter.high - parameter.low)),
-                against: None,
-            },
-        }
-    }
-
-    /// d value / d searched.
-    fn slope(&self, value: f64) -> f64 {
-        if self.logarithmic { value } else { 1.0 }
-    }
-
-    fn moved(&self, value: f64, step: f64) -> f64 {
-        let moved = if self.logarithmic {
-            value * step.exp()
-        } else {
-            value + step
-        };
-        moved.clamp(self.low, self.high)
-    }
-
-    /// The lowest and highest step: to the bounds, and no leap in the dark.
-    fn reach(&self, value: f64) -> (f64, f64) {
-        if self.logarithmic {
-            let to = |bound: f64| (bound / value).ln();
-            (to(self.low).clamp(-2.0, 0.0), to(self.high).clamp(0.0, 2.0))
-        } else {
-            ((self.low - value).min(0.0), (self.high - value).max(0.0))
-        }
-    }
-}
-
-/// Residuals and Jacobian of one record.
-struct Linearised {
-    residual: Vec<f64>,
-    /// ∂y_sim/∂searched, one series per axis.
-    jacobian: Vec<Vec<f64>>,
-}
-
-struct Problem<'a> {
-    model: &'a Model,
-    signals: Vec<Signals<'a>>,
-    measured: Vec<&'a [f64]>,
-    axes: Vec<Axis>,
-    warm_up: usize,
-    rounding: Rounding,
-}
-
-impl Problem<'_> {
-    /// y_sim of a record; `None` if it diverges.
-    fn run(&self, values: &[f64], record: usize) -> Option<Vec<f64>> {
-        let signals = &self.signals[record];
-        let mut y = Vec::with_capacity(signals.u.len());
-        let simulator = Simulator::with_values(self.model, values, self.rounding);
-        let left = simulator.run(signals, |_, output: &Output<f64>| {
-            y.push(output.measured);
-            ControlFlow::Continue(())
-        });
-        left.is_none().then_some(y)
-    }
-
-    /// Σ r²; infinite if a run diverges, and not summed beyond `enough`.
-    fn cost(&self, values: &[f64], enough: f64) -> f64 {
-        let simulator = Simulator::with_values(self.model, values, self.rounding);
-        let each = |record: usize| {
-            let measured = self.measured[record];
-            let mut sum = 0.0;
-            let left = simulator.run(&self.signals[record], |k, output: &Output<f64>| {
-                if k >= self.warm_up {
-                    let error = measured[k] - output.measured;
-                    sum += error * error;
-                }
-                // NaN breaks off too.
-                if sum <= enough {
-                    ControlFlow::Continue(())
-                } else {
-                    ControlFlow::Break(())
-                }
-            });
-            if left.is_some() || sum.is_nan() {
-                f64::INFINITY
-            } else {
-                sum
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Converged => "converged",
+            Self::Stationary => "at a minimum",
+            Self::NothingToFit => "nothing is free to be fitted",
+            Self::IterationLimit => {
+                "stopped at the iteration limit: more iterations may lower the error further"
             }
-        };
-        let sums: Vec<f64> = (0..self.signals.len()).into_par_iter().map(each).collect();
-        sums.iter().sum()
+            Self::NoDescent => {
+                "stopped where no step lowers the error, short of a minimum of its linearisation"
+            }
+            Self::Diverged => "stopped where the sensitivities of the free run grow without bound",
+        }
     }
+}
 
-    fn linearise(&self, values: &[f64], record: usize) -> Option<Linearised> {
-        let smooth: Vec<usize> = (0..self.axes.len())
-            .filter(|axis| self.axes[*axis].secant.is_none())
-            .collect();
-        let mut jacobian: Vec<Vec<f64>> = vec![Vec::new(); self.axes.len()];
-        let mut simulated = None;
-        let chunks = smooth.chunks(if smooth.len() <= FEW { FEW } else { MANY });
-        for chunk in chunks {
-            let (run, columns) = if chunk.len() <= FEW {
-                self.sensitivities::<FEW>(values, record, chunk)?
-            } else {
-                self.sensitivities::<MANY>(values, record, chunk)?
+/// Residuals r and their Jacobian for one part of the data.
+pub(crate) struct Part {
+    /// Measurement minus model.
+    pub(crate) residual: Vec<f64>,
+    /// ∂model/∂searched, one series per coordinate, as long as the residual.
+    pub(crate) jacobian: Vec<Vec<f64>>,
+}
+
+/// A sum of squares to be minimised.
+pub(crate) trait LeastSquares {
+    /// Number of coordinates that are searched.
+    fn free(&self) -> usize;
+    /// Σ r² at `values`; infinite where the model diverges, and not summed beyond `enough`.
+    fn cost(&self, values: &[f64], enough: f64) -> f64;
+    /// All parts at `values`; `None` where the model diverges.
+    fn linearise(&self, values: &[f64]) -> Option<Vec<Part>>;
+    /// The lowest and the highest step of each coordinate from `values`.
+    fn reach(&self, values: &[f64]) -> Vec<(f64, f64)>;
+    /// `values` after a step of the searched coordinates.
+    fn moved(&self, values: &[f64], step: &[f64]) -> Vec<f64>;
+}
+
+/// Where a minimisation ended.
+pub(crate) struct Descent {
+    pub(crate) values: Vec<f64>,
+    pub(crate) cost: f64,
+    pub(crate) iterations: usize,
+    pub(crate) stop: StopReason,
+    /// The last linearisation and its JᵀJ (row-major); one iteration old where that
+    /// lowered the cost.
+    pub(crate) linearised: Option<(Vec<Part>, Vec<f64>)>,
+}
+
+/// Minimises from `values`, where the cost is `cost` and finite, in at most `iterations`
+/// iterations, until one lowers the cost by less than the share `tolerance`.
+pub(crate) fn minimise(
+    problem: &impl LeastSquares,
+    mut values: Vec<f64>,
+    mut cost: f64,
+    iterations: usize,
+    tolerance: f64,
+) -> Descent {
+    let n = problem.free();
+    let mut damping = FIRST_DAMPING;
+    let mut made = 0;
+    let mut linearised = None;
+    let stop = loop {
+        if n == 0 {
+            break StopReason::NothingToFit;
+        }
+        if made == iterations {
+            break StopReason::IterationLimit;
+        }
+        let Some(parts) = problem.linearise(&values) else {
+            break StopReason::Diverged;
+        };
+        let (information, gradient) = normal_equations(&parts, n);
+        made += 1;
+        let reach = problem.reach(&values);
+        let lowered = (0..TRIES).find_map(|_| {
+            if damping > LARGEST_DAMPING {
+                return None;
+            }
+            let mut damped = information.clone();
+            for i in 0..n {
+                damped[i * n + i] += damping * information[i * n + i] + FLOOR;
+            }
+            let moved =
+                bounded_step(&damped, &gradient, &reach).map(|step| problem.moved(&values, &step));
+            let lower = moved
+                .map(|moved| (problem.cost(&moved, cost), moved))
+                .filter(|(moved_cost, _)| *moved_cost < cost);
+            damping = match lower {
+                Some(_) => (damping * LESS_DAMPING).max(LEAST_DAMPING),
+                None => damping * MORE_DAMPING,
             };
-            simulated = Some(run);
-            for (axis, column) in chunk.iter().zip(columns) {
-                jacobian[*axis] = column;
-            }
-        }
-        let simulated = match simulated {
-            Some(run) => run,
-            None => self.run(values, record)?,
-        };
-        let measured = self.measured[record];
-        let residual = |(k, sim): (usize, &f64)| {
-            if k < self.warm_up {
-                0.0
-            } else {
-                measured[k] - sim
-            }
-        };
-        let residual: Vec<f64> = simulated.iter().enumerate().map(residual).collect();
-        for (axis, column) in self.axes.iter().zip(&mut jacobian) {
-            let Some(half) = axis.secant else { continue };
-            let at = |shift: f64| {
-                let mut moved = values.to_vec();
-                moved[axis.index] = (values[axis.index] + shift).clamp(axis.low, axis.high);
-                (moved[axis.index], self.run(&moved, record))
-            };
-            let ((above, high), (below, low)) = (at(half), at(-half));
-            let (high, low) = (high?, low?);
-            let width = (above - below).max(1e-12);
-            let scale = axis.slope(values[axis.index]) / width;
-            let slopes = high.iter().zip(&low).enumerate();
-            *column = slopes
-                .map(|(k, (high, low))| {
-                    if k < self.warm_up {
-                        0.0
-                    } else {
-                        (high - low) * scale
-                    }
-                })
-                .collect();
-        }
-        Some(Linearised { residual, jacobian })
-    }
-
-    /// y_sim of a record and its derivatives with respect to `axes`, at most `P`;
-    /// `None` if it diverges.
-    fn sensitivities<const P: usize>(
-        &self,
-        values: &[f64],
-        record: usize,
-        axes: &[usize],
-    ) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
-        let signals = &self.signals[record];
-        let mut duals: Vec<Dual<P>> = values.iter().map(|v| Dual::constant(*v)).collect();
-        for (slot, axis) in axes.iter().enumerate() {
-            let axis = &self.axes[*axis];
-            duals[axis.index].partials[slot] = axis.slope(values[axis.index]);
-            if let Some(index) = axis.against {
-                duals[index].partials[slot] = -1.0;
-            }
-        }
-        let mut y = Vec::with_capacity(signals.u.len());
-        let mut columns = vec![Vec::with_capacity(signals.u.len()); axes.len()];
-        let simulator = Simulator::with_values(self.model, &duals, self.rounding);
-        let left = simulator.run(signals, |k, output: &Output<Dual<P>>| {
-            y.push(output.measured.value);
-            for (column, slope) in columns.iter_mut().zip(output.measured.partials) {
-                column.push(if k < self.warm_up { 0.0 } else { slope });
-            }
-            ControlFlow::Continue(())
+            lower
         });
-        left.is_none().then_some((y, columns))
+        let stationary = is_stationary(&information, &gradient, &reach, cost);
+        linearised = Some((parts, information));
+        let Some((moved_cost, moved)) = lowered else {
+            break if stationary {
+                StopReason::Stationary
+            } else {
+                StopReason::NoDescent
+            };
+        };
+        let gain = (cost - moved_cost) / cost.max(f64::MIN_POSITIVE);
+        values = moved;
+        cost = moved_cost;
+        if gain < tolerance {
+            break StopReason::Converged;
+        }
+    };
+    Descent {
+        values,
+        cost,
+        iterations: made,
+        stop,
+        linearised,
     }
+}
 
-    fn linearise_all(&self, values: &[f64]) -> Option<Vec<Linearised>> {
-        let each = |record| self.linearise(values, record);
-        let all: Vec<_> = (0..self.signals.len()).into_par_iter().map(each).collect();
-        all.into_iter().collect()
-    }
+/// Whether the residual is orthogonal to every column of J along which the bounds leave room.
+fn is_stationary(a: &[f64], g: &[f64], reach: &[(f64, f64)], cost: f64) -> bool {
+    let n = g.len();
+    (0..n).all(|i| {
+        let (low, high) = reach[i];
+        let blocked = if g[i] > 0.0 { high <= 0.0 } else { low >= 0.0 };
+        blocked || g[i].abs() <= ORTHOGONAL * (a[i * n + i] * cost).sqrt()
+    })
 }
 
 /// JᵀJ (row-major) and Jᵀr.
-fn normal_equations(parts: &[Linearised], n: usize) -> (Vec<f64>, Vec<f64>) {
+fn normal_equations(parts: &[Part], n: usize) -> (Vec<f64>, Vec<f64>) {
     let mut information = vec![0.0; n * n];
     let mut gradient = vec![0.0; n];
     for part in parts {
@@ -311,25 +203,6 @@ fn normal_equations(parts: &[Linearised], n: usize) -> (Vec<f64>, Vec<f64>) {
     (information, gradient)
 }
 
-/// Four partial sums, so that the processor can work on them side by side; the
-/// order is fixed and the result repeatable.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4
-        .remainder()
-        .iter()
-        .zip(b4.remainder())
-        .map(|(a, b)| a * b)
-        .sum();
-    for (a, b) in a4.zip(b4) {
-        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
-            *sum += a * b;
-        }
-    }
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
-}
-
 /// The minimiser of ½ sᵀ·A·s − gᵀ·s within bounds: coordinates that would leave
 /// are held at their bound and the others solved again.
 fn bounded_step(a: &[f64], g: &[f64], reach: &[(f64, f64)]) -> Option<Vec<f64>> {
@@ -345,7 +218,7 @@ fn bounded_step(a: &[f64], g: &[f64], reach: &[(f64, f64)]) -> Option<Vec<f64>> 
                 .collect();
             let rest = |i: &usize| g[*i] - (0..n).map(|j| a[i * n + j] * step[j]).sum::<f64>();
             let right: Vec<f64> = free.iter().map(rest).collect();
-            for (i, value) in free.iter().zip(linalg::solve_symmetric(&sub, &right)?) {
+            for (i, value) in free.iter().zip(solve_symmetric(&sub, &right)?) {
                 step[*i] = value;
             }
         }
@@ -363,249 +236,316 @@ fn bounded_step(a: &[f64], g: &[f64], reach: &[(f64, f64)]) -> Option<Vec<f64>> 
     }
 }
 
-/// Fits the parameters of `model` to `records` in free run, from where they are.
-///
-/// A rounded state-dependent delay is fitted without its rounding, which makes the free
-/// run smooth; the coefficients are then fitted again with it.
-///
-/// # Errors
-/// A missing channel, or a model whose free run diverges from the start.
-pub fn fit(model: &Model, records: &[&Record], options: &FitOptions) -> Result<Fit, SimulateError> {
-    let rounded = matches!(
-        model.delay,
-        Delay::StateDependent {
-            interpolated: false,
-            ..
-        }
-    );
-    if !rounded {
-        return descend(model, records, options, Rounding::Samples);
-    }
-    let smooth = descend(model, records, options, Rounding::None)?;
-    let last = FitOptions {
-        iterations: options.iterations.min(4),
-        delay: false,
-        ..*options
-    };
-    let rounded = descend(&smooth.model, records, &last, Rounding::Samples)?;
-    Ok(Fit {
-        model: rounded.model,
-        sum_of_squares: rounded.sum_of_squares,
-        ..smooth
-    })
-}
-
-fn descend(
-    model: &Model,
-    records: &[&Record],
-    options: &FitOptions,
-    rounding: Rounding,
-) -> Result<Fit, SimulateError> {
-    let signals: Result<Vec<_>, _> = records.iter().map(|r| Signals::of(model, r)).collect();
-    let coordinates = model.coordinates();
-    let moves = |index: usize, coordinate: &Coordinate| match coordinate.parameter() {
-        None => options.linear && (index > 0 || options.constant),
-        Some(parameter) if parameter.low >= parameter.high => false,
-        Some(_) => options.delay || !matches!(coordinate.kind, Kind::Delay(_)),
-    };
-    let axes: Vec<Axis> = coordinates
-        .iter()
-        .enumerate()
-        .filter(|(index, coordinate)| moves(*index, coordinate))
-        .map(|(index, coordinate)| Axis {
-            against: held_sum(model, index),
-            ..Axis::of(index, coordinate)
-        })
-        .collect();
-    let problem = Problem {
-        model,
-        signals: signals?,
-        measured: records.iter().map(|record| record.y.as_slice()).collect(),
-        axes,
-        warm_up: model.warm_up(),
-        rounding,
-    };
-    let n = problem.axes.len();
-    let samples: usize = records
-        .iter()
-        .map(|r| r.y.len().saturating_sub(problem.warm_up))
-        .sum();
-    let mut values = model.values();
-    let mut cost = problem.cost(&values, f64::INFINITY);
-    if !cost.is_finite() {
-        for record in records {
-            model.free_run(record)?;
-        }
-    }
-    let mut damping = 1e-3;
-    let mut iterations = 0;
-    let mut linearised = None;
-    while iterations < options.iterations && n > 0 {
-        let Some(parts) = problem.linearise_all(&values) else {
-            break;
-        };
-        let (information, gradient) = normal_equations(&parts, n);
-        linearised = Some((parts, information.clone()));
-        iterations += 1;
-        let mut lowered = None;
-        for _ in 0..10 {
-            let mut damped = information.clone();
-            for i in 0..n {
-                damped[i * n + i] += damping * information[i * n + i] + 1e-12;
-            }
-            let reach: Vec<(f64, f64)> = problem
-                .axes
-                .iter()
-                .map(|axis| axis.reach(values[axis.index]))
-                .collect();
-            if let Some(step) = bounded_step(&damped, &gradient, &reach) {
-                let mut moved = values.clone();
-                for (axis, step) in problem.axes.iter().zip(&step) {
-                    moved[axis.index] = axis.moved(moved[axis.index], *step);
-                    if let Some(index) = axis.against {
-                        moved[index] -= step;
-                    }
-                }
-                let moved_cost = problem.cost(&moved, cost);
-                if moved_cost < cost {
-                    lowered = Some((moved, moved_cost));
-                    damping = (damping * 0.2).max(1e-9);
-                    break;
-                }
-            }
-            damping *= 6.0;
-            if damping > 1e8 {
-                break;
-            }
-        }
-        let Some((moved, moved_cost)) = lowered else {
-            break;
-        };
-        let gain = (cost - moved_cost) / cost.max(f64::MIN_POSITIVE);
-        values = moved;
-        cost = moved_cost;
-        if gain < options.tolerance {
-            break;
-        }
-    }
-    let covariance = linearised
-        .and_then(|(parts, information)| {
-            let (inverse, unknown) = linalg::inverse_where_known(&information, n)?;
-            let searched = sandwich(&parts, &inverse, n);
-            let mut covariance = in_values(&searched, &problem.axes, &values);
-            for (i, _) in unknown.iter().enumerate().filter(|(_, unknown)| **unknown) {
-                covariance[i * n + i] = f64::NAN;
-            }
-            Some(covariance)
-        })
-        .unwrap_or_default();
-    Ok(Fit {
-        model: model.with_values(&values),
-        sum_of_squares: cost,
-        samples,
-        free: problem.axes.iter().map(|axis| axis.index).collect(),
-        covariance,
-        iterations,
-    })
-}
-
-/// (JᵀJ)⁻¹ S (JᵀJ)⁻¹ with S the long-run covariance of J·r (Newey & West 1987,
-/// Bartlett weights): residuals of a free run are correlated over many samples,
-/// and standard errors that ignore it are several times too small.
-fn sandwich(parts: &[Linearised], inverse: &[f64], n: usize) -> Vec<f64> {
-    let mut middle = vec![0.0; n * n];
-    // Sums over blocks much longer than the noise's memory (batch means) are
-    // uncorrelated, and their outer products are cheap.
-    for part in parts {
-        let length = part.residual.len();
-        let block = (length / 40).clamp(1, 250);
-        let mut from = 0;
-        while from < length {
-            let to = (from + block).min(length);
-            let score: Vec<f64> = (0..n)
-                .map(|i| dot(&part.jacobian[i][from..to], &part.residual[from..to]))
-                .collect();
-            for i in 0..n {
-                for j in 0..n {
-                    middle[i * n + j] += score[i] * score[j];
-                }
-            }
-            from = to;
-        }
-    }
-    let half = product(n, |i, k| inverse[i * n + k], |k, j| middle[k * n + j]);
-    product(n, |i, k| half[i * n + k], |k, j| inverse[k * n + j])
-}
-
-/// Covariance of the coordinates themselves from that of what is searched.
-fn in_values(searched: &[f64], axes: &[Axis], values: &[f64]) -> Vec<f64> {
-    let n = axes.len();
-    // ∂coordinate i/∂searched j.
-    let slope = |i: usize, j: usize| match axes[j].against {
-        _ if i == j => axes[j].slope(values[axes[j].index]),
-        Some(index) if axes[i].index == index => -1.0,
-        _ => 0.0,
-    };
-    let half = product(n, slope, |k, j| searched[k * n + j]);
-    product(n, |i, k| half[i * n + k], |k, j| slope(j, k))
-}
-
-/// The product of two square matrices, row-major.
-fn product(
-    n: usize,
-    left: impl Fn(usize, usize) -> f64,
-    right: impl Fn(usize, usize) -> f64,
-) -> Vec<f64> {
-    let cells = (0..n * n).map(|cell| (cell / n, cell % n));
-    cells
-        .map(|(i, j)| (0..n).map(|k| left(i, k) * right(k, j)).sum())
-        .collect()
-}
-
-/// The coordinate that moves against the one with index `index`: a_1 against every
-/// other a_i. Oversampled rigs fix the sum of the a_i to many digits and what is
-/// left to fewer; damped in proportion to the former, the latter would never move.
-fn held_sum(model: &Model, index: usize) -> Option<usize> {
-    // The constant comes before a_1.
-    (2..=model.a.len()).contains(&index).then_some(1)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::Use;
-    use crate::model::Start;
+    use crate::linalg::inverse_where_known;
 
-    /// A motor's position at 1 kHz: a_1 + a_2 is 1 to many digits, and what the fit
-    /// is after, the damping, lies in the rest.
-    #[test]
-    fn the_damping_of_an_oversampled_integrator_is_found() {
-        let u: Vec<f64> = (0..4000)
-            .map(|k| if k / 300 % 2 == 0 { 1.0 } else { -0.9 })
-            .collect();
-        let model = |pole: f64, gain: f64| Model {
-            sample_period_s: 0.001,
-            start: Start::Measured,
-            state_lags: vec![1, 2],
-            a: vec![1.0 + pole, -pole],
-            product_lags: Vec::new(),
-            b: vec![gain],
-            c: Vec::new(),
-            delay: Delay::Fixed { delays: vec![0] },
-            ..Model::default()
-        };
-        let mut y = vec![0.0, 0.0];
-        for k in 1..u.len() - 1 {
-            y.push(1.998 * y[k] - 0.998 * y[k - 1] + 1e-5 * u[k]);
+    /// A curve through points, free of bounds unless given.
+    struct Curve {
+        points: Vec<(f64, f64)>,
+        /// The curve and its slopes along the parameters.
+        model: fn(&[f64], f64) -> (f64, Vec<f64>),
+        bounds: Vec<(f64, f64)>,
+    }
+
+    impl Curve {
+        fn sum(&self, values: &[f64]) -> f64 {
+            let error = |(y, x): &(f64, f64)| (y - (self.model)(values, *x).0).powi(2);
+            self.points.iter().map(error).sum()
         }
-        let record = Record::new("moves", Use::Identify, 0.001, u, y);
-        let start = model(0.99, 4e-5);
-        let fitted = fit(&start, &[&record], &FitOptions::default()).expect("a fit");
-        assert!(
-            (fitted.model.a[1] + 0.998).abs() < 1e-5,
-            "{:?}",
-            fitted.model.a
-        );
-        assert!(fitted.standard_error(1).is_some_and(|error| error < 1e-4));
+    }
+
+    impl LeastSquares for Curve {
+        fn free(&self) -> usize {
+            self.bounds.len()
+        }
+        fn cost(&self, values: &[f64], _: f64) -> f64 {
+            self.sum(values)
+        }
+        /// Two parts, to see that parts add up.
+        fn linearise(&self, values: &[f64]) -> Option<Vec<Part>> {
+            let (first, second) = self.points.split_at(self.points.len() / 3);
+            let part = |points: &[(f64, f64)]| {
+                let at: Vec<_> = points.iter().map(|p| (self.model)(values, p.1)).collect();
+                Part {
+                    residual: points.iter().zip(&at).map(|(p, m)| p.0 - m.0).collect(),
+                    jacobian: (0..values.len())
+                        .map(|i| at.iter().map(|m| m.1[i]).collect())
+                        .collect(),
+                }
+            };
+            Some(vec![part(first), part(second)])
+        }
+        fn reach(&self, values: &[f64]) -> Vec<(f64, f64)> {
+            let room = |(value, (low, high)): (&f64, &(f64, f64))| (low - value, high - value);
+            values.iter().zip(&self.bounds).map(room).collect()
+        }
+        fn moved(&self, values: &[f64], step: &[f64]) -> Vec<f64> {
+            values.iter().zip(step).map(|(v, s)| v + s).collect()
+        }
+    }
+
+    fn solve(curve: &Curve, start: &[f64]) -> Descent {
+        minimise(curve, start.to_vec(), curve.sum(start), 2000, 1e-15)
+    }
+
+    /// A problem of the Statistical Reference Datasets (NIST, nonlinear regression) with
+    /// its certified values: parameters, their standard deviations, residual sum of squares.
+    struct Reference {
+        name: &'static str,
+        y: &'static [f64],
+        x: &'static [f64],
+        model: fn(&[f64], f64) -> (f64, Vec<f64>),
+        /// From far and from near.
+        starts: [&'static [f64]; 2],
+        certified: &'static [f64],
+        deviations: &'static [f64],
+        sum: f64,
+    }
+
+    const REFERENCES: [Reference; 6] = [
+        Reference {
+            name: "Misra1a",
+            y: &[
+                10.07, 14.73, 17.94, 23.93, 29.61, 35.18, 40.02, 44.82, 50.76, 55.05, 61.01, 66.40,
+                75.47, 81.78,
+            ],
+            x: &[
+                77.6, 114.9, 141.1, 190.8, 239.9, 289.0, 332.8, 378.4, 434.8, 477.3, 536.8, 593.1,
+                689.1, 760.0,
+            ],
+            model: rising,
+            starts: [&[500.0, 0.0001], &[250.0, 0.0005]],
+            certified: &[2.3894212918e2, 5.5015643181e-4],
+            deviations: &[2.7070075241, 7.2668688436e-6],
+            sum: 1.2455138894e-1,
+        },
+        Reference {
+            name: "BoxBOD",
+            y: &[109.0, 149.0, 149.0, 191.0, 213.0, 224.0],
+            x: &[1.0, 2.0, 3.0, 5.0, 7.0, 10.0],
+            model: rising,
+            starts: [&[1.0, 1.0], &[100.0, 0.75]],
+            certified: &[2.1380940889e2, 5.4723748542e-1],
+            deviations: &[1.2354515176e1, 1.0455993237e-1],
+            sum: 1.1680088766e3,
+        },
+        Reference {
+            name: "Rat42",
+            y: &[
+                8.930, 10.800, 18.590, 22.330, 39.350, 56.110, 61.730, 64.620, 67.080,
+            ],
+            x: &[9.0, 14.0, 21.0, 28.0, 42.0, 57.0, 63.0, 70.0, 79.0],
+            model: |b, x| {
+                let e = (b[1] - b[2] * x).exp();
+                let whole = b[0] / (1.0 + e);
+                let slope = -whole * e / (1.0 + e);
+                (whole, vec![1.0 / (1.0 + e), slope, -slope * x])
+            },
+            starts: [&[100.0, 1.0, 0.1], &[75.0, 2.5, 0.07]],
+            certified: &[7.2462237576e1, 2.6180768402, 6.7359200066e-2],
+            deviations: &[1.7340283401, 8.8295217536e-2, 3.4465663377e-3],
+            sum: 8.0565229338,
+        },
+        Reference {
+            name: "MGH09",
+            y: &[
+                0.1957, 0.1947, 0.1735, 0.16, 0.0844, 0.0627, 0.0456, 0.0342, 0.0323, 0.0235,
+                0.0246,
+            ],
+            x: &[
+                4.0, 2.0, 1.0, 0.5, 0.25, 0.167, 0.125, 0.1, 0.0833, 0.0714, 0.0625,
+            ],
+            model: |b, x| {
+                let (above, below) = (x * x + x * b[1], x * x + x * b[2] + b[3]);
+                let whole = b[0] * above / below;
+                let slopes = vec![
+                    above / below,
+                    b[0] * x / below,
+                    -whole * x / below,
+                    -whole / below,
+                ];
+                (whole, slopes)
+            },
+            starts: [&[25.0, 39.0, 41.5, 39.0], &[0.25, 0.39, 0.415, 0.39]],
+            certified: &[
+                1.9280693458e-1,
+                1.9128232873e-1,
+                1.2305650693e-1,
+                1.3606233068e-1,
+            ],
+            deviations: &[
+                1.1435312227e-2,
+                1.9633220911e-1,
+                8.0842031232e-2,
+                9.0025542308e-2,
+            ],
+            sum: 3.0750560385e-4,
+        },
+        Reference {
+            name: "MGH10",
+            y: &[
+                34780.0, 28610.0, 23650.0, 19630.0, 16370.0, 13720.0, 11540.0, 9744.0, 8261.0,
+                7030.0, 6005.0, 5147.0, 4427.0, 3820.0, 3307.0, 2872.0,
+            ],
+            x: &[
+                50.0, 55.0, 60.0, 65.0, 70.0, 75.0, 80.0, 85.0, 90.0, 95.0, 100.0, 105.0, 110.0,
+                115.0, 120.0, 125.0,
+            ],
+            model: |b, x| {
+                let e = (b[1] / (x + b[2])).exp();
+                let whole = b[0] * e;
+                (
+                    whole,
+                    vec![e, whole / (x + b[2]), -whole * b[1] / (x + b[2]).powi(2)],
+                )
+            },
+            starts: [&[2.0, 400_000.0, 25_000.0], &[0.02, 4000.0, 250.0]],
+            certified: &[5.6096364710e-3, 6.1813463463e3, 3.4522363462e2],
+            deviations: &[1.5687892471e-4, 2.3309021107e1, 7.8486103508e-1],
+            sum: 8.7945855171e1,
+        },
+        Reference {
+            name: "Thurber",
+            y: &[
+                80.574, 84.248, 87.264, 87.195, 89.076, 89.608, 89.868, 90.101, 92.405, 95.854,
+                100.696, 101.060, 401.672, 390.724, 567.534, 635.316, 733.054, 759.087, 894.206,
+                990.785, 1090.109, 1080.914, 1122.643, 1178.351, 1260.531, 1273.514, 1288.339,
+                1327.543, 1353.863, 1414.509, 1425.208, 1421.384, 1442.962, 1464.350, 1468.705,
+                1447.894, 1457.628,
+            ],
+            x: &[
+                -3.067, -2.981, -2.921, -2.912, -2.840, -2.797, -2.702, -2.699, -2.633, -2.481,
+                -2.363, -2.322, -1.501, -1.460, -1.274, -1.212, -1.100, -1.046, -0.915, -0.714,
+                -0.566, -0.545, -0.400, -0.309, -0.109, -0.103, 0.010, 0.119, 0.377, 0.790, 0.963,
+                1.006, 1.115, 1.572, 1.841, 2.047, 2.200,
+            ],
+            model: |b, x| {
+                let powers = [1.0, x, x * x, x * x * x];
+                let above: f64 = b.iter().zip(powers).map(|(b, p)| b * p).sum();
+                let below = 1.0 + b[4] * x + b[5] * powers[2] + b[6] * powers[3];
+                let whole = above / below;
+                let up = powers.iter().map(|p| p / below);
+                let down = powers.iter().skip(1).map(|p| -whole * p / below);
+                (whole, up.chain(down).collect())
+            },
+            starts: [
+                &[1000.0, 1000.0, 400.0, 40.0, 0.7, 0.3, 0.03],
+                &[1300.0, 1500.0, 500.0, 75.0, 1.0, 0.4, 0.05],
+            ],
+            certified: &[
+                1.2881396800e3,
+                1.4910792535e3,
+                5.8323836877e2,
+                7.5416644291e1,
+                9.6629502864e-1,
+                3.9797285797e-1,
+                4.9727297349e-2,
+            ],
+            deviations: &[
+                4.6647963344,
+                3.9571156086e1,
+                2.8698696102e1,
+                5.5675370270,
+                3.1333340687e-2,
+                1.4984928198e-2,
+                6.5842344623e-3,
+            ],
+            sum: 5.6427082397e3,
+        },
+    ];
+
+    /// b1·(1 − exp(−b2·x)).
+    fn rising(b: &[f64], x: f64) -> (f64, Vec<f64>) {
+        let e = (-b[1] * x).exp();
+        (b[0] * (1.0 - e), vec![1.0 - e, b[0] * x * e])
+    }
+
+    fn curve(reference: &Reference) -> Curve {
+        let points = reference.y.iter().copied().zip(reference.x.iter().copied());
+        Curve {
+            points: points.collect(),
+            model: reference.model,
+            bounds: vec![(f64::NEG_INFINITY, f64::INFINITY); reference.certified.len()],
+        }
+    }
+
+    #[test]
+    fn certified_values_are_reached() {
+        for reference in &REFERENCES {
+            let (name, n) = (reference.name, reference.certified.len());
+            let curve = curve(reference);
+            for start in reference.starts {
+                // From far off two of the problems lead into flat country.
+                if matches!(name, "BoxBOD" | "MGH10") && start == reference.starts[0] {
+                    continue;
+                }
+                let end = solve(&curve, start);
+                assert!(end.stop.was_successful(), "{name}: {:?}", end.stop);
+                assert!((end.cost / reference.sum - 1.0).abs() < 1e-9, "{name}");
+                for (found, certified) in end.values.iter().zip(reference.certified) {
+                    assert!((found / certified - 1.0).abs() < 1e-7, "{name}: {found}");
+                }
+                let (_, information) = end.linearised.expect("iterations were made");
+                let (inverse, _) = inverse_where_known(&information, n).expect("regular");
+                let variance = end.cost / (reference.y.len() - n) as f64;
+                for (i, certified) in reference.deviations.iter().enumerate() {
+                    let found = (inverse[i * n + i] * variance).sqrt();
+                    assert!((found / certified - 1.0).abs() < 1e-4, "{name}: {found}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_minimum_is_not_called_one() {
+        for reference in &REFERENCES {
+            if matches!(reference.name, "BoxBOD" | "MGH10") {
+                let end = solve(&curve(reference), reference.starts[0]);
+                assert!(end.cost > 2.0 * reference.sum);
+                assert!(!end.stop.was_successful(), "{}", reference.name);
+            }
+        }
+    }
+
+    /// With b1 held below its minimum the other parameter takes what is left.
+    #[test]
+    fn a_bound_holds_one_coordinate_and_the_others_go_on() {
+        let mut curve = curve(&REFERENCES[0]);
+        curve.bounds = vec![(0.0, 200.0), (0.0, 1.0)];
+        let end = solve(&curve, &[150.0, 1e-3]);
+        assert!(end.stop.was_successful(), "{:?}", end.stop);
+        assert_eq!(end.values[0], 200.0);
+        for other in [0.999, 1.001] {
+            assert!(curve.sum(&[200.0, other * end.values[1]]) > end.cost);
+        }
+    }
+
+    #[test]
+    fn a_fit_says_why_it_ended() {
+        let curve = curve(&REFERENCES[0]);
+        let stop = |iterations, tolerance| {
+            let start = REFERENCES[0].starts[0];
+            let end = minimise(
+                &curve,
+                start.to_vec(),
+                curve.sum(start),
+                iterations,
+                tolerance,
+            );
+            assert!(end.iterations <= iterations && !end.stop.words().is_empty());
+            end.stop
+        };
+        assert_eq!(stop(3, 1e-9), StopReason::IterationLimit);
+        assert_eq!(stop(100, 1e-3), StopReason::Converged);
+        assert_eq!(stop(0, 1e-3), StopReason::IterationLimit);
+        let nothing = Curve {
+            bounds: Vec::new(),
+            ..curve
+        };
+        let end = minimise(&nothing, vec![1.0, 1.0], 1.0, 5, 1e-3);
+        assert_eq!((end.stop, end.iterations), (StopReason::NothingToFit, 0));
+        assert!(end.stop.was_successful());
     }
 }

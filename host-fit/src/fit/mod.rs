@@ -2,12 +2,13 @@
 
 mod candidate;
 mod drift;
+mod free_run;
 mod lean;
 mod levenberg;
 
 pub use candidate::{CandidateError, fit_with_effect};
 pub(crate) use drift::pieces;
 pub use drift::restart_after;
+pub use free_run::{Fit, FitOptions, fit};
 pub use lean::{lean_base, settle_fixed_delay};
-pub(crate) use levenberg::dot;
-pub use levenberg::{Fit, FitOptions, fit};
+pub use levenberg::StopReason;

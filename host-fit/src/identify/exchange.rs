@@ -6,10 +6,10 @@
 //! that is over all lags, at a time.
 
 use super::arrival::Weights;
-use super::cholesky::Cholesky;
 use super::lagged_products::{ONE, TARGET, Table};
 use super::layout::{Column, Delays};
 use super::regression::Regression;
+use crate::linalg::Cholesky;
 
 /// Gains below this share of the residual are rounding.
 const NEGLIGIBLE: f64 = 1e-7;

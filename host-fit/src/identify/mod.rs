@@ -6,7 +6,6 @@
 //! costs look-ups and a small solve.
 
 mod arrival;
-mod cholesky;
 mod coefficients;
 mod delay_search;
 mod error;

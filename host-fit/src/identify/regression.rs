@@ -3,11 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::arrival::{Signals, Weights, difference};
-use super::cholesky::Cholesky;
 use super::lagged_products::{LaggedOutputs, TARGET, Table};
 use super::layout::{Column, Delays, Layout};
 use super::structure::{Series, Structure};
-use crate::linalg;
+use crate::linalg::{self, Cholesky};
 
 /// Tables kept; the longest unused goes first. One of 500 lags takes 2 MB.
 const TABLES_KEPT: usize = 48;

@@ -3,7 +3,7 @@
 
 use super::binned::{Binned, Folds};
 use super::rules::RULES;
-use crate::fit::dot;
+use crate::linalg::dot;
 use std::collections::BTreeMap;
 
 /// The error of a free run, record by record, with the variance of the noise.

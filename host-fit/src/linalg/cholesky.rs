@@ -1,4 +1,4 @@
-//! Cholesky factors of small Gram matrices, the innermost loop of the search.
+//! Cholesky factors of small symmetric matrices, the innermost loop of the search.
 
 /// A pivot below this share of its diagonal entry marks a dependent column,
 /// which is left out: the residual is then that of the pseudo-inverse.
@@ -73,6 +73,14 @@ impl Cholesky {
     }
 }
 
+/// Solves A·x = b for a symmetric positive definite A (row-major); `None` if it
+/// is not. Unknowns may be of very different size.
+pub(crate) fn solve_symmetric(a: &[f64], b: &[f64]) -> Option<Vec<f64>> {
+    let factor = Cholesky::new(a, b.len());
+    let complete = factor.inverse_diagonal.iter().all(|inverse| *inverse > 0.0);
+    complete.then(|| factor.backward(factor.forward(b)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -103,5 +111,21 @@ mod tests {
             (x[0] - 1.0).abs() < 1e-12 && x[1] == 0.0 && x[2].abs() < 1e-12,
             "{x:?}"
         );
+    }
+
+    #[test]
+    fn unknowns_of_very_different_size_are_solved_and_singular_systems_refused() {
+        let x = solve_symmetric(&[4.0, 0.0, 0.0, 1e-12], &[8.0, 1e-12]).expect("a solution");
+        assert!(
+            (x[0] - 2.0).abs() < 1e-12 && (x[1] - 1.0).abs() < 1e-12,
+            "{x:?}"
+        );
+        let x = solve_symmetric(&[4.0, 4e3, 4e3, 5e6], &[8.0, 9e3]).expect("a solution");
+        assert!(
+            (x[0] - 1.0).abs() < 1e-9 && (x[1] - 1e-3).abs() < 1e-12,
+            "{x:?}"
+        );
+        assert_eq!(solve_symmetric(&[4.0, 4e3, 4e3, 4e6], &[8.0, 8e3]), None);
+        assert_eq!(solve_symmetric(&[-1.0], &[1.0]), None);
     }
 }

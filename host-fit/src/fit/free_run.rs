@@ -1,0 +1,526 @@
+//! Fits of a model's free run, ε of eq. (9): exact sensitivities of everything smooth
+//! by dual numbers, secants for what acts in steps, and standard errors that allow for
+//! correlated residuals.
+
+use super::levenberg::{LeastSquares, Part, StopReason, minimise};
+use crate::data::Record;
+use crate::dual::Dual;
+use crate::linalg::{self, dot};
+use crate::model::{Coordinate, Delay, Kind, Model, Rounding};
+use crate::simulate::{Signals, SimulateError, Simulator};
+use model_core::Output;
+use rayon::prelude::*;
+use std::ops::ControlFlow;
+
+/// Derivatives carried by one run: up to eight …
+const FEW: usize = 8;
+/// … or, where more are wanted, up to twelve.
+const MANY: usize = 12;
+
+/// How to fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitOptions {
+    /// Most iterations.
+    pub iterations: usize,
+    /// Stop when an iteration lowers the sum of squares by less than this fraction.
+    pub tolerance: f64,
+    /// Whether the constant d may differ from 0.
+    pub constant: bool,
+    /// Whether coefficients a, b, c and d move.
+    pub linear: bool,
+    /// Whether the delay law moves.
+    pub delay: bool,
+}
+
+impl Default for FitOptions {
+    fn default() -> Self {
+        Self {
+            iterations: 30,
+            tolerance: 1e-5,
+            constant: false,
+            linear: true,
+            delay: true,
+        }
+    }
+}
+
+/// What a fit gives.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The model with its fitted parameters.
+    pub model: Model,
+    /// Σ (y − y_sim)² over the records.
+    pub sum_of_squares: f64,
+    /// Samples that were judged.
+    pub samples: usize,
+    /// Indices of the coordinates that moved.
+    pub free: Vec<usize>,
+    /// Covariance of the free coordinates that allows for correlated residuals,
+    /// row-major; NaN on the diagonal for those that the records leave unknown.
+    pub covariance: Vec<f64>,
+    /// Iterations made.
+    pub iterations: usize,
+    /// Why the fit ended.
+    pub stop: StopReason,
+}
+
+impl Fit {
+    /// Mean square error over the samples that were judged: comparable between
+    /// models that need warm-ups of different lengths. Infinite if none was.
+    #[must_use]
+    pub fn mean_square(&self) -> f64 {
+        if self.samples == 0 {
+            return f64::INFINITY;
+        }
+        self.sum_of_squares / self.samples as f64
+    }
+
+    /// Standard error of the coordinate with index `index`, if it is known.
+    #[must_use]
+    pub fn standard_error(&self, index: usize) -> Option<f64> {
+        let n = self.free.len();
+        let at = self.free.iter().position(|free| *free == index)?;
+        let variance = self.covariance.get(at * n + at)?;
+        (*variance >= 0.0).then(|| variance.sqrt())
+    }
+}
+
+/// How a coordinate is searched.
+#[derive(Clone, Copy, Debug)]
+struct Axis {
+    index: usize,
+    logarithmic: bool,
+    low: f64,
+    high: f64,
+    /// Half width of the secant, for coordinates that act in steps.
+    secant: Option<f64>,
+    /// The index of a coordinate that moves against this one, so that their sum stays.
+    against: Option<usize>,
+}
+
+impl Axis {
+    fn of(index: usize, coordinate: &Coordinate) -> Self {
+        match coordinate.parameter() {
+            None => Self {
+                index,
+                logarithmic: false,
+                low: f64::NEG_INFINITY,
+                high: f64::INFINITY,
+                secant: None,
+                against: None,
+            },
+            Some(parameter) => Self {
+                index,
+                logarithmic: parameter.is_logarithmic(),
+                low: parameter.low,
+                high: parameter.high,
+                secant: (!coordinate.is_smooth())
+                    .then_some(0.01 * (parameter.high - parameter.low)),
+                against: None,
+            },
+        }
+    }
+
+    /// d value / d searched.
+    fn slope(&self, value: f64) -> f64 {
+        if self.logarithmic { value } else { 1.0 }
+    }
+
+    fn moved(&self, value: f64, step: f64) -> f64 {
+        let moved = if self.logarithmic {
+            value * step.exp()
+        } else {
+            value + step
+        };
+        moved.clamp(self.low, self.high)
+    }
+
+    /// The lowest and highest step: to the bounds, and no leap in the dark.
+    fn reach(&self, value: f64) -> (f64, f64) {
+        if self.logarithmic {
+            let to = |bound: f64| (bound / value).ln();
+            (to(self.low).clamp(-2.0, 0.0), to(self.high).clamp(0.0, 2.0))
+        } else {
+            ((self.low - value).min(0.0), (self.high - value).max(0.0))
+        }
+    }
+}
+
+struct Problem<'a> {
+    model: &'a Model,
+    signals: Vec<Signals<'a>>,
+    measured: Vec<&'a [f64]>,
+    axes: Vec<Axis>,
+    warm_up: usize,
+    rounding: Rounding,
+}
+
+impl Problem<'_> {
+    /// y_sim of a record; `None` if it diverges.
+    fn run(&self, values: &[f64], record: usize) -> Option<Vec<f64>> {
+        let signals = &self.signals[record];
+        let mut y = Vec::with_capacity(signals.u.len());
+        let simulator = Simulator::with_values(self.model, values, self.rounding);
+        let left = simulator.run(signals, |_, output: &Output<f64>| {
+            y.push(output.measured);
+            ControlFlow::Continue(())
+        });
+        left.is_none().then_some(y)
+    }
+
+    /// Residuals of a record and their Jacobian; `None` if it diverges.
+    fn part(&self, values: &[f64], record: usize) -> Option<Part> {
+        let smooth: Vec<usize> = (0..self.axes.len())
+            .filter(|axis| self.axes[*axis].secant.is_none())
+            .collect();
+        let mut jacobian: Vec<Vec<f64>> = vec![Vec::new(); self.axes.len()];
+        let mut simulated = None;
+        let chunks = smooth.chunks(if smooth.len() <= FEW { FEW } else { MANY });
+        for chunk in chunks {
+            let (run, columns) = if chunk.len() <= FEW {
+                self.sensitivities::<FEW>(values, record, chunk)?
+            } else {
+                self.sensitivities::<MANY>(values, record, chunk)?
+            };
+            simulated = Some(run);
+            for (axis, column) in chunk.iter().zip(columns) {
+                jacobian[*axis] = column;
+            }
+        }
+        let simulated = match simulated {
+            Some(run) => run,
+            None => self.run(values, record)?,
+        };
+        let measured = self.measured[record];
+        let residual = |(k, sim): (usize, &f64)| {
+            if k < self.warm_up {
+                0.0
+            } else {
+                measured[k] - sim
+            }
+        };
+        let residual: Vec<f64> = simulated.iter().enumerate().map(residual).collect();
+        for (axis, column) in self.axes.iter().zip(&mut jacobian) {
+            let Some(half) = axis.secant else { continue };
+            let at = |shift: f64| {
+                let mut moved = values.to_vec();
+                moved[axis.index] = (values[axis.index] + shift).clamp(axis.low, axis.high);
+                (moved[axis.index], self.run(&moved, record))
+            };
+            let ((above, high), (below, low)) = (at(half), at(-half));
+            let (high, low) = (high?, low?);
+            let width = (above - below).max(1e-12);
+            let scale = axis.slope(values[axis.index]) / width;
+            let slopes = high.iter().zip(&low).enumerate();
+            *column = slopes
+                .map(|(k, (high, low))| {
+                    if k < self.warm_up {
+                        0.0
+                    } else {
+                        (high - low) * scale
+                    }
+                })
+                .collect();
+        }
+        Some(Part { residual, jacobian })
+    }
+
+    /// y_sim of a record and its derivatives with respect to `axes`, at most `P`;
+    /// `None` if it diverges.
+    fn sensitivities<const P: usize>(
+        &self,
+        values: &[f64],
+        record: usize,
+        axes: &[usize],
+    ) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+        let signals = &self.signals[record];
+        let mut duals: Vec<Dual<P>> = values.iter().map(|v| Dual::constant(*v)).collect();
+        for (slot, axis) in axes.iter().enumerate() {
+            let axis = &self.axes[*axis];
+            duals[axis.index].partials[slot] = axis.slope(values[axis.index]);
+            if let Some(index) = axis.against {
+                duals[index].partials[slot] = -1.0;
+            }
+        }
+        let mut y = Vec::with_capacity(signals.u.len());
+        let mut columns = vec![Vec::with_capacity(signals.u.len()); axes.len()];
+        let simulator = Simulator::with_values(self.model, &duals, self.rounding);
+        let left = simulator.run(signals, |k, output: &Output<Dual<P>>| {
+            y.push(output.measured.value);
+            for (column, slope) in columns.iter_mut().zip(output.measured.partials) {
+                column.push(if k < self.warm_up { 0.0 } else { slope });
+            }
+            ControlFlow::Continue(())
+        });
+        left.is_none().then_some((y, columns))
+    }
+}
+
+impl LeastSquares for Problem<'_> {
+    fn free(&self) -> usize {
+        self.axes.len()
+    }
+
+    fn cost(&self, values: &[f64], enough: f64) -> f64 {
+        let simulator = Simulator::with_values(self.model, values, self.rounding);
+        let each = |record: usize| {
+            let measured = self.measured[record];
+            let mut sum = 0.0;
+            let left = simulator.run(&self.signals[record], |k, output: &Output<f64>| {
+                if k >= self.warm_up {
+                    let error = measured[k] - output.measured;
+                    sum += error * error;
+                }
+                // NaN breaks off too.
+                if sum <= enough {
+                    ControlFlow::Continue(())
+                } else {
+                    ControlFlow::Break(())
+                }
+            });
+            if left.is_some() || sum.is_nan() {
+                f64::INFINITY
+            } else {
+                sum
+            }
+        };
+        let sums: Vec<f64> = (0..self.signals.len()).into_par_iter().map(each).collect();
+        sums.iter().sum()
+    }
+
+    fn linearise(&self, values: &[f64]) -> Option<Vec<Part>> {
+        let each = |record| self.part(values, record);
+        let all: Vec<_> = (0..self.signals.len()).into_par_iter().map(each).collect();
+        all.into_iter().collect()
+    }
+
+    fn reach(&self, values: &[f64]) -> Vec<(f64, f64)> {
+        let reach = |axis: &Axis| axis.reach(values[axis.index]);
+        self.axes.iter().map(reach).collect()
+    }
+
+    fn moved(&self, values: &[f64], step: &[f64]) -> Vec<f64> {
+        let mut moved = values.to_vec();
+        for (axis, step) in self.axes.iter().zip(step) {
+            moved[axis.index] = axis.moved(moved[axis.index], *step);
+            if let Some(index) = axis.against {
+                moved[index] -= step;
+            }
+        }
+        moved
+    }
+}
+
+/// Fits the parameters of `model` to `records` in free run, from where they are.
+///
+/// A rounded state-dependent delay is fitted without its rounding, which makes the free
+/// run smooth; the coefficients are then fitted again with it.
+///
+/// # Errors
+/// A missing channel, or a model whose free run diverges from the start.
+pub fn fit(model: &Model, records: &[&Record], options: &FitOptions) -> Result<Fit, SimulateError> {
+    let rounded = matches!(
+        model.delay,
+        Delay::StateDependent {
+            interpolated: false,
+            ..
+        }
+    );
+    if !rounded {
+        return descend(model, records, options, Rounding::Samples);
+    }
+    let smooth = descend(model, records, options, Rounding::None)?;
+    let last = FitOptions {
+        iterations: options.iterations.min(4),
+        delay: false,
+        ..*options
+    };
+    let rounded = descend(&smooth.model, records, &last, Rounding::Samples)?;
+    Ok(Fit {
+        model: rounded.model,
+        sum_of_squares: rounded.sum_of_squares,
+        ..smooth
+    })
+}
+
+fn descend(
+    model: &Model,
+    records: &[&Record],
+    options: &FitOptions,
+    rounding: Rounding,
+) -> Result<Fit, SimulateError> {
+    let signals: Result<Vec<_>, _> = records.iter().map(|r| Signals::of(model, r)).collect();
+    let coordinates = model.coordinates();
+    let moves = |index: usize, coordinate: &Coordinate| match coordinate.parameter() {
+        None => options.linear && (index > 0 || options.constant),
+        Some(parameter) if parameter.low >= parameter.high => false,
+        Some(_) => options.delay || !matches!(coordinate.kind, Kind::Delay(_)),
+    };
+    let axes: Vec<Axis> = coordinates
+        .iter()
+        .enumerate()
+        .filter(|(index, coordinate)| moves(*index, coordinate))
+        .map(|(index, coordinate)| Axis {
+            against: held_sum(model, index),
+            ..Axis::of(index, coordinate)
+        })
+        .collect();
+    let problem = Problem {
+        model,
+        signals: signals?,
+        measured: records.iter().map(|record| record.y.as_slice()).collect(),
+        axes,
+        warm_up: model.warm_up(),
+        rounding,
+    };
+    let samples: usize = records
+        .iter()
+        .map(|r| r.y.len().saturating_sub(problem.warm_up))
+        .sum();
+    let values = model.values();
+    let cost = problem.cost(&values, f64::INFINITY);
+    if !cost.is_finite() {
+        for record in records {
+            model.free_run(record)?;
+        }
+    }
+    let end = minimise(
+        &problem,
+        values,
+        cost,
+        options.iterations,
+        options.tolerance,
+    );
+    let covariance = end
+        .linearised
+        .and_then(|(parts, information)| {
+            covariance(&parts, &information, &problem.axes, &end.values)
+        })
+        .unwrap_or_default();
+    Ok(Fit {
+        model: model.with_values(&end.values),
+        sum_of_squares: end.cost,
+        samples,
+        free: problem.axes.iter().map(|axis| axis.index).collect(),
+        covariance,
+        iterations: end.iterations,
+        stop: end.stop,
+    })
+}
+
+/// Covariance of the coordinates, NaN on the diagonal where the records leave one unknown.
+fn covariance(
+    parts: &[Part],
+    information: &[f64],
+    axes: &[Axis],
+    values: &[f64],
+) -> Option<Vec<f64>> {
+    let n = axes.len();
+    let (inverse, unknown) = linalg::inverse_where_known(information, n)?;
+    let searched = sandwich(parts, &inverse, n);
+    let mut covariance = in_values(&searched, axes, values);
+    for (i, _) in unknown.iter().enumerate().filter(|(_, unknown)| **unknown) {
+        covariance[i * n + i] = f64::NAN;
+    }
+    Some(covariance)
+}
+
+/// (JᵀJ)⁻¹ S (JᵀJ)⁻¹ with S the long-run covariance of J·r: residuals of a free run
+/// are correlated over many samples, and standard errors that ignore it are several
+/// times too small. S is estimated by batch means: sums of J·r over blocks much longer
+/// than the memory of the noise are uncorrelated, and their outer products are cheap.
+fn sandwich(parts: &[Part], inverse: &[f64], n: usize) -> Vec<f64> {
+    let mut middle = vec![0.0; n * n];
+    for part in parts {
+        let length = part.residual.len();
+        let block = (length / 40).clamp(1, 250);
+        let mut from = 0;
+        while from < length {
+            let to = (from + block).min(length);
+            let score: Vec<f64> = (0..n)
+                .map(|i| dot(&part.jacobian[i][from..to], &part.residual[from..to]))
+                .collect();
+            for i in 0..n {
+                for j in 0..n {
+                    middle[i * n + j] += score[i] * score[j];
+                }
+            }
+            from = to;
+        }
+    }
+    let half = product(n, |i, k| inverse[i * n + k], |k, j| middle[k * n + j]);
+    product(n, |i, k| half[i * n + k], |k, j| inverse[k * n + j])
+}
+
+/// Covariance of the coordinates themselves from that of what is searched.
+fn in_values(searched: &[f64], axes: &[Axis], values: &[f64]) -> Vec<f64> {
+    let n = axes.len();
+    // ∂coordinate i/∂searched j.
+    let slope = |i: usize, j: usize| match axes[j].against {
+        _ if i == j => axes[j].slope(values[axes[j].index]),
+        Some(index) if axes[i].index == index => -1.0,
+        _ => 0.0,
+    };
+    let half = product(n, slope, |k, j| searched[k * n + j]);
+    product(n, |i, k| half[i * n + k], |k, j| slope(j, k))
+}
+
+/// The product of two square matrices, row-major.
+fn product(
+    n: usize,
+    left: impl Fn(usize, usize) -> f64,
+    right: impl Fn(usize, usize) -> f64,
+) -> Vec<f64> {
+    let cells = (0..n * n).map(|cell| (cell / n, cell % n));
+    cells
+        .map(|(i, j)| (0..n).map(|k| left(i, k) * right(k, j)).sum())
+        .collect()
+}
+
+/// The coordinate that moves against the one with index `index`: a_1 against every
+/// other a_i. Oversampled rigs fix the sum of the a_i to many digits and what is
+/// left to fewer; damped in proportion to the former, the latter would never move.
+fn held_sum(model: &Model, index: usize) -> Option<usize> {
+    // The constant comes before a_1.
+    (2..=model.a.len()).contains(&index).then_some(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Use;
+    use crate::model::Start;
+
+    /// A motor's position at 1 kHz: a_1 + a_2 is 1 to many digits, and what the fit
+    /// is after, the damping, lies in the rest.
+    #[test]
+    fn the_damping_of_an_oversampled_integrator_is_found() {
+        let u: Vec<f64> = (0..4000)
+            .map(|k| if k / 300 % 2 == 0 { 1.0 } else { -0.9 })
+            .collect();
+        let model = |pole: f64, gain: f64| Model {
+            sample_period_s: 0.001,
+            start: Start::Measured,
+            state_lags: vec![1, 2],
+            a: vec![1.0 + pole, -pole],
+            product_lags: Vec::new(),
+            b: vec![gain],
+            c: Vec::new(),
+            delay: Delay::Fixed { delays: vec![0] },
+            ..Model::default()
+        };
+        let mut y = vec![0.0, 0.0];
+        for k in 1..u.len() - 1 {
+            y.push(1.998 * y[k] - 0.998 * y[k - 1] + 1e-5 * u[k]);
+        }
+        let record = Record::new("moves", Use::Identify, 0.001, u, y);
+        let start = model(0.99, 4e-5);
+        let fitted = fit(&start, &[&record], &FitOptions::default()).expect("a fit");
+        assert!(
+            (fitted.model.a[1] + 0.998).abs() < 1e-5,
+            "{:?}",
+            fitted.model.a
+        );
+        assert!(fitted.standard_error(1).is_some_and(|error| error < 1e-4));
+    }
+}

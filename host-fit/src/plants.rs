@@ -8,7 +8,9 @@ use firmware_sim::bench::{Disturbed, Lost};
 use firmware_sim::instrument::{Converter, Noise};
 use firmware_sim::plant::{BasePlant, DelayLaw, Effect, FreeStream, PlantSpec, RateLaw, Rig};
 use host_fit::design::{CaseGroup, DesignError, TRIAL_SAMPLES, Trial, steady, time_constants};
-use host_fit::model::{Added, Delay, Model};
+use host_fit::model::{Added, Delay, Model, TransportLaw};
+use model_core::effect::Physics;
+use model_core::effects::{EdgeDependentDelay, StateDependentDelay};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -72,27 +74,7 @@ fn nearest_plant(model: &Model) -> anyhow::Result<PlantSpec> {
         Delay::Fixed { delays } => DelayLaw::Fixed {
             delay_s: f64::from(delays.iter().copied().min().unwrap_or(0)) * period,
         },
-        Delay::StateDependent {
-            delay_floor,
-            delay_rise,
-            delay_rate,
-            factors,
-            ..
-        } => {
-            let factor = factors.iter().copied().fold(f64::INFINITY, f64::min);
-            DelayLaw::StateDependent {
-                floor_s: factor * delay_floor * period,
-                rise_s: factor * delay_rise * period,
-                rate: *delay_rate,
-            }
-        }
-        Delay::EdgeDependent {
-            rise_delay,
-            fall_delay,
-        } => DelayLaw::EdgeDependent {
-            rise_s: *rise_delay,
-            fall_s: *fall_delay,
-        },
+        Delay::Law(law) => transport(law, period),
     };
     let base = BasePlant {
         attach_s,
@@ -108,6 +90,29 @@ fn nearest_plant(model: &Model) -> anyhow::Result<PlantSpec> {
         .map(physical_effect)
         .collect::<anyhow::Result<Vec<_>>>()?;
     Ok(PlantSpec::new(base, &effects))
+}
+
+/// The law in continuous time; where the plants have no such law, the longest of
+/// its delays.
+fn transport(law: &TransportLaw, period: f64) -> DelayLaw {
+    let factor = law.factors.iter().copied().fold(f64::INFINITY, f64::min);
+    let is = |name: &str| law.spec.name == name;
+    match law.parameters.as_slice() {
+        [floor, rise, rate] if is(StateDependentDelay::<f64>::SPEC.name) => {
+            DelayLaw::StateDependent {
+                floor_s: factor * floor * period,
+                rise_s: factor * rise * period,
+                rate: *rate,
+            }
+        }
+        [rise, fall] if is(EdgeDependentDelay::<f64>::SPEC.name) => DelayLaw::EdgeDependent {
+            rise_s: *rise,
+            fall_s: *fall,
+        },
+        _ => DelayLaw::Fixed {
+            delay_s: factor * period * law.range(period)[1],
+        },
+    }
 }
 
 fn is_known(added: &Added) -> bool {

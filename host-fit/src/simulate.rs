@@ -153,9 +153,7 @@ impl<T: Real> Simulator<T> {
         let memory = match model.delay {
             Delay::Fixed { .. } => model.memory(),
             // Room for a search to move the law.
-            Delay::StateDependent { .. } | Delay::EdgeDependent { .. } => {
-                model.memory_for(model.longest_delay().max(ROOM))
-            }
+            Delay::Law(_) => model.memory_for(model.longest_delay().max(ROOM)),
         };
         Self {
             prepared: model.prepare_with(values, rounding),

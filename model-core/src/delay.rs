@@ -37,6 +37,18 @@ impl<T: Real> Tap<T> {
         }
     }
 
+    /// A tap at any delay (negative or NaN counts as 0), in samples: on the
+    /// nearest sample if `rounded`, as in eq. (4), else between samples.
+    #[inline]
+    #[must_use]
+    pub fn at(delay: T, rounded: bool) -> Self {
+        if rounded {
+            Self::on(delay.round().max(0) as usize)
+        } else {
+            Self::between(delay)
+        }
+    }
+
     /// The signal that far back: between two samples, straight from one to the other.
     #[inline]
     pub fn read(&self, past: &impl Past<T>) -> T {
@@ -46,7 +58,41 @@ impl<T: Real> Tap<T> {
     }
 }
 
-/// A law for the input delays h_l of eqs. (3) and (4).
+/// A law of the transport from the jets to the flow: what one file of
+/// [`effects`](crate::effects) defines.
+///
+/// It gives the delay of one input; those of a model's inputs are its multiples,
+/// see [`ScaledDelay`].
+pub trait Transport<T: Real> {
+    /// What the law remembers of the command.
+    type State: Clone;
+
+    /// The state before the first sample.
+    fn start(&self) -> Self::State;
+
+    /// The command as the valve will get it; an edge may be held back here.
+    #[inline]
+    fn command(&self, _state: &mut Self::State, command: T) -> T {
+        command
+    }
+
+    /// The delay at the averaged output ỹ_k ≥ 0 (or y_k for an averaged model),
+    /// samples; below 0 counts as 0.
+    fn delay(&self, output: T) -> T;
+
+    /// The shortest and the longest of these delays over all outputs ≥ 0, where
+    /// the law has such bounds.
+    fn bounds(&self) -> Option<[T; 2]>;
+
+    /// For how many samples [`command`](Self::command) holds rising and falling
+    /// edges back. A pulse (or a gap) shorter than that never arrives.
+    #[inline]
+    fn held_back(&self) -> [T; 2] {
+        [T::ZERO; 2]
+    }
+}
+
+/// The input delays h_l of eqs. (3) and (4), as a model reads them.
 pub trait DelayLaw<T: Real> {
     /// What the law remembers of the command.
     type State: Clone;
@@ -93,5 +139,117 @@ impl<T: Real, H: AsRef<[u16]>> DelayLaw<T> for FixedDelay<H> {
     #[inline]
     fn tap(&self, l: usize, _evaluated: T) -> Tap<T> {
         Tap::on(self.delays.as_ref().get(l).copied().unwrap_or(0).into())
+    }
+}
+
+/// Delays h_l = f_l · h after a law h, rounded to whole samples as in eq. (4)
+/// where `ROUNDED`, else with the input interpolated between samples.
+///
+/// The rounding moves every edge by up to half a sample, which a flow that
+/// rings at 20 Hz shows as an error of several per cent of the ringing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScaledDelay<L, F, const ROUNDED: bool> {
+    /// h.
+    pub law: L,
+    /// f_l, one factor for each input.
+    pub factors: F,
+}
+
+impl<T: Real, L: Transport<T>, F: AsRef<[T]>, const ROUNDED: bool> DelayLaw<T>
+    for ScaledDelay<L, F, ROUNDED>
+{
+    type State = L::State;
+    const INTERPOLATES: bool = !ROUNDED;
+
+    fn start(&self) -> L::State {
+        self.law.start()
+    }
+    #[inline]
+    fn command(&self, state: &mut L::State, command: T) -> T {
+        self.law.command(state, command)
+    }
+    #[inline]
+    fn evaluate(&self, output: T) -> T {
+        self.law.delay(output)
+    }
+    /// A law lies between its bounds, and every operation after it keeps the
+    /// order, roundings included: the bounds' taps are the ends.
+    #[inline]
+    fn range(&self, l: usize) -> Option<(usize, usize)> {
+        if !ROUNDED {
+            return None;
+        }
+        let [low, high] = self.law.bounds()?;
+        let (low, high) = (self.tap(l, low).whole, self.tap(l, high).whole);
+        Some((low.min(high), low.max(high)))
+    }
+    #[inline]
+    fn tap(&self, l: usize, evaluated: T) -> Tap<T> {
+        let factor = self.factors.as_ref().get(l).copied().unwrap_or(T::ONE);
+        Tap::at(factor * evaluated, ROUNDED)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::StateDependentDelay;
+
+    fn papers<T: Real>(rise: f64) -> StateDependentDelay<T> {
+        StateDependentDelay {
+            floor: T::from_f64(47.35),
+            rise: T::from_f64(rise),
+            rate: T::from_f64(20.18),
+        }
+    }
+
+    #[test]
+    fn without_rounding_it_taps_between_samples() {
+        let law = ScaledDelay::<_, [f64; 2], false> {
+            law: StateDependentDelay {
+                floor: 30.25,
+                rise: 0.0,
+                rate: 1.0,
+            },
+            factors: [1.0, 2.0],
+        };
+        let evaluated = law.evaluate(0.3);
+        let (first, second) = (law.tap(0, evaluated), law.tap(1, evaluated));
+        assert_eq!((first.whole, first.fraction), (30, 0.25));
+        assert_eq!((second.whole, second.fraction), (60, 0.5));
+        assert_eq!(law.range(0), None);
+    }
+
+    #[test]
+    fn the_range_of_a_rounded_law_holds_all_its_taps_and_no_more() {
+        for (rise, factor) in [(12.69, 1.0), (-12.69, 1.0), (12.69, 0.37), (12.69, 3.1)] {
+            let law = ScaledDelay::<_, [f32; 1], true> {
+                law: papers::<f32>(rise),
+                factors: [factor],
+            };
+            let (low, high) = law.range(0).unwrap();
+            let mut met = (usize::MAX, 0);
+            for bits in (0..0x4080_0000_u32).step_by(10_007) {
+                let tap = law.tap(0, law.evaluate(f32::from_bits(bits))).whole;
+                met = (met.0.min(tap), met.1.max(tap));
+            }
+            assert_eq!(met, (low, high));
+        }
+    }
+
+    #[test]
+    fn the_papers_laws_at_their_ends() {
+        let law = ScaledDelay::<_, [f32; 1], true> {
+            law: papers::<f32>(12.69),
+            factors: [1.0],
+        };
+        assert_eq!(law.tap(0, law.evaluate(0.0)).whole, 60);
+        assert_eq!(law.tap(0, law.evaluate(1.0)).whole, 47);
+        let two = ScaledDelay::<_, [f32; 2], true> {
+            law: papers::<f32>(12.69),
+            factors: [1.5513, 106.756],
+        };
+        assert_eq!(two.tap(1, two.evaluate(0.0)).whole, 6410);
+        assert_eq!(two.tap(1, two.evaluate(1.0)).whole, 5055);
     }
 }

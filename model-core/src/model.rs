@@ -423,14 +423,14 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::delay::FixedDelay;
+    use crate::delay::{FixedDelay, ScaledDelay};
     use crate::effect::{Physics, Setting};
     use crate::effects::{HotFilmLag, StateDependentDelay, ValveLag};
 
     /// Table II of the paper, state-dependent delays.
     fn table_two<T: Real>(
         convention: LagConvention,
-    ) -> Params<T, 5, 10, 1, StateDependentDelay<T>, ()> {
+    ) -> Params<T, 5, 10, 1, ScaledDelay<StateDependentDelay<T>, [T; 1], true>, ()> {
         let number = T::from_f64;
         Params {
             convention,
@@ -449,10 +449,12 @@ mod tests {
                 -0.0049,
             ]
             .map(number)]),
-            delay: StateDependentDelay {
-                floor: number(47.35),
-                rise: number(12.69),
-                rate: number(20.18),
+            delay: ScaledDelay {
+                law: StateDependentDelay {
+                    floor: number(47.35),
+                    rise: number(12.69),
+                    rate: number(20.18),
+                },
                 factors: [T::ONE],
             },
             effects: (),
@@ -586,10 +588,12 @@ mod tests {
     #[test]
     fn clamping_is_counted() {
         let model = Params {
-            delay: StateDependentDelay {
-                floor: 100.0,
-                rise: 100.0,
-                rate: 20.0,
+            delay: ScaledDelay {
+                law: StateDependentDelay {
+                    floor: 100.0,
+                    rise: 100.0,
+                    rate: 20.0,
+                },
                 factors: [1.0],
             },
             ..table_two::<f64>(LagConvention::OneStep)

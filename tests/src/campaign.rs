@@ -5,6 +5,7 @@ use firmware_sim::hidden_set::{HiddenSet, HiddenSetPlan};
 use firmware_sim::plant::{Effect, Fault};
 use host_fit::diagnose::{Diagnosis, Options, Verdict, diagnose};
 use host_fit::model::{Delay, Model, Start, Training};
+use model_core::effects::StateDependentDelay;
 use model_core::model::Averaging;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -119,13 +120,7 @@ fn given(case: &Case) -> Model {
         product_lags: vec![1],
         b: vec![0.02],
         c: vec![0.0],
-        delay: Delay::StateDependent {
-            delay_floor: 35.0,
-            delay_rise: 10.0,
-            delay_rate: 6.0,
-            factors: vec![1.0],
-            interpolated: false,
-        },
+        delay: Delay::of::<StateDependentDelay<f64>>(&[35.0, 10.0, 6.0], vec![1.0], false),
         effects: Vec::new(),
         definitions: Vec::new(),
         law: None,
@@ -141,13 +136,7 @@ fn given(case: &Case) -> Model {
         model.a = vec![0.97, 0.002, 0.001, -0.001, 0.001];
         model.product_lags = lags(3);
         model.c = vec![-0.003, 0.002, 0.001];
-        model.delay = Delay::StateDependent {
-            delay_floor: 90.0,
-            delay_rise: 40.0,
-            delay_rate: 2.0,
-            factors: vec![1.0],
-            interpolated: false,
-        };
+        model.delay = Delay::of::<StateDependentDelay<f64>>(&[90.0, 40.0, 2.0], vec![1.0], false);
     }
     model
 }

@@ -9,6 +9,7 @@ use model_core::checks;
 use model_core::control::budget::Budget;
 use model_core::control::golden::GoldenLaw;
 use model_core::control::{Air, HoldTimes, Reachable, Switches, Tracking, TrackingState};
+use model_core::delay::ScaledDelay;
 use model_core::effect::{Physics, Setting};
 use model_core::effects::AmplitudeSaturation;
 use model_core::effects::HotFilmNonlinearity;
@@ -37,7 +38,7 @@ pub type Effect2 = AmplitudeSaturation<f32>;
 /// hot-film-nonlinearity.
 pub type Effect3 = HotFilmNonlinearity<f32>;
 /// The delay law.
-pub type Delay = StateDependentDelay<f32, [f32; 1]>;
+pub type Delay = ScaledDelay<StateDependentDelay<f32>, [f32; 1], true>;
 /// The effects, in the order of the physics.
 pub type Effects = (Effect1, (Effect2, (Effect3, ())));
 /// Structure, coefficients and delay law: N1, N2, N3 as identified.
@@ -59,13 +60,11 @@ pub const B: [f32; 1] = [0.008];
 pub const C1: [f32; 10] = [
     -0.0228, 0.0138, 0.0621, -0.0286, -0.0186, -0.0121, -0.0035, -0.0056, 0.0189, -0.0049,
 ];
-/// p0, samples.
-pub const DELAY_FLOOR: f32 = 47.35;
-/// p1, samples.
-pub const DELAY_RISE: f32 = 12.69;
-/// p2, 1/y.
-pub const DELAY_RATE: f32 = 20.18;
-/// f_l.
+/// state-dependent-delay: delay_floor (samples), delay_rise (samples), delay_rate (1/y).
+pub const DELAY_PARAMETERS: [f32; 3] = [47.35, 12.69, 20.18];
+/// Shortest and longest delay of the law, samples.
+pub const DELAY_RANGE: [f32; 2] = [47.35, 60.04];
+/// f_l, the delays of the inputs in units of the law's.
 pub const DELAY_FACTORS: [f32; 1] = [1.0];
 /// valve-lag: opening_time (s), closing_time (s).
 pub const EFFECT1: [f32; 2] = [0.004, 0.009];
@@ -101,11 +100,7 @@ const _: () = {
         "the averaging window reaches beyond the outputs kept"
     );
     assert!(
-        JETS > (DELAY_FACTORS[0] * (DELAY_FLOOR + DELAY_RISE) + 0.5) as usize,
-        "an input delay reaches beyond the commands kept"
-    );
-    assert!(
-        JETS > (DELAY_FACTORS[0] * DELAY_FLOOR + 0.5) as usize,
+        JETS > (DELAY_FACTORS[0] * DELAY_RANGE[1] + 0.5) as usize,
         "an input delay reaches beyond the commands kept"
     );
 };
@@ -124,10 +119,12 @@ pub const BASE: Base = Params {
     product_lags: PRODUCT_LAGS,
     b: vector(B),
     c: matrix([C1]),
-    delay: StateDependentDelay {
-        floor: DELAY_FLOOR,
-        rise: DELAY_RISE,
-        rate: DELAY_RATE,
+    delay: ScaledDelay {
+        law: StateDependentDelay {
+            floor: DELAY_PARAMETERS[0],
+            rise: DELAY_PARAMETERS[1],
+            rate: DELAY_PARAMETERS[2],
+        },
         factors: DELAY_FACTORS,
     },
     effects: (),
@@ -209,8 +206,7 @@ pub const GOLDEN: Golden<32> = Golden {
 };
 
 /// Longest time from a command to its first arrival, samples.
-pub const FIRST_ARRIVAL: usize =
-    (checks::smallest(&DELAY_FACTORS) * (DELAY_FLOOR + DELAY_RISE.max(0.0)) + 0.5) as usize;
+pub const FIRST_ARRIVAL: usize = (checks::smallest(&DELAY_FACTORS) * DELAY_RANGE[1] + 0.5) as usize;
 /// Samples that the law looks ahead at most.
 pub const LOOK_AHEAD: usize = 78;
 /// The law: it holds the friction at its reference.

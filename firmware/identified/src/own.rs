@@ -6,6 +6,7 @@
 //! - units: y is the normalised friction gain, u is 0 or 1, delays and lags are samples of 0.001 s
 
 use model_core::checks;
+use model_core::delay::ScaledDelay;
 use model_core::effect::Setting;
 use model_core::effects::StateDependentDelay;
 use model_core::frozen::{self, Frozen};
@@ -31,7 +32,7 @@ pub type Effect2 = user_late_spring::LateSpring;
 /// warm-film.
 pub type Effect3 = user_warm_film::WarmFilm;
 /// The delay law.
-pub type Delay = StateDependentDelay<f32, [f32; 1]>;
+pub type Delay = ScaledDelay<StateDependentDelay<f32>, [f32; 1], true>;
 /// The effects, in the order of the physics.
 pub type Effects = (Effect1, (Effect2, (Effect3, ())));
 /// Structure, coefficients and delay law: N1, N2, N3 as identified.
@@ -53,13 +54,11 @@ pub const B: [f32; 1] = [0.008];
 pub const C1: [f32; 10] = [
     -0.0228, 0.0138, 0.0621, -0.0286, -0.0186, -0.0121, -0.0035, -0.0056, 0.0189, -0.0049,
 ];
-/// p0, samples.
-pub const DELAY_FLOOR: f32 = 47.35;
-/// p1, samples.
-pub const DELAY_RISE: f32 = 12.69;
-/// p2, 1/y.
-pub const DELAY_RATE: f32 = 20.18;
-/// f_l.
+/// state-dependent-delay: delay_floor (samples), delay_rise (samples), delay_rate (1/y).
+pub const DELAY_PARAMETERS: [f32; 3] = [47.35, 12.69, 20.18];
+/// Shortest and longest delay of the law, samples.
+pub const DELAY_RANGE: [f32; 2] = [47.35, 60.04];
+/// f_l, the delays of the inputs in units of the law's.
 pub const DELAY_FACTORS: [f32; 1] = [1.0];
 /// supply-line-ringing: gain (-), frequency (Hz), decay_time (s).
 pub const EFFECT1: [f32; 3] = [0.4, 18.0, 0.06];
@@ -95,11 +94,7 @@ const _: () = {
         "the averaging window reaches beyond the outputs kept"
     );
     assert!(
-        JETS > (DELAY_FACTORS[0] * (DELAY_FLOOR + DELAY_RISE) + 0.5) as usize,
-        "an input delay reaches beyond the commands kept"
-    );
-    assert!(
-        JETS > (DELAY_FACTORS[0] * DELAY_FLOOR + 0.5) as usize,
+        JETS > (DELAY_FACTORS[0] * DELAY_RANGE[1] + 0.5) as usize,
         "an input delay reaches beyond the commands kept"
     );
 };
@@ -118,10 +113,12 @@ pub const BASE: Base = Params {
     product_lags: PRODUCT_LAGS,
     b: vector(B),
     c: matrix([C1]),
-    delay: StateDependentDelay {
-        floor: DELAY_FLOOR,
-        rise: DELAY_RISE,
-        rate: DELAY_RATE,
+    delay: ScaledDelay {
+        law: StateDependentDelay {
+            floor: DELAY_PARAMETERS[0],
+            rise: DELAY_PARAMETERS[1],
+            rate: DELAY_PARAMETERS[2],
+        },
         factors: DELAY_FACTORS,
     },
     effects: (),

@@ -2,7 +2,7 @@
 
 use super::layout::{array, documented, number, numbers};
 use super::{CodegenError, law, spec_of};
-use crate::model::{Added, Delay, Footprint, Model};
+use crate::model::{Added, Delay, Footprint, Model, TransportLaw};
 use crate::user_effect::rust_source;
 use model_core::effect::{RustType, Setting, Spec};
 use model_core::effects;
@@ -13,18 +13,15 @@ pub(super) fn imports(out: &mut String, model: &Model, graded: bool) {
     if let Some(designed) = &model.law {
         lines.extend(law::imports(designed));
     }
-    if matches!(model.delay, Delay::Fixed { .. }) {
-        lines.push("use model_core::delay::FixedDelay;".to_owned());
-    }
     let mut named: Vec<&str> = Vec::new();
     // A user's own effects bring their `new` with them.
     let (mut physics, mut setting) = (false, false);
-    match model.delay {
-        Delay::Fixed { .. } => {}
-        Delay::StateDependent { .. } => named.push("StateDependentDelay"),
-        Delay::EdgeDependent { .. } => {
-            named.push("EdgeDependentDelay");
-            (physics, setting) = (true, true);
+    match &model.delay {
+        Delay::Fixed { .. } => lines.push("use model_core::delay::FixedDelay;".to_owned()),
+        Delay::Law(law) => {
+            lines.push("use model_core::delay::ScaledDelay;".to_owned());
+            named.push(rust_name(law.spec));
+            (physics, setting) = (!is_frozen(model), !is_frozen(model));
         }
     }
     for added in &model.effects {
@@ -62,10 +59,18 @@ pub(super) fn imports(out: &mut String, model: &Model, graded: bool) {
     }
 }
 
-/// Whether the constants are part of the code: those of edge delays are computed
-/// where they are used, for the sample period.
+/// Whether the constants are part of the code: those of some delay laws are
+/// computed where they are used, for the sample period.
 fn is_frozen(model: &Model) -> bool {
-    !matches!(model.delay, Delay::EdgeDependent { .. })
+    match &model.delay {
+        Delay::Fixed { .. } => true,
+        Delay::Law(law) => fields(law).is_some(),
+    }
+}
+
+/// The law's public fields, if they are its parameters.
+fn fields(law: &TransportLaw) -> Option<&'static [&'static str]> {
+    law.spec.law.and_then(|card| card.fields)
 }
 
 pub(super) fn sizes(out: &mut String, model: &Model, memory: &Footprint) {
@@ -132,13 +137,13 @@ pub(super) fn effect_type(model: &Model, added: &Added) -> Result<String, Codege
 
 pub(super) fn types(out: &mut String, model: &Model, graded: bool) -> Result<(), CodegenError> {
     let inputs = model.b.len();
-    let delay = match model.delay {
+    let delay = match &model.delay {
         Delay::Fixed { .. } => format!("FixedDelay<[u16; {inputs}]>"),
-        Delay::StateDependent { interpolated, .. } => format!(
-            "StateDependentDelay<f32, [f32; {inputs}]{}>",
-            if interpolated { ", false" } else { "" }
+        Delay::Law(law) => format!(
+            "ScaledDelay<{}<f32>, [f32; {inputs}], {}>",
+            rust_name(law.spec),
+            !law.interpolated
         ),
-        Delay::EdgeDependent { .. } => "EdgeDependentDelay<f32>".to_owned(),
     };
     out.push('\n');
     for (i, added) in model.effects.iter().enumerate() {
@@ -237,61 +242,37 @@ pub(super) fn coefficients(out: &mut String, model: &Model) {
                 &lags(delays),
             );
         }
-        Delay::StateDependent {
-            delay_floor,
-            delay_rise,
-            delay_rate,
-            factors,
-            ..
-        } => {
-            let _ = write!(
+        Delay::Law(law) => {
+            documented(
                 out,
-                "/// p0, samples.
-pub const DELAY_FLOOR: f32 = {};
-/// p1, samples.
-pub const DELAY_RISE: f32 = {};
-/// p2, 1/y.
-pub const DELAY_RATE: f32 = {};
-/// f_l.
-",
-                number(*delay_floor),
-                number(*delay_rise),
-                number(*delay_rate),
+                &format!("{}: {}.", law.spec.name, with_units(law.spec)),
+                "DELAY_PARAMETERS",
+                &format!("[f32; {}]", law.parameters.len()),
+                &numbers(&law.parameters),
             );
-            array(
+            documented(
                 out,
+                "Shortest and longest delay of the law, samples.",
+                "DELAY_RANGE",
+                "[f32; 2]",
+                &numbers(&law.range(model.sample_period_s)),
+            );
+            documented(
+                out,
+                "f_l, the delays of the inputs in units of the law's.",
                 "DELAY_FACTORS",
                 &format!("[f32; {n3}]"),
-                &numbers(factors),
+                &numbers(&law.factors),
             );
         }
-        Delay::EdgeDependent {
-            rise_delay,
-            fall_delay,
-        } => documented(
-            out,
-            "Delays of rising and falling edges, s.",
-            "EDGE_DELAYS",
-            "[f32; 2]",
-            &numbers(&[*rise_delay, *fall_delay]),
-        ),
     }
     for (i, added) in model.effects.iter().enumerate() {
         let Some(spec) = model.spec(&added.name) else {
             continue;
         };
-        let units: Vec<String> = spec
-            .parameters
-            .iter()
-            .map(|parameter| format!("{} ({})", parameter.name, parameter.unit))
-            .collect();
-        let doc = match units.as_slice() {
-            [] => format!("{}: no parameters.", spec.name),
-            units => format!("{}: {}.", spec.name, units.join(", ")),
-        };
         documented(
             out,
-            &doc,
+            &format!("{}: {}.", spec.name, with_units(spec)),
             &format!("EFFECT{}", i + 1),
             &format!("[f32; {}]", added.parameters.len()),
             &numbers(&added.parameters),
@@ -367,18 +348,11 @@ const _: () = {{
                 fits(format!("DELAYS[{l}] as usize"));
             }
         }
-        Delay::StateDependent { factors, .. } => {
-            // The law is monotonic in ỹ ≥ 0: longest at one of its ends.
-            for l in 0..factors.len() {
+        Delay::Law(law) => {
+            for l in 0..law.factors.len() {
                 fits(format!(
-                    "(DELAY_FACTORS[{l}] * (DELAY_FLOOR + DELAY_RISE) + 0.5) as usize"
+                    "(DELAY_FACTORS[{l}] * DELAY_RANGE[1] + 0.5) as usize"
                 ));
-                fits(format!("(DELAY_FACTORS[{l}] * DELAY_FLOOR + 0.5) as usize"));
-            }
-        }
-        Delay::EdgeDependent { .. } => {
-            for l in 0..2 {
-                fits(format!("(EDGE_DELAYS[{l}] / SAMPLE_PERIOD_S) as usize + 1"));
             }
         }
     }
@@ -389,14 +363,25 @@ pub(super) fn constructors(out: &mut String, model: &Model, graded: bool) {
     let frozen = is_frozen(model);
     let delay = match &model.delay {
         Delay::Fixed { .. } => "FixedDelay { delays: DELAYS }".to_owned(),
-        Delay::StateDependent { .. } => "StateDependentDelay {
-        floor: DELAY_FLOOR,
-        rise: DELAY_RISE,
-        rate: DELAY_RATE,
+        Delay::Law(law) => {
+            let name = rust_name(law.spec);
+            let prepared = match fields(law) {
+                None => format!("{name}::new(&DELAY_PARAMETERS, &SETTING)"),
+                Some(fields) => {
+                    let each = fields.iter().enumerate();
+                    let lines: String = each
+                        .map(|(i, field)| format!("            {field}: DELAY_PARAMETERS[{i}],\n"))
+                        .collect();
+                    format!("{name} {{\n{lines}        }}")
+                }
+            };
+            format!(
+                "ScaledDelay {{
+        law: {prepared},
         factors: DELAY_FACTORS,
-    }"
-        .to_owned(),
-        Delay::EdgeDependent { .. } => "EdgeDependentDelay::new(&EDGE_DELAYS, &SETTING)".to_owned(),
+    }}"
+            )
+        }
     };
     let effects = if model.effects.is_empty() {
         "()"
@@ -526,12 +511,22 @@ pub(super) fn own_effects(out: &mut String, model: &Model) {
             let setting = Setting {
                 period: model.sample_period_s as f32,
                 channel: 0,
-                reference: added.reference.unwrap_or(1.0) as f32,
+                reference: added.reference() as f32,
             };
             out.push('\n');
             out.push_str(&rust_source(definition, &added.parameters, &setting));
         }
     }
+}
+
+/// The parameters with their units.
+fn with_units(spec: &Spec) -> String {
+    let each = spec.parameters.iter();
+    let units: Vec<String> = each.map(|p| format!("{} ({})", p.name, p.unit)).collect();
+    if units.is_empty() {
+        return "no parameters".to_owned();
+    }
+    units.join(", ")
 }
 
 pub(super) fn rust_name(spec: &Spec) -> &'static str {

@@ -74,16 +74,13 @@ fn tracking(out: &mut String, model: &Model, track: &Track) -> Result<(), Codege
         }
     };
     // The first input to arrive is the one that counts.
-    let first_arrival = match model.delay {
+    let first_arrival = match &model.delay {
         Delay::Fixed { .. } => " checks::shortest(&DELAYS)",
-        Delay::StateDependent { .. } => {
-            "
-    (checks::smallest(&DELAY_FACTORS) * (DELAY_FLOOR + DELAY_RISE.max(0.0)) + 0.5) as usize"
+        // What is held back is in `opening` and `closing`.
+        Delay::Law(law) if law.interpolated => {
+            " (checks::smallest(&DELAY_FACTORS) * DELAY_RANGE[1]) as usize"
         }
-        // What the later edge takes longer is in `opening` and `closing`.
-        Delay::EdgeDependent { .. } => {
-            " (checks::smallest(&EDGE_DELAYS) / SAMPLE_PERIOD_S) as usize"
-        }
+        Delay::Law(_) => " (checks::smallest(&DELAY_FACTORS) * DELAY_RANGE[1] + 0.5) as usize",
     };
     let expected = golden_value(model, &track.tracking())?;
     let _ = write!(

@@ -95,22 +95,9 @@ fn check(model: &Model) -> Result<(), CodegenError> {
     fits("a", &model.a)?;
     fits("b", &model.b)?;
     fits("c", &model.c)?;
-    match &model.delay {
-        Delay::Fixed { .. } => {}
-        Delay::StateDependent {
-            delay_floor,
-            delay_rise,
-            delay_rate,
-            factors,
-            ..
-        } => {
-            fits("delay", &[*delay_floor, *delay_rise, *delay_rate])?;
-            fits("factors", factors)?;
-        }
-        Delay::EdgeDependent {
-            rise_delay,
-            fall_delay,
-        } => fits("delay", &[*rise_delay, *fall_delay])?,
+    if let Delay::Law(law) = &model.delay {
+        fits("delay", &law.parameters)?;
+        fits("factors", &law.factors)?;
     }
     for added in &model.effects {
         fits("effect parameter", &added.parameters)?;

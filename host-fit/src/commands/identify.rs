@@ -1,5 +1,6 @@
 //! `host-fit identify`: recordings to a model.
 
+use model_core::effects::StateDependentDelay;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -342,13 +343,15 @@ fn measured_law(
     }
     let template = Model {
         sample_period_s: set.sample_period_s,
-        delay: Delay::StateDependent {
-            delay_floor: DelayLaw::PAPER.floor,
-            delay_rise: DelayLaw::PAPER.rise,
-            delay_rate: DelayLaw::PAPER.rate,
-            factors: vec![1.0],
-            interpolated: false,
-        },
+        delay: Delay::of::<StateDependentDelay<f64>>(
+            &[
+                DelayLaw::PAPER.floor,
+                DelayLaw::PAPER.rise,
+                DelayLaw::PAPER.rate,
+            ],
+            vec![1.0],
+            false,
+        ),
         ..Model::default()
     };
     let lean = lean_base(&template, learning)?;
@@ -356,18 +359,10 @@ fn measured_law(
         "the edges bear no state-dependent law out ({}): it was fitted in free run instead",
         study.words
     ));
-    match lean.model.delay {
-        Delay::StateDependent {
-            delay_floor,
-            delay_rise,
-            delay_rate,
-            ..
-        } => Ok(DelayLaw {
-            floor: delay_floor,
-            rise: delay_rise,
-            rate: delay_rate,
-        }),
-        Delay::Fixed { .. } | Delay::EdgeDependent { .. } => bail!(
+    let law = lean.model.delay.law::<StateDependentDelay<f64>>();
+    match law.map(|law| law.parameters.as_slice()) {
+        Some(&[floor, rise, rate]) => Ok(DelayLaw { floor, rise, rate }),
+        _ => bail!(
             "no delay law could be found on these records; prescribe one with --delay-law P0,P1,P2, or use --delay fixed"
         ),
     }
@@ -419,7 +414,7 @@ struct Delays<'a> {
     product: &'a [u16],
     input: &'a [u16],
     factors: &'a [f64],
-    law: Option<[f64; 3]>,
+    law: Option<&'a [f64]>,
 }
 
 #[derive(serde::Serialize)]
@@ -432,18 +427,11 @@ struct RefinementDocument {
 fn delays(model: &Model) -> Delays<'_> {
     let (input, factors, law) = match &model.delay {
         Delay::Fixed { delays } => (delays.as_slice(), &[][..], None),
-        Delay::StateDependent {
-            delay_floor,
-            delay_rise,
-            delay_rate,
-            factors,
-            ..
-        } => (
+        Delay::Law(law) => (
             &[][..],
-            factors.as_slice(),
-            Some([*delay_floor, *delay_rise, *delay_rate]),
+            law.factors.as_slice(),
+            Some(law.parameters.as_slice()),
         ),
-        Delay::EdgeDependent { .. } => (&[][..], &[][..], None),
     };
     Delays {
         state: &model.state_lags,

@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 
 use host_fit::data::{Record, Use};
 use host_fit::indicators::{Indicators, Scores};
-use host_fit::model::{Delay, Model};
+use host_fit::model::{Delay, Model, TransportLaw};
 use host_fit::picture::{Column, Overlay, Report, Run, overlay, significant};
+use model_core::effect::Unit;
 
 /// `identify` or `validate`.
 pub(crate) fn role_name(role: Use) -> &'static str {
@@ -19,25 +20,7 @@ pub(crate) fn role_name(role: Use) -> &'static str {
 pub(crate) fn describe(model: &Model) -> String {
     let delay = match &model.delay {
         Delay::Fixed { delays } => format!("fixed delay {delays:?} samples"),
-        Delay::StateDependent {
-            delay_floor,
-            delay_rise,
-            delay_rate,
-            ..
-        } => format!(
-            "delay {} + {}·exp(−{}·ỹ) samples",
-            significant(*delay_floor, 4),
-            significant(*delay_rise, 4),
-            significant(*delay_rate, 4)
-        ),
-        Delay::EdgeDependent {
-            rise_delay,
-            fall_delay,
-        } => format!(
-            "delay {} ms after rising, {} ms after falling edges",
-            significant(rise_delay * 1e3, 3),
-            significant(fall_delay * 1e3, 3)
-        ),
+        Delay::Law(law) => format!("delay {}", law_in_words(law)),
     };
     let kind = if model.averaging.averaged_model {
         "averaged model"
@@ -55,6 +38,23 @@ pub(crate) fn describe(model: &Model) -> String {
         let _ = write!(text, "; with {}", names.join(", "));
     }
     text
+}
+
+/// The law with its values: times in ms, everything else in its unit.
+fn law_in_words(law: &TransportLaw) -> String {
+    let mut words = law
+        .spec
+        .law
+        .map_or(law.spec.name, |card| card.words)
+        .to_owned();
+    for (parameter, value) in law.spec.parameters.iter().zip(&law.parameters) {
+        let value = match parameter.unit {
+            Unit::Second => format!("{} ms", significant(1e3 * value, 3)),
+            _ => significant(*value, 4),
+        };
+        words = words.replacen("{}", &value, 1);
+    }
+    words
 }
 
 const HEAD: [&str; 8] = [

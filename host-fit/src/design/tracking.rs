@@ -8,6 +8,7 @@ use closed_loop::{AHEAD, Figures, ModelFlow, TrackingController, run};
 use model_core::control::budget::Budget;
 use model_core::control::tracking::Unusable;
 use model_core::control::{Reachable, Tracking};
+use model_core::delay::Transport;
 
 /// What is wanted of a tracking law.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,23 +102,17 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         on: samples(request.min_on_s),
         off: samples(request.min_off_s),
     };
-    if matches!(model.delay, Delay::StateDependent { .. }) {
-        hold.on = hold.on.max(SHORTEST_SURE_PULSE);
-        hold.off = hold.off.max(SHORTEST_SURE_PULSE);
-    }
-    if let Delay::EdgeDependent {
-        rise_delay,
-        fall_delay,
-    } = model.delay
+    if let Delay::Law(law) = &model.delay
+        && let Some(transport) = law.transport(model.sample_period_s)
     {
-        // A pulse (or gap) shorter than the difference of the delays never arrives.
-        let difference = (rise_delay - fall_delay) / model.sample_period_s;
-        hold.on = hold
-            .on
-            .max(difference.ceil().max(0.0) as u32 + SHORTEST_SURE_PULSE);
-        hold.off = hold
-            .off
-            .max((-difference).ceil().max(0.0) as u32 + SHORTEST_SURE_PULSE);
+        let [rising, falling] = transport.held_back();
+        let varies = transport.bounds().is_none_or(|[low, high]| low < high);
+        if varies || law.shapes_command() {
+            // A pulse (or gap) shorter than its edge is held back never arrives.
+            let sure = |held: f64| held.ceil() as u32 + SHORTEST_SURE_PULSE;
+            hold.on = hold.on.max(sure(rising));
+            hold.off = hold.off.max(sure(falling));
+        }
     }
     if hold.on > samples(request.min_on_s) || hold.off > samples(request.min_off_s) {
         remarks.push(format!(
@@ -287,6 +282,7 @@ fn samples(seconds: f64) -> u32 {
 pub(super) mod tests {
     use super::*;
     use crate::model::Training;
+    use model_core::effects::StateDependentDelay;
     use model_core::model::Averaging;
     use model_core::recursion::{Grading, LagConvention};
 
@@ -325,13 +321,7 @@ pub(super) mod tests {
                 -0.0228, 0.0138, 0.0621, -0.0286, -0.0186, -0.0121, -0.0035, -0.0056, 0.0189,
                 -0.0049,
             ],
-            delay: Delay::StateDependent {
-                delay_floor: 47.35,
-                delay_rise: 12.69,
-                delay_rate: 20.18,
-                factors: vec![1.0],
-                interpolated: false,
-            },
+            delay: Delay::of::<StateDependentDelay<f64>>(&[47.35, 12.69, 20.18], vec![1.0], false),
             ..paper(convention)
         }
     }

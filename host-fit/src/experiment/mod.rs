@@ -186,14 +186,12 @@ fn separation(models: &[Model], u: &[f64]) -> f64 {
 
 /// The free run from rest, every channel at its reference; `None` if it diverges.
 fn run(model: &Model, u: &[f64]) -> Option<Vec<f64>> {
-    let references = model.channels().into_iter().map(|channel| {
-        let user = model
-            .effects
-            .iter()
-            .find(|e| e.channel.as_deref() == Some(&channel));
-        vec![user.and_then(|e| e.reference).unwrap_or(1.0); u.len()]
-    });
-    let references: Vec<Vec<f64>> = references.collect();
+    let references: Vec<Vec<f64>> = model
+        .memory()
+        .references()
+        .into_iter()
+        .map(|reference| vec![reference; u.len()])
+        .collect();
     let signals = Signals {
         u,
         y: None,

@@ -1,10 +1,11 @@
 //! A base model refitted, all of it, with one more effect.
 
 use super::lean::{fresh_starts, settle_fixed_delay, with_law_of};
+use super::starts::starts;
 use super::{Fit, FitOptions, fit};
 use crate::data::Record;
 use crate::model::{Delay, Model};
-use model_core::effect::{Facts, Parameter, Place, Spec, Start, Starts};
+use model_core::effect::{Place, Spec};
 use model_core::recursion::Grading;
 use rayon::prelude::*;
 use std::cmp::Ordering;
@@ -23,8 +24,6 @@ const GRADINGS: [Grading; 3] = [
     Grading::Interpolated,
     Grading::Switched,
 ];
-/// Most starting points that are tried.
-const MOST_STARTS: usize = 12;
 
 /// Why an effect could not be tried.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -160,92 +159,4 @@ fn channel_reference(spec: &Spec, records: &[&Record]) -> Result<Option<f64>, Ca
         count += values.len() as f64;
     }
     Ok(Some(sum / f64::max(count, 1.0)))
-}
-
-/// The size of a signal: 1 where it is of order 1, as the catalogue's ranges are.
-fn size_of(records: &[&Record], signal: impl Fn(&Record) -> &[f64]) -> f64 {
-    let values = records.iter().flat_map(|record| signal(record));
-    let size = values.fold(0.0, |size: f64, value| size.max(value.abs()));
-    if (0.3..3.0).contains(&size) || size == 0.0 {
-        1.0
-    } else {
-        size
-    }
-}
-
-/// Root mean square change of y over a sample.
-fn y_per_sample(records: &[&Record]) -> f64 {
-    let changes = records
-        .iter()
-        .flat_map(|r| r.y.windows(2).map(|pair| pair[1] - pair[0]));
-    let (sum, count) = changes.fold((0.0, 0.0), |(s, n), change| (s + change * change, n + 1.0));
-    f64::sqrt(sum / f64::max(count, 1.0))
-}
-
-/// Parameter vectors from which to set out.
-fn starts(base: &Model, spec: &Spec, records: &[&Record]) -> Vec<Vec<f64>> {
-    let mut sorted_y: Vec<f64> = records.iter().flat_map(|r| r.y.iter().copied()).collect();
-    sorted_y.sort_by(f64::total_cmp);
-    let period = base.sample_period_s;
-    let longest = records.iter().map(|r| r.len()).max().unwrap_or(0);
-    let facts = Facts {
-        y: size_of(records, |record| &record.y),
-        u: size_of(records, |record| &record.u),
-        time: 1.0,
-        y_per_sample: y_per_sample(records),
-        sorted_y: &sorted_y,
-        delay: present_delay(base),
-        period,
-        record: longest as f64 * period,
-        time_constant: base.time_constant().min(longest as f64 * period),
-    };
-    match spec.starts {
-        Starts::Grid => product(spec.parameters, &facts),
-        Starts::Rows(rows) => {
-            let values = |row: &&[Start]| {
-                let each = row.iter().zip(spec.parameters);
-                each.map(|(start, p)| start.value(p, &facts)).collect()
-            };
-            rows.iter().map(values).collect()
-        }
-    }
-}
-
-/// Every combination of the catalogue's starting values.
-fn product(parameters: &[Parameter], facts: &Facts<'_>) -> Vec<Vec<f64>> {
-    let mut all = vec![Vec::new()];
-    for parameter in parameters {
-        let extended = all.iter().flat_map(|start| {
-            parameter.starts.iter().map(move |value| {
-                let mut longer = start.clone();
-                longer.push(Start::Value(*value).value(parameter, facts));
-                longer
-            })
-        });
-        all = extended.collect();
-    }
-    // Thinned evenly, so that no parameter keeps only its first value.
-    let stride = all.len().div_ceil(MOST_STARTS).max(1);
-    all.into_iter().step_by(stride).collect()
-}
-
-/// The first input's delay, about: in the middle of a law's range.
-fn present_delay(base: &Model) -> f64 {
-    match &base.delay {
-        Delay::Fixed { delays } => delays.first().copied().unwrap_or(0).into(),
-        Delay::StateDependent {
-            delay_floor,
-            delay_rise,
-            delay_rate,
-            factors,
-            ..
-        } => {
-            let factor = factors.first().copied().unwrap_or(1.0);
-            factor * (delay_floor + delay_rise * (-0.5 * delay_rate).exp())
-        }
-        Delay::EdgeDependent {
-            rise_delay,
-            fall_delay,
-        } => 0.5 * (rise_delay + fall_delay) / base.sample_period_s,
-    }
 }

@@ -313,19 +313,13 @@ impl LeastSquares for Problem<'_> {
 
 /// Fits the parameters of `model` to `records` in free run, from where they are.
 ///
-/// A rounded state-dependent delay is fitted without its rounding, which makes the free
+/// A rounded delay law is fitted without its rounding, which makes the free
 /// run smooth; the coefficients are then fitted again with it.
 ///
 /// # Errors
 /// A missing channel, or a model whose free run diverges from the start.
 pub fn fit(model: &Model, records: &[&Record], options: &FitOptions) -> Result<Fit, SimulateError> {
-    let rounded = matches!(
-        model.delay,
-        Delay::StateDependent {
-            interpolated: false,
-            ..
-        }
-    );
+    let rounded = matches!(&model.delay, Delay::Law(law) if !law.interpolated);
     if !rounded {
         return descend(model, records, options, Rounding::Samples);
     }

@@ -4,13 +4,16 @@
 //! of a plenum's droop behind 18 free coefficients is a twentieth). The leanest
 //! model has nothing to imitate with, so what it lacks stays visible.
 
+use super::starts::starts;
 use super::{Fit, FitOptions, fit};
 use crate::data::Record;
-use crate::model::{Delay, Model, Start};
+use crate::model::{Delay, Model, Start, TransportLaw};
 use crate::simulate::SimulateError;
 use model_core::recursion::{Grading, LagConvention};
 use rayon::prelude::*;
 
+/// How many of the starts on a delay law's card are tried, beside the given law.
+const LAW_STARTS: usize = 3;
 /// Time constants from which the search sets out, s.
 const TIME_CONSTANTS: [f64; 3] = [0.02, 0.06, 0.2];
 
@@ -52,9 +55,7 @@ pub fn lean_base(given: &Model, records: &[&Record]) -> Result<Fit, SimulateErro
     let best = settle_fixed_delay(best, records, &FitOptions::default())?;
     match given.delay {
         Delay::Fixed { .. } => Ok(best),
-        Delay::StateDependent { .. } | Delay::EdgeDependent { .. } => {
-            with_law_of(&best.model, given, records)
-        }
+        Delay::Law(_) => with_law_of(&best.model, given, records),
     }
 }
 
@@ -162,39 +163,23 @@ pub(super) fn with_law_of(
     given: &Model,
     records: &[&Record],
 ) -> Result<Fit, SimulateError> {
-    let delay = model.longest_delay() as f64;
-    let period = model.sample_period_s;
     let laws: Vec<Delay> = match &given.delay {
         Delay::Fixed { .. } => vec![model.delay.clone()],
-        Delay::StateDependent {
-            delay_floor,
-            delay_rise,
-            delay_rate,
-            factors,
-            ..
-        } => {
-            let law = |delay_floor: f64, delay_rise: f64, delay_rate: f64| Delay::StateDependent {
-                delay_floor,
-                delay_rise,
-                delay_rate,
-                factors: vec![1.0],
-                interpolated: true,
+        Delay::Law(law) => {
+            let with = |parameters: Vec<f64>, factor: f64| {
+                Delay::Law(TransportLaw {
+                    parameters,
+                    factors: vec![factor],
+                    interpolated: true,
+                    ..*law
+                })
             };
-            let factor = factors.first().copied().unwrap_or(1.0);
-            vec![
-                law(factor * delay_floor, factor * delay_rise, *delay_rate),
-                law(delay - 3.0, 10.0, 4.0),
-                law(delay - 1.0, 10.0, 16.0),
-                law(delay - 6.0, 10.0, 2.0),
-            ]
+            let factor = law.factors.first().copied().unwrap_or(1.0);
+            let own = with(law.parameters.clone(), factor);
+            let others = starts(model, law.spec, records).into_iter();
+            let others = others.take(LAW_STARTS).map(|start| with(start, 1.0));
+            std::iter::once(own).chain(others).collect()
         }
-        Delay::EdgeDependent { .. } => [(4.0, -4.0), (-4.0, 4.0), (0.0, 0.0)]
-            .into_iter()
-            .map(|(rise, fall)| Delay::EdgeDependent {
-                rise_delay: ((delay + rise) * period).max(period),
-                fall_delay: ((delay + fall) * period).max(period),
-            })
-            .collect(),
     };
     let tried: Vec<Option<Fit>> = laws
         .into_par_iter()

@@ -5,6 +5,7 @@ mod drift;
 mod free_run;
 mod lean;
 mod levenberg;
+mod starts;
 
 pub use candidate::{CandidateError, fit_with_effect};
 pub(crate) use drift::pieces;

@@ -1,7 +1,7 @@
 //! The command as it arrives at the sensor, for any input delay.
 
 use model_core::average::WindowSum;
-use model_core::delay::DelayLaw as _;
+use model_core::delay::{DelayLaw as _, ScaledDelay, Tap};
 use model_core::effects::StateDependentDelay;
 
 use super::structure::{DelayLaw, FACTOR_STEP, InputDelay, Series, Structure, WINDOW};
@@ -251,24 +251,23 @@ pub(crate) fn factor(tick: i64) -> f64 {
     tick as f64 * FACTOR_STEP
 }
 
+/// The law for one input, as the model's core runs it.
+pub(crate) type CoreLaw = ScaledDelay<StateDependentDelay<f64>, [f64; 1], true>;
+
 /// The law as the model's core runs it.
-pub(crate) fn core_law(law: &DelayLaw, factor: f64) -> StateDependentDelay<f64> {
-    StateDependentDelay {
-        floor: law.floor,
-        rise: law.rise,
-        rate: law.rate,
+pub(crate) fn core_law(law: &DelayLaw, factor: f64) -> CoreLaw {
+    ScaledDelay {
+        law: StateDependentDelay {
+            floor: law.floor,
+            rise: law.rise,
+            rate: law.rate,
+        },
         factors: [factor],
     }
 }
 
 fn delay_samples(factor: f64, base: f64) -> usize {
-    let law: StateDependentDelay<f64> = StateDependentDelay {
-        floor: 0.0,
-        rise: 0.0,
-        rate: 0.0,
-        factors: [factor],
-    };
-    law.tap(0, base).whole
+    Tap::at(factor * base, true).whole
 }
 
 /// ỹ_k of eq. (1): the W − 1 values before y_k, divided by W.

@@ -10,7 +10,7 @@
 
 use model_core::delay::DelayLaw as _;
 
-use super::arrival::{Signals, core_law, factor};
+use super::arrival::{CoreLaw, Signals, core_law, factor};
 use super::coefficients::Coefficients;
 use super::layout::Delays;
 use super::structure::{DelayLaw, InputDelay, Structure, WINDOW};
@@ -142,7 +142,7 @@ impl Recursion {
 
 /// One input of a candidate: its law, and its shortest and longest delay.
 struct Arrival {
-    law: Option<model_core::effects::StateDependentDelay<f64>>,
+    law: Option<CoreLaw>,
     shortest: usize,
     longest: usize,
 }
@@ -152,7 +152,7 @@ impl Arrival {
         let law = law.map(|law| core_law(law, factor(tick)));
         let ends = match &law {
             None => [tick.max(0) as usize; 2],
-            Some(law) => [law.floor, law.floor + law.rise].map(|h| law.tap(0, h).whole),
+            Some(law) => [law.law.floor, law.law.floor + law.law.rise].map(|h| law.tap(0, h).whole),
         };
         Self {
             law,

@@ -1,5 +1,6 @@
 //! One identification, from records to a model.
 
+use model_core::effects::StateDependentDelay;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
@@ -136,13 +137,11 @@ fn model(
                     .map(|h| u16::try_from(*h).unwrap_or(u16::MAX))
                     .collect(),
             },
-            InputDelay::StateDependent { law, .. } => Delay::StateDependent {
-                delay_floor: law.floor,
-                delay_rise: law.rise,
-                delay_rate: law.rate,
-                factors: delays.ticks.iter().map(|f| factor(*f)).collect(),
-                interpolated: false,
-            },
+            InputDelay::StateDependent { law, .. } => Delay::of::<StateDependentDelay<f64>>(
+                &[law.floor, law.rise, law.rate],
+                delays.ticks.iter().map(|f| factor(*f)).collect(),
+                false,
+            ),
         },
         effects: Vec::new(),
         definitions: Vec::new(),

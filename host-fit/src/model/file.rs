@@ -1,6 +1,7 @@
 //! The model file `model.toml`.
 
-use super::{Added, Delay, Law, Model, Start, Training};
+use super::delay_table::DelayTable;
+use super::{Added, Law, Model, Start, Training};
 use crate::output::{self, OutputError};
 use crate::user_effect::{Definition, DefinitionError, Source};
 use model_core::effect::Spec;
@@ -72,7 +73,7 @@ struct File {
     start: Start,
     structure: Structure,
     coefficients: Coefficients,
-    delay: Delay,
+    delay: DelayTable,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     effect: Vec<EffectTable>,
     /// The user's own effects, whole: a model file stands alone.
@@ -246,7 +247,7 @@ impl File {
                     .map(|l| model.c.iter().copied().skip(l * lags).take(lags).collect())
                     .collect(),
             },
-            delay: model.delay.clone(),
+            delay: DelayTable::of(&model.delay),
             effect: model
                 .effects
                 .iter()
@@ -343,39 +344,6 @@ impl File {
                 );
             }
         }
-        let per_input = |key: &str, found: usize| {
-            if found == coefficients.b.len() {
-                return Ok(());
-            }
-            let inputs = coefficients.b.len();
-            wrong(
-                key,
-                format!("has {found} entries, but `coefficients.b` has {inputs}"),
-            )
-        };
-        match &self.delay {
-            Delay::Fixed { delays } => per_input("delay.delays", delays.len())?,
-            Delay::StateDependent {
-                delay_floor,
-                delay_rise,
-                delay_rate,
-                factors,
-                ..
-            } => {
-                per_input("delay.factors", factors.len())?;
-                finite("delay", &[*delay_floor, *delay_rise, *delay_rate])?;
-                finite("delay.factors", factors)?;
-            }
-            Delay::EdgeDependent {
-                rise_delay,
-                fall_delay,
-            } => {
-                finite("delay", &[*rise_delay, *fall_delay])?;
-                if *rise_delay < 0.0 || *fall_delay < 0.0 {
-                    return wrong("delay", "a delay cannot be negative".into());
-                }
-            }
-        }
         if let Some(fault) = self.law.as_ref().and_then(Law::fault) {
             return Err(fault);
         }
@@ -396,9 +364,9 @@ impl File {
             state_lags: self.structure.state_lags,
             a: self.coefficients.a,
             product_lags: self.structure.product_lags,
+            delay: self.delay.into_delay(self.coefficients.b.len())?,
             b: self.coefficients.b,
             c,
-            delay: self.delay,
             effects: Vec::new(),
             definitions: Vec::new(),
             training: self.training,
@@ -472,7 +440,7 @@ impl EffectTable {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Hold, Maximise, Track};
+    use super::super::{Delay, Hold, Maximise, Track};
     use super::*;
 
     fn example() -> Model {

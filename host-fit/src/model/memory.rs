@@ -3,7 +3,7 @@
 //! The one place that knows: the simulator, the design of laws and the generated
 //! code all keep what is said here.
 
-use super::{Delay, Model};
+use super::{Added, Delay, Model};
 use model_core::Real;
 use model_core::effect::Place;
 
@@ -58,7 +58,7 @@ impl Model {
             // A sample to interpolate to, one for what single precision may round
             // up, and the newest itself.
             jets: delay + 3 + averaged,
-            graded: matches!(self.delay, Delay::EdgeDependent { .. })
+            graded: matches!(&self.delay, Delay::Law(law) if law.shapes_command())
                 || names.into_iter().any(shapes_jet),
             channels: self.measured(),
         }
@@ -71,7 +71,7 @@ impl Model {
                 .iter()
                 .find(|added| added.channel.as_ref() == Some(&name));
             Channel {
-                reference: owner.and_then(|added| added.reference).unwrap_or(1.0),
+                reference: owner.map_or(Added::NO_REFERENCE, Added::reference),
                 name,
             }
         };
@@ -107,7 +107,6 @@ impl Footprint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Added;
 
     #[test]
     fn lags_delays_and_windows_are_kept() {

@@ -1,6 +1,8 @@
 //! An identified model with sizes known at run time.
 
 mod chain;
+mod delay;
+mod delay_table;
 mod envelope;
 mod file;
 mod law;
@@ -10,6 +12,7 @@ mod poles;
 mod prepared;
 
 pub use chain::{Chain, HostEffect, HostState};
+pub use delay::{Delay, TransportLaw};
 pub use file::{FORMAT_VERSION, ModelError};
 pub use law::{Hold, Law, Maximise, Track};
 pub use memory::{Channel, Footprint};
@@ -85,39 +88,6 @@ pub enum Start {
     Measured,
 }
 
-/// The law of the input delays.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "law", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Delay {
-    /// h_l, samples, eq. (3).
-    Fixed {
-        /// h_l, samples.
-        delays: Vec<u16>,
-    },
-    /// h_l = round(f_l·(p0 + p1·exp(−p2·ỹ))), eqs. (2) and (4).
-    StateDependent {
-        /// p0, samples.
-        delay_floor: f64,
-        /// p1, samples.
-        delay_rise: f64,
-        /// p2, 1/y.
-        delay_rate: f64,
-        /// f_l.
-        factors: Vec<f64>,
-        /// Whether the input is interpolated between samples instead of the
-        /// delay rounded as in eq. (4).
-        #[serde(default)]
-        interpolated: bool,
-    },
-    /// Rising and falling edges travel differently long.
-    EdgeDependent {
-        /// Delay of rising edges, s.
-        rise_delay: f64,
-        /// Delay of falling edges, s.
-        fall_delay: f64,
-    },
-}
-
 /// An effect that was added to a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -129,9 +99,20 @@ pub struct Added {
     /// The measured channel it uses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channel: Option<String>,
-    /// The reference of that channel, in its unit.
+    /// The reference of that channel, in its unit; see [`reference`](Self::reference).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference: Option<f64>,
+}
+
+impl Added {
+    /// What stands for a reference that is not known: effects divide by theirs.
+    pub(crate) const NO_REFERENCE: f64 = 1.0;
+
+    /// The reference of the effect's channel, in its unit.
+    #[must_use]
+    pub fn reference(&self) -> f64 {
+        self.reference.unwrap_or(Self::NO_REFERENCE)
+    }
 }
 
 /// What the model was trained on: predictions outside are extrapolations.
@@ -274,22 +255,7 @@ impl Model {
     /// The longest input delay, samples: at ỹ = 0 if it depends on the state.
     #[must_use]
     pub fn longest_delay(&self) -> usize {
-        let longest = match &self.delay {
-            Delay::Fixed { delays } => delays.iter().copied().max().unwrap_or(0).into(),
-            Delay::StateDependent {
-                delay_floor,
-                delay_rise,
-                factors,
-                ..
-            } => {
-                let factor = factors.iter().copied().fold(0.0, f64::max);
-                factor * delay_floor.max(delay_floor + delay_rise)
-            }
-            Delay::EdgeDependent {
-                rise_delay,
-                fall_delay,
-            } => rise_delay.max(*fall_delay) / self.sample_period_s + 1.0,
-        };
+        let longest = self.delay.longest(self.sample_period_s);
         // A delay of more than 2²⁰ samples is a mistake that clamping reports.
         longest.clamp(0.0, 1_048_576.0).round() as usize
     }
@@ -313,61 +279,31 @@ impl Model {
     /// Adds an effect with the values `parameters`, where the physics has its
     /// place: of the catalogue, or a user's own that was [defined](Self::define). A delay law replaces the one there is.
     pub fn add(&mut self, spec: &'static Spec, parameters: &[f64], reference: Option<f64>) {
-        match (spec.name, parameters) {
-            ("state-dependent-delay", &[delay_floor, delay_rise, delay_rate]) => {
-                let factors = match &self.delay {
-                    // Inputs keep their delays relative to the first.
-                    Delay::Fixed { delays } => {
-                        let first = f64::from(delays.first().copied().unwrap_or(1).max(1));
-                        delays.iter().map(|h| f64::from(*h) / first).collect()
-                    }
-                    Delay::StateDependent { factors, .. } => factors.clone(),
-                    Delay::EdgeDependent { .. } => vec![1.0; self.inputs()],
-                };
-                self.delay = Delay::StateDependent {
-                    delay_floor,
-                    delay_rise,
-                    delay_rate,
-                    factors,
-                    interpolated: true,
-                };
-            }
-            ("edge-dependent-delay", &[rise_delay, fall_delay]) => {
-                self.delay = Delay::EdgeDependent {
-                    rise_delay,
-                    fall_delay,
-                };
-            }
-            _ => {
-                self.effects.push(Added {
-                    name: spec.name.to_owned(),
-                    parameters: parameters.to_vec(),
-                    channel: spec.channel.map(str::to_owned),
-                    reference,
-                });
-                // By place, within a place as the catalogue has them, the user's last.
-                let order: Vec<(Place, &str)> = self
-                    .candidates()
-                    .map(|spec| (spec.place, spec.name))
-                    .collect();
-                let rank = |added: &Added| {
-                    let index = order.iter().position(|(_, name)| *name == added.name);
-                    (index.map(|index| order[index].0), index)
-                };
-                self.effects.sort_by_key(rank);
-            }
+        if spec.place == Place::Delay {
+            self.delay = Delay::Law(TransportLaw {
+                spec,
+                parameters: parameters.to_vec(),
+                // Inputs keep their delays relative to the first.
+                factors: self.delay.factors(),
+                interpolated: true,
+            });
+            return;
         }
-    }
-}
-
-impl Delay {
-    /// The name of the law in the catalogue of effects; a fixed delay is none.
-    #[must_use]
-    pub fn effect_name(&self) -> Option<&'static str> {
-        match self {
-            Self::Fixed { .. } => None,
-            Self::StateDependent { .. } => Some("state-dependent-delay"),
-            Self::EdgeDependent { .. } => Some("edge-dependent-delay"),
-        }
+        self.effects.push(Added {
+            name: spec.name.to_owned(),
+            parameters: parameters.to_vec(),
+            channel: spec.channel.map(str::to_owned),
+            reference,
+        });
+        // By place, within a place as the catalogue has them, the user's last.
+        let order: Vec<(Place, &str)> = self
+            .candidates()
+            .map(|spec| (spec.place, spec.name))
+            .collect();
+        let rank = |added: &Added| {
+            let index = order.iter().position(|(_, name)| *name == added.name);
+            (index.map(|index| order[index].0), index)
+        };
+        self.effects.sort_by_key(rank);
     }
 }

@@ -59,9 +59,9 @@ impl Model {
         all.extend((1..=self.b.len()).map(|l| linear(format!("b{l}"))));
         let lags = self.product_lags.len();
         all.extend((0..self.c.len()).map(|i| linear(format!("c{}{}", i % lags + 1, i / lags + 1))));
-        if let Some(name) = self.delay.effect_name() {
-            all.extend(self.parameters_of(name).iter().map(|parameter| Coordinate {
-                name: format!("{name}.{}", parameter.name),
+        if let Delay::Law(law) = &self.delay {
+            all.extend(law.spec.parameters.iter().map(|parameter| Coordinate {
+                name: format!("{}.{}", law.spec.name, parameter.name),
                 kind: Kind::Delay(*parameter),
             }));
         }
@@ -82,18 +82,8 @@ impl Model {
         values.extend(&self.a);
         values.extend(&self.b);
         values.extend(&self.c);
-        match self.delay {
-            Delay::Fixed { .. } => {}
-            Delay::StateDependent {
-                delay_floor,
-                delay_rise,
-                delay_rate,
-                ..
-            } => values.extend([delay_floor, delay_rise, delay_rate]),
-            Delay::EdgeDependent {
-                rise_delay,
-                fall_delay,
-            } => values.extend([rise_delay, fall_delay]),
+        if let Delay::Law(law) = &self.delay {
+            values.extend(&law.parameters);
         }
         values.extend(self.effects.iter().flat_map(|added| &added.parameters));
         values
@@ -113,20 +103,8 @@ impl Model {
         model.a.iter_mut().for_each(&mut set);
         model.b.iter_mut().for_each(&mut set);
         model.c.iter_mut().for_each(&mut set);
-        match &mut model.delay {
-            Delay::Fixed { .. } => {}
-            Delay::StateDependent {
-                delay_floor,
-                delay_rise,
-                delay_rate,
-                ..
-            } => [delay_floor, delay_rise, delay_rate]
-                .into_iter()
-                .for_each(&mut set),
-            Delay::EdgeDependent {
-                rise_delay,
-                fall_delay,
-            } => [rise_delay, fall_delay].into_iter().for_each(&mut set),
+        if let Delay::Law(law) = &mut model.delay {
+            law.parameters.iter_mut().for_each(&mut set);
         }
         let parameters = |added: &mut Added| added.parameters.iter_mut().for_each(&mut set);
         model.effects.iter_mut().for_each(parameters);

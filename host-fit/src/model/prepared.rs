@@ -1,11 +1,11 @@
 //! A model in numbers of one type, ready to run.
 
+use super::delay::setting;
 use super::{Chain, Delay, HostEffect, Model};
 use model_core::Real;
-use model_core::delay::{DelayLaw, FixedDelay, Tap};
-use model_core::effect::{Physics, Setting};
-use model_core::effects::edge_dependent_delay::Run;
-use model_core::effects::{EdgeDependentDelay, StateDependentDelay};
+use model_core::delay::{DelayLaw, FixedDelay, Tap, Transport};
+use model_core::effect::Setting;
+use model_core::effects::{AnyTransport, AnyTransportState};
 use model_core::model::{Averaging, Parts};
 use model_core::recursion::{Bilinear, Grading, LagConvention};
 
@@ -55,7 +55,7 @@ impl<T: Real> Parts<T> for Prepared<T> {
     }
 }
 
-/// What becomes of a state-dependent delay between two samples.
+/// What becomes of a delay law between two samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rounding {
     /// As the model says: rounded to whole samples, eq. (4), or interpolated.
@@ -65,51 +65,55 @@ pub enum Rounding {
     None,
 }
 
-/// Any delay law of `model-core`, chosen at run time.
+/// Input delays of any kind, chosen at run time.
 #[derive(Clone, Debug)]
-pub enum AnyDelay<T> {
-    /// Constant delays.
+pub enum AnyDelay<T: Real> {
+    /// Constant whole samples.
     Fixed(FixedDelay<Vec<u16>>),
-    /// Eqs. (2) and (4).
-    StateDependent(StateDependentDelay<T, Vec<T>>),
-    /// Eq. (2) without the rounding of eq. (4).
-    Unrounded(StateDependentDelay<T, Vec<T>, false>),
-    /// Rising and falling edges apart.
-    EdgeDependent(EdgeDependentDelay<T>),
+    /// After a law of the catalogue.
+    Law {
+        /// The law.
+        law: AnyTransport<T>,
+        /// One factor for each input.
+        factors: Vec<T>,
+        /// Whether its delays are rounded to whole samples.
+        rounded: bool,
+    },
 }
 
 impl<T: Real> DelayLaw<T> for AnyDelay<T> {
-    type State = Run;
+    type State = Option<AnyTransportState<T>>;
     const INTERPOLATES: bool = true;
-    fn start(&self) -> Run {
+    fn start(&self) -> Self::State {
         match self {
-            Self::EdgeDependent(law) => law.start(),
-            Self::Fixed(_) | Self::StateDependent(_) | Self::Unrounded(_) => Run::default(),
+            Self::Fixed(_) => None,
+            Self::Law { law, .. } => Some(law.start()),
         }
     }
     #[inline]
-    fn command(&self, run: &mut Run, command: T) -> T {
-        match self {
-            Self::EdgeDependent(law) => law.command(run, command),
-            Self::Fixed(_) | Self::StateDependent(_) | Self::Unrounded(_) => command,
+    fn command(&self, state: &mut Self::State, command: T) -> T {
+        match (self, state) {
+            (Self::Law { law, .. }, Some(state)) => law.command(state, command),
+            _ => command,
         }
     }
     #[inline]
     fn evaluate(&self, output: T) -> T {
         match self {
             Self::Fixed(law) => law.evaluate(output),
-            Self::StateDependent(law) => law.evaluate(output),
-            Self::Unrounded(law) => law.evaluate(output),
-            Self::EdgeDependent(law) => law.evaluate(output),
+            Self::Law { law, .. } => law.delay(output),
         }
     }
     #[inline]
     fn tap(&self, l: usize, evaluated: T) -> Tap<T> {
         match self {
             Self::Fixed(law) => law.tap(l, evaluated),
-            Self::StateDependent(law) => law.tap(l, evaluated),
-            Self::Unrounded(law) => law.tap(l, evaluated),
-            Self::EdgeDependent(law) => law.tap(l, evaluated),
+            Self::Law {
+                factors, rounded, ..
+            } => {
+                let factor = factors.get(l).copied().unwrap_or(T::ONE);
+                Tap::at(factor * evaluated, *rounded)
+            }
         }
     }
 }
@@ -138,37 +142,21 @@ impl Model {
             Delay::Fixed { delays } => AnyDelay::Fixed(FixedDelay {
                 delays: delays.clone(),
             }),
-            Delay::StateDependent {
-                factors,
-                interpolated,
-                ..
-            } => {
-                let law = many(3);
-                let (floor, rise, rate) = (law[0], law[1], law[2]);
-                let factors = factors.iter().map(|f| T::from_f64(*f)).collect();
-                if *interpolated || rounding == Rounding::None {
-                    AnyDelay::Unrounded(StateDependentDelay {
-                        floor,
-                        rise,
-                        rate,
-                        factors,
-                    })
-                } else {
-                    AnyDelay::StateDependent(StateDependentDelay {
-                        floor,
-                        rise,
-                        rate,
-                        factors,
-                    })
+            Delay::Law(chosen) => {
+                let parameters = many(chosen.parameters.len());
+                let law = AnyTransport::new(chosen.spec.name, &parameters, &setting(period));
+                let factors = chosen.factors.iter().map(|f| T::from_f64(*f));
+                match law {
+                    Some(law) => AnyDelay::Law {
+                        law,
+                        factors: factors.collect(),
+                        rounded: !chosen.interpolated && rounding == Rounding::Samples,
+                    },
+                    // A law that is in no catalogue: `Delay::of` and files know none.
+                    None => AnyDelay::Fixed(FixedDelay {
+                        delays: vec![0; chosen.factors.len()],
+                    }),
                 }
-            }
-            Delay::EdgeDependent { .. } => {
-                let setting = Setting {
-                    period,
-                    channel: 0,
-                    reference: T::ONE,
-                };
-                AnyDelay::EdgeDependent(EdgeDependentDelay::new(&many(2), &setting))
             }
         };
         let channels = self.channels();
@@ -180,7 +168,7 @@ impl Model {
                 let setting = Setting {
                     period,
                     channel: added.channel.as_ref().and_then(index).unwrap_or(0),
-                    reference: T::from_f64(added.reference.unwrap_or(1.0)),
+                    reference: T::from_f64(added.reference()),
                 };
                 let parameters = many(added.parameters.len());
                 HostEffect::new(self, added, &parameters, &setting)

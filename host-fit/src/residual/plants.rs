@@ -5,6 +5,7 @@ use crate::data::{Record, Use};
 use crate::fit::lean_base;
 use crate::model::{Delay, Model, Start, Training};
 use firmware_sim::hidden_set::HiddenSetPlan;
+use model_core::effects::StateDependentDelay;
 use model_core::model::Averaging;
 use model_core::recursion::{Grading, LagConvention};
 
@@ -33,13 +34,7 @@ pub(crate) fn base(records: &[Record]) -> Model {
         product_lags: vec![1],
         b: vec![0.02],
         c: vec![0.0],
-        delay: Delay::StateDependent {
-            delay_floor: 30.0,
-            delay_rise: 10.0,
-            delay_rate: 5.0,
-            factors: vec![1.0],
-            interpolated: false,
-        },
+        delay: Delay::of::<StateDependentDelay<f64>>(&[30.0, 10.0, 5.0], vec![1.0], false),
         effects: Vec::new(),
         definitions: Vec::new(),
         training: Training::default(),

@@ -146,6 +146,7 @@ pub fn run<T, M, Y, J, const A: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::delay::ScaledDelay;
     use crate::effect::{Physics, Setting};
     use crate::effects::{PlenumDroop, StateDependentDelay, ValveLag};
     use crate::model::{Averaging, Params, matrix, step, vector};
@@ -173,10 +174,12 @@ mod tests {
             product_lags: [70],
             b: vector([0.03]),
             c: matrix([[-0.01]]),
-            delay: StateDependentDelay::<f64, [f64; 1]> {
-                floor: 20.0,
-                rise: 15.0,
-                rate: 5.0,
+            delay: ScaledDelay::<_, _, true> {
+                law: StateDependentDelay {
+                    floor: 20.0,
+                    rise: 15.0,
+                    rate: 5.0,
+                },
                 factors: [1.0],
             },
             effects: (

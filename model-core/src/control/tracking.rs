@@ -381,13 +381,14 @@ fn limited<T: Real>(value: T, limit: T) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::delay::ScaledDelay;
     use crate::effects::StateDependentDelay;
     use crate::model::{Averaging, Params};
     use crate::recursion::LagConvention;
     use crate::step;
     use nalgebra::{SMatrix, SVector};
 
-    type TableTwo<T> = Params<T, 5, 10, 1, StateDependentDelay<T>, ()>;
+    type TableTwo<T> = Params<T, 5, 10, 1, ScaledDelay<StateDependentDelay<T>, [T; 1], true>, ()>;
 
     fn table_two<T: Real>(convention: LagConvention) -> TableTwo<T> {
         let number = T::from_f64;
@@ -408,10 +409,12 @@ mod tests {
                 -0.0049,
             ]
             .map(number)]),
-            delay: StateDependentDelay {
-                floor: number(47.35),
-                rise: number(12.69),
-                rate: number(20.18),
+            delay: ScaledDelay {
+                law: StateDependentDelay {
+                    floor: number(47.35),
+                    rise: number(12.69),
+                    rate: number(20.18),
+                },
                 factors: [T::ONE],
             },
             effects: (),

@@ -291,6 +291,36 @@ pub enum RustType {
     Buffer(usize),
 }
 
+/// What the card of a delay law says besides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LawCard {
+    /// The law in words, with `{}` for each parameter: "{} + {}·exp(−{}·ỹ) samples".
+    pub words: &'static str,
+    /// Whether it holds edges of the command back, so that jets are not on/off
+    /// any more. Its delays are then not meant to be rounded.
+    pub shapes_command: bool,
+    /// Whether base models have it, so that none lacks it.
+    pub base: bool,
+    /// The public fields of its type, if they are the parameters as they are, in
+    /// their order: generated code can then have it as a constant.
+    pub fields: Option<&'static [&'static str]>,
+}
+
+impl LawCard {
+    /// A law that a model can lack, its words yet to be said.
+    pub const EFFECT: Self = Self {
+        words: "",
+        shapes_command: false,
+        base: false,
+        fields: None,
+    };
+    /// A law that base models have.
+    pub const BASE: Self = Self {
+        base: true,
+        ..Self::EFFECT
+    };
+}
+
 /// The identity card of an effect.
 #[derive(Clone, Copy, Debug)]
 pub struct Spec {
@@ -316,6 +346,8 @@ pub struct Spec {
     pub channel: Option<&'static str>,
     /// What else it needs to show.
     pub needs: Needs,
+    /// Delay laws: what else is known of them.
+    pub law: Option<LawCard>,
     /// Where to read more.
     pub source: &'static str,
 }

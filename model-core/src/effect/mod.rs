@@ -9,11 +9,11 @@ mod card;
 mod unit;
 
 pub use card::{
-    Amplitude, Facts, Influence, Needs, Parameter, Place, RustType, Sign, Spec, Start, Starts,
+    Amplitude, Facts, Influence, LawCard, Needs, Parameter, Place, RustType, Sign, Spec, Start,
+    Starts,
 };
 pub use unit::Unit;
 
-use crate::delay::DelayLaw;
 use crate::real::Real;
 
 /// What an effect is told about the rig.
@@ -104,10 +104,6 @@ pub trait Physics<T: Real>: Sized {
     /// `SPEC.parameters`; missing ones count as 0.
     fn new(parameters: &[T], setting: &Setting<T>) -> Self;
 }
-
-/// A delay law that is in the catalogue of effects.
-pub trait DelayPhysics<T: Real>: Physics<T> + DelayLaw<T> {}
-impl<T: Real, L: Physics<T> + DelayLaw<T>> DelayPhysics<T> for L {}
 
 /// The first `N` parameters; missing ones are 0.
 pub(crate) fn take<T: Real, const N: usize>(parameters: &[T]) -> [T; N] {

@@ -57,6 +57,7 @@ impl<T: Real> Physics<T> for AttachmentHysteresis<T> {
         amplitude: Some(Amplitude::new("gain", "an attachment hysteresis").linear()),
         channel: None,
         needs: Needs::Nothing,
+        law: None,
         source: "Greenblatt & Wygnanski, Prog. Aerosp. Sci. 36 (2000)",
     };
 

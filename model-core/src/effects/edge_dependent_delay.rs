@@ -1,9 +1,9 @@
 //! Rising and falling edges of the command take different times to arrive:
 //! attachment has to work its way through the separated flow, release does not.
 
-use crate::delay::{DelayLaw, Tap};
+use crate::delay::Transport;
 use crate::effect::{
-    Needs, Parameter, Physics, Place, RustType, Setting, Spec, Start, Starts, Unit, take,
+    LawCard, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Start, Starts, Unit, take,
 };
 use crate::real::Real;
 
@@ -11,8 +11,8 @@ use crate::real::Real;
 ///
 /// The edge that travels longer is held back by the difference before the jets,
 /// and everything then travels for the shorter time; a pulse (or gap) shorter
-/// than the difference never arrives. Inputs l > 1 use the same delay. Delays
-/// need not be whole samples: an edge between samples is a sample of part strength.
+/// than the difference never arrives. Delays need not be whole samples: an edge
+/// between samples is a sample of part strength.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeDependentDelay<T> {
     /// The shorter delay, samples.
@@ -40,10 +40,8 @@ impl Default for Run {
     }
 }
 
-impl<T: Real> DelayLaw<T> for EdgeDependentDelay<T> {
+impl<T: Real> Transport<T> for EdgeDependentDelay<T> {
     type State = Run;
-    const INTERPOLATES: bool = true;
-
     fn start(&self) -> Run {
         Run::default()
     }
@@ -64,12 +62,16 @@ impl<T: Real> DelayLaw<T> for EdgeDependentDelay<T> {
     }
 
     #[inline]
-    fn evaluate(&self, _output: T) -> T {
+    fn delay(&self, _output: T) -> T {
         self.shorter
     }
     #[inline]
-    fn tap(&self, _l: usize, evaluated: T) -> Tap<T> {
-        Tap::between(evaluated)
+    fn bounds(&self) -> Option<[T; 2]> {
+        Some([self.shorter; 2])
+    }
+    #[inline]
+    fn held_back(&self) -> [T; 2] {
+        [self.hold_rise, self.hold_fall]
     }
 }
 
@@ -94,6 +96,11 @@ impl<T: Real> Physics<T> for EdgeDependentDelay<T> {
         amplitude: None,
         channel: None,
         needs: Needs::OnOffInput,
+        law: Some(LawCard {
+            words: "{} after rising, {} after falling edges",
+            shapes_command: true,
+            ..LawCard::EFFECT
+        }),
         source: "Darabi & Wygnanski, J. Fluid Mech. 510 (2004): attachment and separation are different processes",
     };
 
@@ -112,6 +119,7 @@ impl<T: Real> Physics<T> for EdgeDependentDelay<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::delay::Tap;
 
     fn arrivals(rise: f64, fall: f64, command: impl Fn(usize) -> bool) -> [f64; 200] {
         let setting = Setting {
@@ -124,7 +132,7 @@ mod tests {
         let shaped: [f64; 200] =
             core::array::from_fn(|k| law.command(&mut run, if command(k) { 1.0 } else { 0.0 }));
         core::array::from_fn(|k| {
-            let tap = law.tap(0, law.evaluate(0.0));
+            let tap = Tap::between(law.delay(0.0));
             let read = |lag: usize| if lag <= k { shaped[k - lag] } else { 0.0 };
             read(tap.whole) + tap.fraction * (read(tap.whole + 1) - read(tap.whole))
         })
@@ -154,5 +162,25 @@ mod tests {
         let arrived = arrivals(0.0304, 0.0201, |k| (10..100).contains(&k));
         let area: f64 = arrived.iter().sum();
         assert!((area - (90.0 - 10.3)).abs() < 1e-9, "{area}");
+    }
+
+    #[test]
+    fn single_precision_follows_double() {
+        fn shaped<T: Real>() -> [f64; 300] {
+            let setting = Setting {
+                period: T::from_f64(0.001),
+                channel: 0,
+                reference: T::ONE,
+            };
+            let law = EdgeDependentDelay::new(&[0.0304, 0.0201].map(T::from_f64), &setting);
+            let mut run = law.start();
+            core::array::from_fn(|k| {
+                let command = if k / 60 % 2 == 1 { T::ONE } else { T::ZERO };
+                law.command(&mut run, command).value()
+            })
+        }
+        for (single, double) in shaped::<f32>().iter().zip(shaped::<f64>()) {
+            assert!((single - double).abs() < 1e-5);
+        }
     }
 }

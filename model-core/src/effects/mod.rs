@@ -7,6 +7,7 @@
 pub mod amplitude_saturation;
 pub mod attachment_hysteresis;
 pub mod bouc_wen_hysteresis;
+pub mod constant_delay;
 pub mod dry_friction;
 pub mod echo_path;
 pub mod edge_dependent_delay;
@@ -26,14 +27,76 @@ pub mod thermal_drift;
 pub mod valve_lag;
 pub mod vortex_shedding;
 
-pub use edge_dependent_delay::EdgeDependentDelay;
-pub use state_dependent_delay::StateDependentDelay;
-
-use crate::effect::{Effect, Flow, Instant, Physics, Setting, Spec};
+use crate::delay::Transport;
+use crate::effect::{Effect, Flow, Instant, Physics, Place, Setting, Spec};
 use crate::real::Real;
 
 /// Samples that an effect of [`AnyEffect`] remembers at most.
 pub const LONGEST_BUFFER: usize = 2048;
+
+macro_rules! delay_laws {
+    ($($file:ident :: $law:ident),+ $(,)?) => {
+        $(pub use $file::$law;)+
+
+        /// Any delay law of the catalogue, chosen at run time.
+        #[derive(Clone, Copy, Debug)]
+        pub enum AnyTransport<T: Real> {
+            $(#[doc = concat!("`", stringify!($file), "`")] $law($law<T>),)+
+        }
+
+        /// The state of [`AnyTransport`].
+        #[derive(Clone, Debug)]
+        pub enum AnyTransportState<T: Real> {
+            $(#[doc = concat!("of `", stringify!($file), "`")] $law(<$law<T> as Transport<T>>::State),)+
+        }
+
+        /// All delay laws, those of base models among them.
+        pub const LAWS: &[Spec] = &[$(<$law<f64> as Physics<f64>>::SPEC),+];
+
+        impl<T: Real> AnyTransport<T> {
+            /// The delay law called `name`, prepared; `None` for an unknown name.
+            #[must_use]
+            pub fn new(name: &str, parameters: &[T], setting: &Setting<T>) -> Option<Self> {
+                $(if name == <$law<T> as Physics<T>>::SPEC.name {
+                    return Some(Self::$law(<$law<T> as Physics<T>>::new(parameters, setting)));
+                })+
+                None
+            }
+        }
+
+        impl<T: Real> Transport<T> for AnyTransport<T> {
+            type State = AnyTransportState<T>;
+            fn start(&self) -> AnyTransportState<T> {
+                match self {
+                    $(Self::$law(law) => AnyTransportState::$law(law.start()),)+
+                }
+            }
+            #[inline]
+            fn command(&self, state: &mut AnyTransportState<T>, command: T) -> T {
+                match (self, state) {
+                    $((Self::$law(law), AnyTransportState::$law(state)) => law.command(state, command),)+
+                    _ => command,
+                }
+            }
+            #[inline]
+            fn delay(&self, output: T) -> T {
+                match self {
+                    $(Self::$law(law) => law.delay(output),)+
+                }
+            }
+            fn bounds(&self) -> Option<[T; 2]> {
+                match self {
+                    $(Self::$law(law) => law.bounds(),)+
+                }
+            }
+            fn held_back(&self) -> [T; 2] {
+                match self {
+                    $(Self::$law(law) => law.held_back(),)+
+                }
+            }
+        }
+    };
+}
 
 macro_rules! catalogue {
     ($($file:ident :: $effect:ident : $type:ty),+ $(,)?) => {
@@ -53,12 +116,10 @@ macro_rules! catalogue {
             $(#[doc = concat!("of `", stringify!($file), "`")] $effect(<$type as Effect<T>>::State),)+
         }
 
-        /// The catalogue in the order of the physics: jet, delay, flow, sensor.
-        pub const SPECS: &[Spec] = &in_order([
-            <StateDependentDelay<f64> as Physics<f64>>::SPEC,
-            <EdgeDependentDelay<f64> as Physics<f64>>::SPEC,
+        /// The cards of the effects that are no delay laws.
+        const EFFECTS: &[Spec] = &[
             $({ #[allow(dead_code, reason = "not every effect has numbers")] type T = f64; <$type as Physics<f64>>::SPEC },)+
-        ]);
+        ];
 
         impl<T: Real> AnyEffect<T> {
             /// The effect called `name`, prepared; `None` for an unknown name or
@@ -106,6 +167,12 @@ macro_rules! catalogue {
     };
 }
 
+delay_laws! {
+    constant_delay::ConstantDelay,
+    state_dependent_delay::StateDependentDelay,
+    edge_dependent_delay::EdgeDependentDelay,
+}
+
 // Within a place, in the order in which the physics runs.
 catalogue! {
     valve_lag::ValveLag: ValveLag<T>,
@@ -129,16 +196,41 @@ catalogue! {
     sensor_saturation::SensorSaturation: SensorSaturation<T>,
 }
 
-/// The two delay laws come first in the list above; move them behind the jets.
-const fn in_order<const N: usize>(specs: [Spec; N]) -> [Spec; N] {
-    let mut ordered = specs;
-    let mut next = 0;
-    let mut place = 0;
-    while place < 4 {
+/// The effects that a model can lack, in the order of the physics: jet, delay,
+/// flow, sensor.
+pub const SPECS: &[Spec] = &in_order::<{ EFFECTS.len() + lacking() }>();
+
+/// Whether a model can lack the law of this card.
+const fn can_be_missing(spec: &Spec) -> bool {
+    matches!(spec.law, Some(law) if !law.base)
+}
+
+/// How many delay laws a model can lack.
+const fn lacking() -> usize {
+    let (mut count, mut i) = (0, 0);
+    while i < LAWS.len() {
+        count += can_be_missing(&LAWS[i]) as usize;
+        i += 1;
+    }
+    count
+}
+
+const fn in_order<const N: usize>() -> [Spec; N] {
+    let mut ordered = [EFFECTS[0]; N];
+    let (mut next, mut place) = (0, 0);
+    while place <= Place::Sensor as usize {
         let mut i = 0;
-        while i < N {
-            if specs[i].place as usize == place {
-                ordered[next] = specs[i];
+        while i < LAWS.len() {
+            if can_be_missing(&LAWS[i]) && LAWS[i].place as usize == place {
+                ordered[next] = LAWS[i];
+                next += 1;
+            }
+            i += 1;
+        }
+        let mut i = 0;
+        while i < EFFECTS.len() {
+            if EFFECTS[i].place as usize == place {
+                ordered[next] = EFFECTS[i];
                 next += 1;
             }
             i += 1;
@@ -148,8 +240,60 @@ const fn in_order<const N: usize>(specs: [Spec; N]) -> [Spec; N] {
     ordered
 }
 
-/// The catalogue's entry for `name`.
+/// The catalogue's entry for the effect `name`.
 #[must_use]
 pub fn spec(name: &str) -> Option<&'static Spec> {
     SPECS.iter().find(|spec| spec.name == name)
+}
+
+/// The card of the delay law `name`, of base models or an effect.
+#[must_use]
+pub fn law(name: &str) -> Option<&'static Spec> {
+    LAWS.iter().find(|spec| spec.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::Starts;
+
+    #[test]
+    fn cards_are_whole() {
+        let mut names = std::vec::Vec::new();
+        for spec in EFFECTS.iter().chain(LAWS) {
+            assert!(!names.contains(&spec.name), "{} is there twice", spec.name);
+            names.push(spec.name);
+            assert_eq!(
+                spec.place == Place::Delay,
+                spec.law.is_some(),
+                "{}",
+                spec.name
+            );
+            let file = spec.rust.split("::").next().unwrap();
+            assert_eq!(file, spec.name.replace('-', "_"));
+            for p in spec.parameters {
+                assert!(p.low <= p.high && !p.starts.is_empty(), "{}", p.name);
+                let inside = p.starts.iter().all(|s| (p.low..=p.high).contains(s));
+                assert!(inside, "{}.{}", spec.name, p.name);
+            }
+            if let Starts::Rows(rows) = spec.starts {
+                assert!(rows.iter().all(|row| row.len() == spec.parameters.len()));
+            }
+            if let Some(amplitude) = &spec.amplitude {
+                assert!(
+                    spec.parameter(amplitude.parameter).is_some(),
+                    "{}",
+                    spec.name
+                );
+            }
+            if let Some(law) = &spec.law {
+                assert_eq!(law.words.matches("{}").count(), spec.parameters.len());
+                let fields = law.fields.map_or(spec.parameters.len(), <[_]>::len);
+                assert_eq!(fields, spec.parameters.len());
+            }
+        }
+        assert!(SPECS.is_sorted_by_key(|spec| spec.place));
+        assert_eq!(SPECS.len() + 1, names.len());
+        assert!(spec("constant-delay").is_none() && law("constant-delay").is_some());
+    }
 }

@@ -1,61 +1,43 @@
 //! The transport delay depends on how far the flow is attached, eq. (2).
 
-use crate::delay::{DelayLaw, Tap};
+use crate::delay::Transport;
 use crate::effect::{
-    Needs, Parameter, Physics, Place, RustType, Setting, Spec, Start, Starts, Unit, take,
+    LawCard, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Start, Starts, Unit, take,
 };
 use crate::real::Real;
 
-/// h_l = round(f_l · (p0 + p1·exp(−p2·ỹ))), samples, eqs. (2) and (4); without
-/// the rounding, and with the input interpolated, where `ROUNDED` is false.
-///
-/// The rounding moves every edge by up to half a sample, which a flow that
-/// rings at 20 Hz shows as an error of several per cent of the ringing.
+/// h = p0 + p1·exp(−p2·ỹ), samples, eq. (2).
 ///
 /// A negative ỹ counts as 0: the exponential would run away (theory: at
 /// ỹ = −0.1 it would be 2.4 times the delay of the natural flow).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StateDependentDelay<T, F = [T; 1], const ROUNDED: bool = true> {
+pub struct StateDependentDelay<T> {
     /// p0, samples: the delay of the attached flow.
     pub floor: T,
     /// p1, samples: how much longer the delay of the separated flow is.
     pub rise: T,
     /// p2, 1/y: how quickly the delay shortens as the flow attaches.
     pub rate: T,
-    /// f_l, one factor for each input.
-    pub factors: F,
 }
 
-impl<T: Real, F: AsRef<[T]> + Clone, const ROUNDED: bool> DelayLaw<T>
-    for StateDependentDelay<T, F, ROUNDED>
-{
+impl<T: Real> Transport<T> for StateDependentDelay<T> {
     type State = ();
-    const INTERPOLATES: bool = !ROUNDED;
     fn start(&self) {}
     #[inline]
-    fn evaluate(&self, output: T) -> T {
+    fn delay(&self, output: T) -> T {
         self.floor + self.rise * (-self.rate * output).exp()
     }
-    /// The exponential lies between 0 and 1, and every operation after it keeps
-    /// the order, roundings included: the ends are the bounds.
+    /// The exponential lies between 0 and 1.
     #[inline]
-    fn range(&self, l: usize) -> Option<(usize, usize)> {
-        if !ROUNDED || self.rate < T::ZERO {
+    fn bounds(&self) -> Option<[T; 2]> {
+        if self.rate < T::ZERO {
             return None;
         }
-        let attached = self.tap(l, self.floor).whole;
-        let separated = self.tap(l, self.floor + self.rise).whole;
-        Some((attached.min(separated), attached.max(separated)))
-    }
-    #[inline]
-    fn tap(&self, l: usize, evaluated: T) -> Tap<T> {
-        let factor = self.factors.as_ref().get(l).copied().unwrap_or(T::ONE);
-        let delay = factor * evaluated;
-        if ROUNDED {
-            Tap::on(delay.round().max(0) as usize)
-        } else {
-            Tap::between(delay)
-        }
+        let separated = self.floor + self.rise;
+        Some([
+            self.floor.at_most(separated),
+            self.floor.at_least(separated),
+        ])
     }
 }
 
@@ -81,17 +63,17 @@ impl<T: Real> Physics<T> for StateDependentDelay<T> {
         amplitude: None,
         channel: None,
         needs: Needs::Nothing,
+        law: Some(LawCard {
+            words: "{} + {}·exp(−{}·ỹ) samples",
+            fields: Some(&["floor", "rise", "rate"]),
+            ..LawCard::EFFECT
+        }),
         source: "Feingesicht et al., ECC 2016, eq. (2)",
     };
 
     fn new(parameters: &[T], _setting: &Setting<T>) -> Self {
         let [floor, rise, rate] = take(parameters);
-        Self {
-            floor,
-            rise,
-            rate,
-            factors: [T::ONE],
-        }
+        Self { floor, rise, rate }
     }
 }
 
@@ -99,54 +81,34 @@ impl<T: Real> Physics<T> for StateDependentDelay<T> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn without_rounding_it_taps_between_samples() {
-        let law = StateDependentDelay::<f64, [f64; 1], false> {
-            floor: 30.25,
-            rise: 0.0,
-            rate: 1.0,
-            factors: [1.0],
+    fn papers<T: Real>() -> StateDependentDelay<T> {
+        let setting = Setting {
+            period: T::from_f64(0.001),
+            channel: 0,
+            reference: T::ONE,
         };
-        let tap = law.tap(0, law.evaluate(0.3));
-        assert_eq!((tap.whole, tap.fraction), (30, 0.25));
+        StateDependentDelay::new(&[47.35, 12.69, 20.18].map(T::from_f64), &setting)
     }
 
     #[test]
-    fn its_range_holds_all_its_taps_and_no_more() {
-        for (rise, factor) in [(12.69, 1.0), (-12.69, 1.0), (12.69, 0.37), (12.69, 3.1)] {
-            let law = StateDependentDelay::<f32> {
-                floor: 47.35,
-                rise,
-                rate: 20.18,
-                factors: [factor],
-            };
-            let (low, high) = law.range(0).unwrap();
-            let mut met = (usize::MAX, 0);
-            for bits in (0..0x4080_0000_u32).step_by(10_007) {
-                let tap = law.tap(0, law.evaluate(f32::from_bits(bits))).whole;
-                met = (met.0.min(tap), met.1.max(tap));
-            }
-            assert_eq!(met, (low, high));
+    fn it_shortens_from_the_separated_to_the_attached_flow() {
+        let law = papers::<f64>();
+        assert_eq!(law.bounds(), Some([47.35, 47.35 + 12.69]));
+        assert_eq!(law.delay(0.0), 47.35 + 12.69);
+        assert!((law.delay(2.0) - 47.35).abs() < 1e-9);
+        // A share 1 − 1/e of the way at ỹ = 1/p2.
+        let there = law.delay(1.0 / 20.18);
+        assert!((there - (47.35 + 12.69 / core::f64::consts::E)).abs() < 1e-9);
+        let runaway = StateDependentDelay { rate: -1.0, ..law };
+        assert_eq!(runaway.bounds(), None);
+    }
+
+    #[test]
+    fn single_precision_follows_double() {
+        let (single, double) = (papers::<f32>(), papers::<f64>());
+        for y in (0..40).map(|i| f64::from(i) * 0.05) {
+            let found = f64::from(single.delay(y as f32));
+            assert!((found - double.delay(y)).abs() < 2e-5, "{y}");
         }
-    }
-
-    #[test]
-    fn the_papers_law_at_its_ends() {
-        let law = StateDependentDelay::<f32> {
-            floor: 47.35,
-            rise: 12.69,
-            rate: 20.18,
-            factors: [1.0],
-        };
-        assert_eq!(law.tap(0, law.evaluate(0.0)).whole, 60);
-        assert_eq!(law.tap(0, law.evaluate(1.0)).whole, 47);
-        let fast = StateDependentDelay::<f32, [f32; 2]> {
-            factors: [1.5513, 106.756],
-            floor: 47.35,
-            rise: 12.69,
-            rate: 20.18,
-        };
-        assert_eq!(fast.tap(1, fast.evaluate(0.0)).whole, 6410);
-        assert_eq!(fast.tap(1, fast.evaluate(1.0)).whole, 5055);
     }
 }

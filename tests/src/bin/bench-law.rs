@@ -12,6 +12,7 @@ use host_fit::model::{Delay, Model, Start, Track, Training};
 use host_fit::simulate::Ring;
 use model_core::State;
 use model_core::control::HoldTimes;
+use model_core::effects::StateDependentDelay;
 use model_core::model::Averaging;
 use model_core::recursion::{Grading, LagConvention};
 use rand::SeedableRng;
@@ -68,13 +69,11 @@ impl Bench {
             product_lags: vec![1],
             b: vec![1.05 * base.gain * (1.0 - attached)],
             c: vec![attached - separated],
-            delay: Delay::StateDependent {
-                delay_floor: 1050.0 * floor,
-                delay_rise: 1050.0 * rise,
-                delay_rate: rate,
-                factors: vec![1.0],
-                interpolated: false,
-            },
+            delay: Delay::of::<StateDependentDelay<f64>>(
+                &[1050.0 * floor, 1050.0 * rise, rate],
+                vec![1.0],
+                false,
+            ),
             effects: Vec::new(),
             definitions: Vec::new(),
             training: Training::default(),

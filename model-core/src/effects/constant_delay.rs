@@ -1,0 +1,79 @@
+//! A constant transport delay that need not be whole samples.
+
+use crate::delay::Transport;
+use crate::effect::{
+    LawCard, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Start, Starts, Unit, take,
+};
+use crate::real::Real;
+
+/// h, samples, whatever the flow does: eq. (3) without the rounding of its delays.
+/// Base models have it, so it is never what a model lacks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConstantDelay<T> {
+    /// h, samples.
+    pub delay: T,
+}
+
+impl<T: Real> Transport<T> for ConstantDelay<T> {
+    type State = ();
+    fn start(&self) {}
+    #[inline]
+    fn delay(&self, _output: T) -> T {
+        self.delay
+    }
+    #[inline]
+    fn bounds(&self) -> Option<[T; 2]> {
+        Some([self.delay; 2])
+    }
+}
+
+impl<T: Real> Physics<T> for ConstantDelay<T> {
+    const SPEC: Spec = Spec {
+        name: "constant-delay",
+        rust: "constant_delay::ConstantDelay",
+        rust_type: RustType::Numbers,
+        place: Place::Delay,
+        summary: "the delay is the same all the time",
+        equation: "h constant",
+        parameters: &[Parameter::new(
+            "delay",
+            Unit::Samples,
+            [0.0, 1000.0],
+            &[40.0],
+        )],
+        starts: Starts::Rows(&[&[Start::Delay(0.0)]]),
+        amplitude: None,
+        channel: None,
+        needs: Needs::Nothing,
+        law: Some(LawCard {
+            words: "{} samples",
+            fields: Some(&["delay"]),
+            ..LawCard::BASE
+        }),
+        source: "Feingesicht et al., ECC 2016, eq. (3)",
+    };
+
+    fn new(parameters: &[T], _setting: &Setting<T>) -> Self {
+        let [delay] = take(parameters);
+        Self { delay }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::delay::{DelayLaw, ScaledDelay};
+
+    #[test]
+    fn it_is_the_same_at_any_output() {
+        let law = ConstantDelay { delay: 31.4_f64 };
+        assert_eq!(law.delay(0.0), law.delay(0.9));
+        let delays = ScaledDelay::<_, [f64; 1], false> {
+            law,
+            factors: [1.0],
+        };
+        let tap = delays.tap(0, delays.evaluate(0.3));
+        assert_eq!(tap.whole, 31);
+        assert!((tap.fraction - 0.4).abs() < 1e-12);
+    }
+}

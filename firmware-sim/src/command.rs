@@ -64,18 +64,37 @@ impl Command {
 
     /// Random on/off, each dwell uniform between 20 and 500 ms.
     pub fn random(name: &str, rng: &mut ChaCha8Rng) -> Self {
-        Self::staircase(name, rng, |_, open| if open { 0.0 } else { 1.0 })
+        Self::telegraph(name, 500, 500, rng)
+    }
+
+    /// Random on/off; openings last 20 ms to `longest_on`, rests 20 ms to `longest_off` (samples).
+    pub fn telegraph(
+        name: &str,
+        longest_on: usize,
+        longest_off: usize,
+        rng: &mut ChaCha8Rng,
+    ) -> Self {
+        let turn = |_: &mut _, open| if open { 0.0 } else { 1.0 };
+        Self::staircase(
+            name,
+            rng,
+            turn,
+            |open| {
+                if open { longest_on } else { longest_off }
+            },
+        )
     }
 
     /// Random levels from `low` to `high`, each dwell uniform between 20 and 500 ms.
     pub fn random_levels(name: &str, low: f64, high: f64, rng: &mut ChaCha8Rng) -> Self {
-        Self::staircase(name, rng, |rng, _| rng.random_range(low..high))
+        Self::staircase(name, rng, |rng, _| rng.random_range(low..high), |_| 500)
     }
 
     fn staircase(
         name: &str,
         rng: &mut ChaCha8Rng,
         mut next: impl FnMut(&mut ChaCha8Rng, bool) -> f64,
+        longest: impl Fn(bool) -> usize,
     ) -> Self {
         let mut levels = vec![0.0; RUN_SAMPLES];
         let end = RUN_SAMPLES - TAIL_SAMPLES;
@@ -83,7 +102,7 @@ impl Command {
         let mut level = 0.0;
         while at < end {
             level = next(rng, level != 0.0);
-            let until = (at + rng.random_range(20..=500)).min(end);
+            let until = (at + rng.random_range(20..=longest(level != 0.0))).min(end);
             if let Some(dwell) = levels.get_mut(at..until) {
                 dwell.fill(level);
             }

@@ -1,19 +1,18 @@
 //! Data sets with something hidden in them, and the truth kept apart.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::RngExt;
 use recordings::{DataError, DataSet, Record, Use};
 use thiserror::Error;
 
 use crate::command::Command;
 use crate::instrument::{Instrument, InstrumentError};
 use crate::plant::{
-    BasePlant, DelayLaw, Effect, EffectError, Fault, FreeStream, PlantError, PlantSpec, RateLaw,
-    Rig, SAMPLE_PERIOD_S, ShowsWith,
+    BasePlant, Effect, EffectError, Fault, FreeStream, PlantError, PlantSpec, Rig, SAMPLE_PERIOD_S,
+    ShowsWith,
 };
+use crate::stream::{Stream, stream};
 
 /// Why a data set could not be made.
 #[derive(Debug, Error)]
@@ -36,22 +35,6 @@ pub enum HiddenSetError {
     /// Two effects want the same part of the rig.
     #[error("`{0}` and `{1}` exclude each other; hide one of them")]
     Exclusive(&'static str, &'static str),
-}
-
-/// Independent streams of random numbers under one seed.
-#[derive(Debug, Clone, Copy)]
-enum Stream {
-    Base,
-    Effects,
-    Commands,
-    Tunnel,
-    Noise,
-}
-
-fn stream(seed: u64, which: Stream) -> ChaCha8Rng {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    rng.set_stream(which as u64);
-    rng
 }
 
 /// Everything that determines a data set, bit for bit.
@@ -99,9 +82,8 @@ impl HiddenSetPlan {
         let wanders = hidden.iter().any(|e| e.channel().is_some());
         Ok(Self {
             plant: PlantSpec {
-                base,
-                effects: hidden,
                 faults,
+                ..PlantSpec::new(base, &hidden)
             },
             instrument: Instrument::default(),
             free_stream: wanders || rng.random_bool(0.25),
@@ -221,54 +203,7 @@ pub struct Truth {
 impl Truth {
     /// The truth as TOML text for people and scoring scripts.
     pub fn to_toml(&self) -> String {
-        let base = &self.plant.base;
-        let mut text = format!(
-            "seed = {}\n\n[base]\nattach_s = {}\nseparate_s = {}\ngain = {}\nrate_law = \"{}\"\n",
-            self.seed,
-            base.attach_s,
-            base.separate_s,
-            base.gain,
-            match base.rate_law {
-                RateLaw::Switched => "switched",
-                RateLaw::Interpolated => "interpolated",
-                RateLaw::Bilinear => "bilinear",
-            }
-        );
-        // Writing to a String cannot fail.
-        let _ = match self.plant.delay() {
-            DelayLaw::Fixed { delay_s } => writeln!(text, "delay_s = {delay_s}"),
-            DelayLaw::StateDependent {
-                floor_s,
-                rise_s,
-                rate,
-            } => writeln!(
-                text,
-                "delay_floor_s = {floor_s}\ndelay_rise_s = {rise_s}\ndelay_rate = {rate}"
-            ),
-            DelayLaw::EdgeDependent { rise_s, fall_s } => {
-                writeln!(text, "rise_delay_s = {rise_s}\nfall_delay_s = {fall_s}")
-            }
-        };
-        for effect in &self.plant.effects {
-            let _ = writeln!(text, "\n[[effect]]\nname = \"{}\"", effect.name());
-            for p in effect.parameters() {
-                let _ = writeln!(text, "{} = {} # {}", p.name, p.value, p.unit);
-            }
-        }
-        for fault in &self.plant.faults {
-            let _ = writeln!(text, "\n[[fault]]\nname = \"{}\"", fault.name());
-            let _ = match *fault {
-                Fault::MissingPulse { every } => writeln!(text, "every = {every}"),
-                Fault::FreezingSensor { from_s, to_s } => {
-                    writeln!(text, "from_s = {from_s}\nto_s = {to_s}")
-                }
-                Fault::StickingValve {
-                    after_open_s,
-                    stuck_s,
-                } => writeln!(text, "after_open_s = {after_open_s}\nstuck_s = {stuck_s}"),
-            };
-        }
-        text
+        format!("seed = {}\n\n{}", self.seed, self.plant.to_toml())
     }
 }
 

@@ -1,8 +1,8 @@
 //! What happens between the film's voltage and a phase-averaged data column: noise, converter, repeats.
 
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
+use rand_distr::{Distribution, StandardNormal, StudentT};
 use thiserror::Error;
 
 use crate::plant::SAMPLE_PERIOD_S;
@@ -106,6 +106,72 @@ impl NoiseSource {
     }
 }
 
+/// What else disturbs a repeat: slow, with tails, now and then. 0 for none.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Unrest {
+    /// Standard deviation of a slow component (y).
+    pub wander: f64,
+    /// Correlation time of the slow component (s).
+    pub wander_s: f64,
+    /// Standard deviation of a white part with heavy tails: Student's t with 3 degrees of freedom (y).
+    pub tails: f64,
+    /// Share of readings that are far off.
+    pub outliers: f64,
+    /// How far off they are (y).
+    pub outlier_size: f64,
+}
+
+impl Unrest {
+    /// Standard deviation of one sample of one repeat (y).
+    pub fn standard_deviation(&self) -> f64 {
+        self.wander
+            .hypot(self.tails)
+            .hypot(self.outlier_size * self.outliers.sqrt())
+    }
+}
+
+/// Running unrest at 1 kHz, stationary from its first sample.
+#[derive(Debug, Clone)]
+struct UnrestSource {
+    size: Unrest,
+    slow: NoiseSource,
+    tails: StudentT<f64>,
+    rng: ChaCha8Rng,
+}
+
+impl UnrestSource {
+    /// `None` when nothing disturbs.
+    fn new(size: Unrest, mut rng: ChaCha8Rng) -> Option<Self> {
+        if size.standard_deviation() == 0.0 {
+            return None;
+        }
+        let slow = Noise {
+            white: 0.0,
+            coloured: size.wander,
+            correlation_s: size.wander_s.max(SAMPLE_PERIOD_S),
+        };
+        let slow = NoiseSource::new(slow, ChaCha8Rng::seed_from_u64(rng.random()));
+        Some(Self {
+            size,
+            slow,
+            tails: StudentT::new(3.0).ok()?,
+            rng,
+        })
+    }
+
+    fn sample(&mut self) -> f64 {
+        // The variance of this t is 3.
+        let tail = self.tails.sample(&mut self.rng) / 3.0_f64.sqrt();
+        let off = if self.rng.random_bool(self.size.outliers.clamp(0.0, 1.0)) {
+            self.size.outlier_size
+        } else {
+            0.0
+        };
+        let off = if self.rng.random_bool(0.5) { off } else { -off };
+        self.slow.sample() + self.size.tails * tail + off
+    }
+}
+
 /// How a record is measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instrument {
@@ -118,6 +184,8 @@ pub struct Instrument {
     /// Relative scatter of the level from repeat to repeat, as the tunnel's speed never comes back
     /// exactly (0 for none).
     pub level_scatter: f64,
+    /// What else disturbs a repeat.
+    pub unrest: Unrest,
 }
 
 impl Default for Instrument {
@@ -128,6 +196,7 @@ impl Default for Instrument {
             converter: Some(Converter::TWELVE_BIT),
             repeats: 20,
             level_scatter: 0.0,
+            unrest: Unrest::default(),
         }
     }
 }
@@ -145,7 +214,17 @@ pub struct PhaseAverage {
     pub max: Vec<f64>,
 }
 
+/// Numbers of the streams of unrest; those of the noise are the repeats' own.
+const UNREST_STREAMS: u64 = 1 << 32;
+
 impl Instrument {
+    /// Standard deviation of one sample of the average, for readings of order 1 (y).
+    pub fn standard_error(&self) -> f64 {
+        let once = self.noise.standard_deviation();
+        let once = once.hypot(self.unrest.standard_deviation());
+        once.hypot(self.level_scatter) / (self.repeats as f64).sqrt()
+    }
+
     /// Measures the noise-free readings `truth` as often as there are repeats and averages.
     ///
     /// # Errors
@@ -165,8 +244,14 @@ impl Instrument {
             let scatter: f64 = StandardNormal.sample(&mut rng);
             let level = 1.0 + self.level_scatter * scatter;
             let mut noise = NoiseSource::new(self.noise, rng);
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            rng.set_stream(UNREST_STREAMS + repeat as u64);
+            let mut unrest = UnrestSource::new(self.unrest, rng);
             for (k, &y) in truth.iter().enumerate() {
-                let analogue = y * level + noise.sample();
+                let mut analogue = y * level + noise.sample();
+                if let Some(unrest) = &mut unrest {
+                    analogue += unrest.sample();
+                }
                 let reading = self
                     .converter
                     .map_or(analogue, |c| c.reading(c.code(analogue)));
@@ -240,6 +325,48 @@ mod tests {
         assert!((rate - 0.05).abs() < 0.005, "false alarms: {rate}");
         let expected = Noise::HOT_FILM.standard_deviation().powi(2) / 20.0;
         assert!((square / total as f64 / expected - 1.0).abs() < 0.03);
+    }
+
+    /// Whatever disturbs the repeats, the scatter says how far the mean may be off.
+    #[test]
+    fn unrest_has_its_size_and_the_standard_error_knows_it() {
+        let truth = vec![0.5; 20_000];
+        let quiet = Instrument {
+            noise: Noise {
+                white: 0.01,
+                coloured: 0.0,
+                correlation_s: 0.02,
+            },
+            ..Instrument::default()
+        };
+        let slow = Unrest {
+            wander: 0.03,
+            wander_s: 0.5,
+            ..Unrest::default()
+        };
+        let tails = Unrest {
+            tails: 0.03,
+            ..Unrest::default()
+        };
+        let outliers = Unrest {
+            outliers: 0.004,
+            outlier_size: 0.5,
+            ..Unrest::default()
+        };
+        for unrest in [slow, tails, outliers] {
+            let instrument = Instrument { unrest, ..quiet };
+            let (mut error, mut stated) = (0.0, 0.0);
+            for seed in 0..10 {
+                let m = instrument.measure(&truth, seed).unwrap();
+                let off: Vec<f64> = m.mean.iter().map(|y| y - 0.5).collect();
+                error += variance(&off) / 10.0;
+                stated += variance(&m.standard_error) / 10.0;
+            }
+            let expected = instrument.standard_error().powi(2);
+            assert!((stated / expected - 1.0).abs() < 0.15, "{unrest:?}");
+            // A slow component has few independent samples in a record.
+            assert!((error / expected - 1.0).abs() < 0.25, "{unrest:?}");
+        }
     }
 
     #[test]

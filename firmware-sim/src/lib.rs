@@ -2,10 +2,12 @@
 //!
 //! The plants are continuous-time physics and share no code with `model-core`.
 
+mod stream;
 mod waveform;
 
 pub mod bench;
 pub mod command;
+pub mod family;
 pub mod hidden_set;
 pub mod instrument;
 pub mod paper_like;

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand, ValueEnum};
 
+use firmware_sim::family::{Family, NoiseKind, Nuisance, RigPlan, Units};
 use firmware_sim::hidden_set::HiddenSetPlan;
 use firmware_sim::paper_like::{Disturbances, LagReading, paper_like_set};
 use firmware_sim::plant::RateLaw;
@@ -49,6 +50,33 @@ enum Command {
         #[arg(long)]
         truth: Option<PathBuf>,
     },
+    /// Writes a data set of a random rig of a family, with its answer beside it.
+    Rig {
+        /// Kind of flow: first-order, memory1, memory2, inertia, wake, rate-of-y.
+        #[arg(long, value_parser = named(Family::ALL.map(Family::name)))]
+        family: String,
+        /// Effect to hide, of the catalogue or in another law (two-reservoirs …); may be given several times.
+        #[arg(long)]
+        effect: Vec<String>,
+        /// What the repeats are disturbed by.
+        #[arg(long, default_value = "coloured", value_parser = named(NoiseKind::ALL.map(NoiseKind::name)))]
+        noise: String,
+        /// What is no effect and must not be taken for one; may be given several times.
+        #[arg(long, value_parser = named(Nuisance::ALL.map(Nuisance::name)))]
+        nuisance: Vec<String>,
+        /// Recorded times are the rig's times this factor.
+        #[arg(long, default_value_t = 1.0)]
+        time_factor: f64,
+        /// Recorded y are the rig's y times this factor.
+        #[arg(long, default_value_t = 1.0)]
+        y_factor: f64,
+        /// Seed of the rig, the commands and the noise.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// Folder for dataset.toml, the records and answer.toml.
+        #[arg(long)]
+        out: PathBuf,
+    },
     /// Writes a data set like the paper's, from its published model.
     PaperSet {
         /// What a printed lag means.
@@ -74,6 +102,11 @@ enum Rate {
 enum Lags {
     Literal,
     OneStep,
+}
+
+/// Only these names.
+fn named<const N: usize>(names: [&'static str; N]) -> clap::builder::PossibleValuesParser {
+    names.into()
 }
 
 fn change(plan: &mut HiddenSetPlan, setting: &str) -> Result<()> {
@@ -136,6 +169,32 @@ fn run(command: Command) -> Result<()> {
                 let text = hidden.truth.to_toml();
                 write_atomic(&path, |file| file.write_all(text.as_bytes()))?;
             }
+        }
+        Command::Rig {
+            family,
+            effect,
+            noise,
+            nuisance,
+            time_factor,
+            y_factor,
+            seed,
+            out,
+        } => {
+            let family = Family::of(&family).context("no such family")?;
+            let noise = NoiseKind::of(&noise).context("no such noise")?;
+            let effects: Vec<&str> = effect.iter().map(String::as_str).collect();
+            let nuisances: Vec<Nuisance> =
+                nuisance.iter().filter_map(|n| Nuisance::of(n)).collect();
+            let units = Units {
+                time: time_factor,
+                y: y_factor,
+            };
+            let plan = RigPlan::draw(family, &effects, noise, &nuisances, seed)?.in_units(units);
+            save(&plan.build()?.data, &out)?;
+            let answer = plan.answer();
+            write_atomic(&out.join("answer.toml"), |file| {
+                file.write_all(answer.as_bytes())
+            })?;
         }
         Command::PaperSet { lags, seed, out } => {
             let lags = match lags {

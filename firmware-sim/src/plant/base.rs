@@ -34,6 +34,15 @@ pub enum DelayLaw {
         /// How fast the extra delay vanishes with the mean friction, p2 (1/y).
         rate: f64,
     },
+    /// h(ỹ) = floor + rise·max(1 − ỹ/level, 0): a straight line that ends on the floor.
+    Clamped {
+        /// Delay of the attached flow (s).
+        floor_s: f64,
+        /// Extra delay of the fully separated flow (s).
+        rise_s: f64,
+        /// Mean friction from which on nothing changes (y).
+        level: f64,
+    },
     /// Each rising edge of the command takes one time to arrive, each falling edge another.
     EdgeDependent {
         /// Delay of a rising edge (s).
@@ -142,6 +151,15 @@ impl BasePlant {
                 delay("floor_s", floor_s)?;
                 delay("rise_s", rise_s)?;
                 within("rate", rate, 0.0, 1000.0, "0 to 1000 per y")
+            }
+            DelayLaw::Clamped {
+                floor_s,
+                rise_s,
+                level,
+            } => {
+                delay("floor_s", floor_s)?;
+                delay("rise_s", rise_s)?;
+                within("level", level, 1e-9, 1e9, "above 0")
             }
             DelayLaw::EdgeDependent { rise_s, fall_s } => {
                 delay("rise_s", rise_s)?;

@@ -144,16 +144,13 @@ impl Jet {
 #[cfg(test)]
 pub(crate) mod bench {
     use super::*;
-    use crate::plant::effects::Effect;
-    use crate::plant::part::{Part, Surroundings};
+    use crate::plant::part::Part;
     use crate::waveform::Cursor;
 
-    pub(crate) fn jet(effects: &[Effect]) -> Jet {
-        let parts = Effect::in_order(effects).into_iter().map(|effect| {
-            match effect.part(&Surroundings::default()) {
-                Part::Jet(part) => part,
-                _ => panic!("{} does not act on the jet", effect.name()),
-            }
+    pub(crate) fn jet(parts: impl IntoIterator<Item = Part>) -> Jet {
+        let parts = parts.into_iter().map(|part| match part {
+            Part::Jet(part) => part,
+            _ => panic!("it does not act on the jet"),
         });
         Jet::new(parts.collect(), &[])
     }

@@ -3,7 +3,10 @@
 //! Nothing here is shared with `model-core`: these plants judge the model, so they must not repeat its
 //! discretisation. The signals run command → valve → plenum → jet → transport → flow → film → reading.
 
+pub mod altered;
 mod base;
+mod character;
+mod describe;
 pub mod effects;
 mod fault;
 mod flow;
@@ -14,7 +17,10 @@ mod rig;
 mod sensor;
 mod transport;
 
+pub use altered::Altered;
+pub(crate) use base::log_uniform;
 pub use base::{BasePlant, BasePlantError, DelayLaw, RateLaw};
+pub use character::{Character, PastTerm};
 pub use effects::{Effect, EffectError, Parameter, ShowsWith};
 pub use fault::Fault;
 pub use free_stream::{FreeStream, MEAN_FREE_STREAM};

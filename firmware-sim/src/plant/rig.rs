@@ -2,7 +2,9 @@
 
 use thiserror::Error;
 
+use super::altered::Altered;
 use super::base::{BasePlant, BasePlantError, DelayLaw};
+use super::character::Character;
 use super::effects::{Effect, EffectError};
 use super::fault::Fault;
 use super::flow::Flow;
@@ -30,32 +32,50 @@ pub enum PlantError {
 pub struct PlantSpec {
     /// The flow to which the rest is added.
     pub base: BasePlant,
+    /// The kind of flow.
+    pub character: Character,
     /// Effects, in any order; the physics orders them.
     pub effects: Vec<Effect>,
+    /// Effects in other laws than the catalogue's.
+    pub altered: Vec<Altered>,
     /// Faults.
     pub faults: Vec<Fault>,
 }
 
 impl PlantSpec {
-    /// The base plant with these effects and no fault.
+    /// A first-order flow with these effects and no fault.
     pub fn new(base: BasePlant, effects: &[Effect]) -> Self {
         Self {
             base,
+            character: Character::FirstOrder,
             effects: effects.to_vec(),
+            altered: Vec::new(),
             faults: Vec::new(),
         }
     }
 
     /// The delay in force: an effect's, if one is about the delay, otherwise the base plant's.
     pub fn delay(&self) -> DelayLaw {
-        let parts = self
-            .effects
-            .iter()
-            .map(|e| e.part(&Surroundings::default()));
+        let parts = self.parts(&Surroundings::default()).into_iter();
         parts.fold(self.base.delay, |law, part| match part {
             Part::Delay(own) => own,
             Part::Jet(_) | Part::Flow(_) | Part::Sensor(_) => law,
         })
+    }
+
+    /// All parts in the order in which the signals run; within a place in the catalogue's.
+    fn parts(&self, surroundings: &Surroundings<'_>) -> Vec<Part> {
+        let effects = self
+            .effects
+            .iter()
+            .map(|e| (e.order(), e.part(surroundings)));
+        let altered = self
+            .altered
+            .iter()
+            .map(|e| (e.order(), e.part(surroundings)));
+        let mut all: Vec<_> = effects.chain(altered).collect();
+        all.sort_by_key(|(order, _)| *order);
+        all.into_iter().map(|(_, part)| part).collect()
     }
 }
 
@@ -81,16 +101,20 @@ impl Rig {
     /// [`PlantError`] when the base plant or a parameter of an effect is physically impossible.
     pub fn new(spec: &PlantSpec, free_stream: Option<FreeStream>) -> Result<Self, PlantError> {
         spec.base.validate()?;
+        spec.character.validate()?;
         for effect in &spec.effects {
             effect.validate()?;
+        }
+        for altered in &spec.altered {
+            altered.validate()?;
         }
         let surroundings = Surroundings {
             free_stream: free_stream.as_ref(),
         };
         let mut law = spec.base.delay;
         let (mut jet, mut flow, mut sensor) = (Vec::new(), Vec::new(), Vec::new());
-        for effect in Effect::in_order(&spec.effects) {
-            match effect.part(&surroundings) {
+        for part in spec.parts(&surroundings) {
+            match part {
                 Part::Delay(own) => law = own,
                 Part::Jet(part) => jet.push(part),
                 Part::Flow(part) => flow.push(part),
@@ -103,7 +127,7 @@ impl Rig {
             clock: ArrivalClock::new(law),
             cursor: Cursor::default(),
             mean: MeanFriction::at_rest(),
-            flow: Flow::new(&spec.base, flow),
+            flow: Flow::new(&spec.base, &spec.character, flow),
             sensor: Sensor::new(sensor, &spec.faults),
             command: 0.0,
             substeps: 0,

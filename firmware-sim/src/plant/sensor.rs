@@ -85,15 +85,12 @@ impl Sensor {
 #[cfg(test)]
 pub(crate) mod bench {
     use super::*;
-    use crate::plant::effects::Effect;
-    use crate::plant::part::{Part, Surroundings};
+    use crate::plant::part::Part;
 
-    pub(crate) fn sensor(effects: &[Effect]) -> Sensor {
-        let parts = Effect::in_order(effects).into_iter().map(|effect| {
-            match effect.part(&Surroundings::default()) {
-                Part::Sensor(part) => part,
-                _ => panic!("{} does not act on the sensor", effect.name()),
-            }
+    pub(crate) fn sensor(parts: impl IntoIterator<Item = Part>) -> Sensor {
+        let parts = parts.into_iter().map(|part| match part {
+            Part::Sensor(part) => part,
+            _ => panic!("it does not act on the sensor"),
         });
         Sensor::new(parts.collect(), &[])
     }

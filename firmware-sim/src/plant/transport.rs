@@ -72,6 +72,11 @@ impl ArrivalClock {
                 rise_s,
                 rate,
             } => floor_s + rise_s * (-rate * mean.max(0.0)).exp(),
+            DelayLaw::Clamped {
+                floor_s,
+                rise_s,
+                level,
+            } => floor_s + rise_s * (1.0 - mean.max(0.0) / level).max(0.0),
             // The edges have been re-timed before they reached the valve.
             DelayLaw::EdgeDependent { .. } => 0.0,
         }

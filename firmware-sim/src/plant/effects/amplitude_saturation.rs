@@ -45,7 +45,7 @@ mod tests {
 
     #[test]
     fn the_cubic_sets_the_saturated_level() {
-        let mut flow = flow(&[AmplitudeSaturation { cubic: 0.3 }.into()]);
+        let mut flow = flow([AmplitudeSaturation { cubic: 0.3 }.at_rest()]);
         let s = hold(&mut flow, 1.0, 3.0);
         assert!((s + 0.3 * s * s * s - 1.0).abs() < 1e-9 && s < 0.9);
     }

@@ -87,7 +87,7 @@ mod tests {
             lower_threshold: 0.3,
             gain: 0.2,
         };
-        let mut flow = flow(&[relay.into()]);
+        let mut flow = flow([relay.at_rest()]);
         // Below the threshold nothing differs; a half-open jet settles at two levels.
         assert!((hold(&mut flow, 0.6, 2.0) - 0.6).abs() < 1e-6);
         assert!((hold(&mut flow, 1.0, 2.0) - 1.2).abs() < 1e-6);

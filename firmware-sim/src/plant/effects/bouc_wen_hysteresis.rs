@@ -67,7 +67,7 @@ mod tests {
             gamma: 1.0,
             alpha: 0.5,
         };
-        let mut flow = flow(&[effect.into()]);
+        let mut flow = flow([effect.at_rest()]);
         let s = hold(&mut flow, 1.0, 3.0);
         // Loading from rest: z = (1 − exp(−(β+γ)·s))/(β+γ).
         let z = (1.0 - (-4.0 * s).exp()) / 4.0;

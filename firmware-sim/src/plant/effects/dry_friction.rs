@@ -56,7 +56,7 @@ mod tests {
     fn dry_friction_stops_the_flow_short_of_its_equilibrium_on_both_sides() {
         // It sticks where rate·|drive − s| = F per sample.
         let level = 0.002;
-        let mut flow = flow(&[DryFriction { level }.into()]);
+        let mut flow = flow([DryFriction { level }.at_rest()]);
         let band_on = level / 0.001 * 0.04;
         assert!((hold(&mut flow, 1.0, 3.0) - (1.0 - band_on)).abs() < 1e-3);
         let band_off = level / 0.001 * 0.1;

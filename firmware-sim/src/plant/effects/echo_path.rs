@@ -94,7 +94,7 @@ mod tests {
             gain: -0.3,
             echo_delay: 0.080_013,
         };
-        let mut jet = jet(&[echo.into()]);
+        let mut jet = jet([echo.at_rest()]);
         jet.command(1.0);
         assert_eq!(run(&mut jet, 0.0800), 1.0);
         assert!((run(&mut jet, 0.0801) - 0.7).abs() < 1e-12);

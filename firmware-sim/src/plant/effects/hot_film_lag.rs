@@ -69,7 +69,7 @@ mod tests {
         let lag = HotFilmLag {
             time_constant: 0.02,
         };
-        let mut film = sensor(&[lag.into()]);
+        let mut film = sensor([lag.at_rest()]);
         film.jump(1.0);
         for _ in 0..400 {
             film.advance(5e-5, 1.0);

@@ -72,7 +72,7 @@ mod tests {
             king_ratio,
             king_offset,
         };
-        let mut film = sensor(&[king.into()]);
+        let mut film = sensor([king.at_rest()]);
         assert!(reading(&mut film, 0.0).abs() < 1e-12);
         assert!((reading(&mut film, 1.0) - 1.0).abs() < 1e-12);
         let e = |s: f64| (1.0 + king_ratio * (s + king_offset).powf(1.0 / 3.0)).sqrt();

@@ -62,7 +62,7 @@ mod tests {
             quadratic: 0.4,
             cubic: -0.2,
         };
-        let mut jet = jet(&[effect.into()]);
+        let mut jet = jet([effect.at_rest()]);
         jet.command(0.5);
         assert!((run(&mut jet, 0.01) - (0.5 + 0.1 - 0.025)).abs() < 1e-12);
     }

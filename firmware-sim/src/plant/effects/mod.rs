@@ -39,8 +39,13 @@ use super::part::{Part, Place, Surroundings};
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum EffectError {
     /// No effect of that name.
-    #[error("there is no effect `{0}`; the names are: {names}", names = Effect::NAMES.join(", "))]
-    UnknownEffect(String),
+    #[error("there is no effect `{name}`; the names are: {known}")]
+    UnknownEffect {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: String,
+    },
     /// The effect has no such parameter.
     #[error("`{effect}` has no parameter `{parameter}`; it has: {known}")]
     UnknownParameter {
@@ -85,12 +90,13 @@ pub(crate) struct Limits {
 }
 
 impl Limits {
-    const FINITE: Self = Self::new(f64::MIN, f64::MAX, "finite");
-    const NOT_NEGATIVE: Self = Self::new(0.0, f64::MAX, "0 or positive");
-    const TIME: Self = Self::new(1e-4, 100.0, "between 0.0001 and 100 s");
-    const TRAVEL: Self = Self::new(1e-4, 1.0, "between 0.0001 and 1 s");
+    pub(crate) const FINITE: Self = Self::new(f64::MIN, f64::MAX, "finite");
+    pub(crate) const NOT_NEGATIVE: Self = Self::new(0.0, f64::MAX, "0 or positive");
+    pub(crate) const POSITIVE: Self = Self::new(f64::MIN_POSITIVE, f64::MAX, "above 0");
+    pub(crate) const TIME: Self = Self::new(1e-4, 100.0, "between 0.0001 and 100 s");
+    pub(crate) const TRAVEL: Self = Self::new(1e-4, 1.0, "between 0.0001 and 1 s");
 
-    const fn new(low: f64, high: f64, requirement: &'static str) -> Self {
+    pub(crate) const fn new(low: f64, high: f64, requirement: &'static str) -> Self {
         Self {
             low,
             high,
@@ -113,7 +119,7 @@ pub(crate) struct Card<E: 'static> {
 }
 
 impl<E: Copy> Card<E> {
-    const fn new(
+    pub(crate) const fn new(
         name: &'static str,
         unit: &'static str,
         limits: Limits,
@@ -148,6 +154,8 @@ pub enum ShowsWith {
 pub(crate) trait Physics: Copy + Debug + PartialEq + Sized + 'static {
     /// Name in model files and reports.
     const NAME: &'static str;
+    /// The effect of the catalogue that it is, or is nearest to.
+    const RESEMBLES: &'static str = Self::NAME;
     /// Where it sits.
     const PLACE: Place;
     /// Its parameters, in the catalogue's order.
@@ -171,9 +179,15 @@ pub(crate) trait Physics: Copy + Debug + PartialEq + Sized + 'static {
 
     /// The effect at rest, ready to run.
     fn part(&self, surroundings: &Surroundings<'_>) -> Part;
+
+    /// The same in surroundings that do not change.
+    #[cfg(test)]
+    fn at_rest(&self) -> Part {
+        self.part(&Surroundings::default())
+    }
 }
 
-fn parameters<E: Physics>(effect: &E) -> Vec<Parameter> {
+pub(super) fn parameters<E: Physics>(effect: &E) -> Vec<Parameter> {
     let each = E::PARAMETERS.iter().map(|card| Parameter {
         name: card.name,
         value: card.value(effect),
@@ -182,7 +196,11 @@ fn parameters<E: Physics>(effect: &E) -> Vec<Parameter> {
     each.collect()
 }
 
-fn with<E: Physics>(mut effect: E, parameter: &str, value: f64) -> Result<E, EffectError> {
+pub(super) fn with<E: Physics>(
+    mut effect: E,
+    parameter: &str,
+    value: f64,
+) -> Result<E, EffectError> {
     let Some(card) = E::PARAMETERS.iter().find(|card| card.name == parameter) else {
         let known: Vec<&str> = E::PARAMETERS.iter().map(|card| card.name).collect();
         return Err(EffectError::UnknownParameter {
@@ -195,7 +213,7 @@ fn with<E: Physics>(mut effect: E, parameter: &str, value: f64) -> Result<E, Eff
     Ok(effect)
 }
 
-fn validate<E: Physics>(effect: &E) -> Result<(), EffectError> {
+pub(super) fn validate<E: Physics>(effect: &E) -> Result<(), EffectError> {
     let refuse = |card: &Card<E>, requirement| EffectError::OutOfRange {
         effect: E::NAME,
         parameter: card.name,
@@ -216,24 +234,22 @@ fn validate<E: Physics>(effect: &E) -> Result<(), EffectError> {
 }
 
 macro_rules! catalogue {
-    ($($file:ident :: $effect:ident),+ $(,)?) => {
+    ($(#[$doc:meta])* $catalogue:ident { $($file:ident :: $effect:ident),+ $(,)? }) => {
         $(pub use $file::$effect;)+
 
-        /// One physical mechanism of the catalogue with its parameters.
-        ///
-        /// A "sample" is 1 ms here, whatever the integrator's step.
+        $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq)]
-        pub enum Effect {
+        pub enum $catalogue {
             $(#[doc = concat!("See [`", stringify!($effect), "`].")] $effect($effect),)+
         }
 
-        $(impl From<$effect> for Effect {
+        $(impl From<$effect> for $catalogue {
             fn from(effect: $effect) -> Self {
                 Self::$effect(effect)
             }
         })+
 
-        impl Effect {
+        impl $catalogue {
             /// Every name of the catalogue, in its order.
             pub const NAMES: &'static [&'static str] = &[$($effect::NAME,)+];
 
@@ -248,7 +264,10 @@ macro_rules! catalogue {
             ) -> Result<Self, EffectError> {
                 match name {
                     $($effect::NAME => Ok($effect::draw(base, rng).into()),)+
-                    _ => Err(EffectError::UnknownEffect(name.to_owned())),
+                    _ => Err(EffectError::UnknownEffect {
+                        name: name.to_owned(),
+                        known: Self::NAMES.join(", "),
+                    }),
                 }
             }
 
@@ -260,6 +279,12 @@ macro_rules! catalogue {
             /// Where it sits in the plant.
             pub fn place(&self) -> Place {
                 match self { $(Self::$effect(_) => $effect::PLACE,)+ }
+            }
+
+            /// Before whom it comes in the plant.
+            pub(crate) fn order(&self) -> (Place, usize) {
+                let names = Self::NAMES.iter();
+                (self.place(), names.take_while(|name| **name != self.name()).count())
             }
 
             /// Commands with which it shows.
@@ -295,6 +320,11 @@ macro_rules! catalogue {
                 match self { $(Self::$effect(effect) => validate(effect),)+ }
             }
 
+            /// The effect of the catalogue that it is, or is nearest to.
+            pub fn resembles(&self) -> &'static str {
+                match self { $(Self::$effect(_) => $effect::RESEMBLES,)+ }
+            }
+
             pub(crate) fn part(&self, surroundings: &Surroundings<'_>) -> Part {
                 match self { $(Self::$effect(effect) => effect.part(surroundings),)+ }
             }
@@ -302,7 +332,13 @@ macro_rules! catalogue {
     };
 }
 
+pub(super) use catalogue;
+
 catalogue! {
+    /// One physical mechanism of the catalogue with its parameters.
+    ///
+    /// A "sample" is 1 ms here, whatever the integrator's step.
+    Effect {
     state_dependent_delay::StateDependentDelay,
     edge_dependent_delay::EdgeDependentDelay,
     valve_lag::ValveLag,
@@ -324,6 +360,7 @@ catalogue! {
     rectifying_sensor::RectifyingSensor,
     input_nonlinearity::InputNonlinearity,
     bouc_wen_hysteresis::BoucWenHysteresis,
+    }
 }
 
 impl Effect {
@@ -337,17 +374,10 @@ impl Effect {
         let transport = |e: &Self| e.place() == Place::Transport;
         self.name() == other.name() || (transport(self) && transport(other))
     }
-
-    /// Effects in the order in which the signals run; within a place in the catalogue's.
-    pub(crate) fn in_order(effects: &[Self]) -> Vec<Self> {
-        let mut sorted = effects.to_vec();
-        sorted.sort_by_key(|e| (e.place(), Self::NAMES.iter().position(|n| *n == e.name())));
-        sorted
-    }
 }
 
 /// A size of either sign.
-fn signed(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
+pub(super) fn signed(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
     let size = rng.random_range(low..high);
     if rng.random_bool(0.5) { size } else { -size }
 }
@@ -398,15 +428,5 @@ mod tests {
                 assert_eq!(effect, Effect::draw(name, &base, &mut rng).unwrap());
             }
         }
-    }
-
-    #[test]
-    fn the_order_of_the_signals_does_not_depend_on_the_order_of_the_list() {
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let base = BasePlant::draw(&mut rng);
-        let draw = |name: &&str| Effect::draw(name, &base, &mut ChaCha8Rng::seed_from_u64(2));
-        let all: Vec<Effect> = Effect::NAMES.iter().map(draw).map(Result::unwrap).collect();
-        let backwards: Vec<Effect> = all.iter().rev().copied().collect();
-        assert_eq!(Effect::in_order(&all), Effect::in_order(&backwards));
     }
 }

@@ -81,7 +81,7 @@ mod tests {
             recovery_time,
             depletion_rate,
         };
-        let mut jet = jet(&[droop.into()]);
+        let mut jet = jet([droop.at_rest()]);
         jet.command(1.0);
         let rest = 1.0 / (1.0 + recovery_time * depletion_rate);
         assert!((run(&mut jet, 10.0) - rest).abs() < 1e-9);

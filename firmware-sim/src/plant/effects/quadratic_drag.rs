@@ -59,7 +59,7 @@ mod tests {
             let before = hold(flow, jet, 0.0);
             20.0 * (hold(flow, jet, 5e-5) - before)
         };
-        let mut flow = flow(&[QuadraticDrag { coefficient: 30.0 }.into()]);
+        let mut flow = flow([QuadraticDrag { coefficient: 30.0 }.at_rest()]);
         // First sample of a step: v + d·v² = 1/40 per sample.
         let rising: f64 = speed(&mut flow, 1.0);
         assert!((rising + 30.0 * rising * rising - 0.025).abs() < 2e-5);

@@ -39,7 +39,7 @@ mod tests {
 
     #[test]
     fn what_is_below_zero_is_folded_up() {
-        let mut folded = sensor(&[RectifyingSensor.into()]);
+        let mut folded = sensor([RectifyingSensor.at_rest()]);
         assert_eq!(reading(&mut folded, -0.3), 0.3);
         assert_eq!(reading(&mut folded, 0.3), 0.3);
     }

@@ -58,7 +58,7 @@ mod tests {
             lower_limit: 0.1,
             upper_limit: 0.8,
         };
-        let mut railed = sensor(&[rails.into()]);
+        let mut railed = sensor([rails.at_rest()]);
         assert_eq!(reading(&mut railed, 0.0), 0.1);
         assert_eq!(reading(&mut railed, 1.0), 0.8);
         assert_eq!(reading(&mut railed, 0.5), 0.5);

@@ -49,7 +49,7 @@ mod tests {
             gain: 0.8,
             decay_time: 0.02,
         };
-        let mut jet = jet(&[vortex.into()]);
+        let mut jet = jet([vortex.at_rest()]);
         jet.command(1.0);
         assert!((run(&mut jet, 0.02) - (1.0 + 0.8 * (-1.0_f64).exp())).abs() < 1e-9);
         run(&mut jet, 1.0);
@@ -69,7 +69,7 @@ mod tests {
             gain: 1.0,
             decay_time: tau,
         };
-        let mut jet = jet(&[valve.into(), vortex.into()]);
+        let mut jet = jet([valve.at_rest(), vortex.at_rest()]);
         jet.command(1.0);
         let t = 0.025_f64;
         let v = 1.0 - (-t / opening).exp();

@@ -48,7 +48,7 @@ mod tests {
             gain: 0.5,
             decay_time: 0.04,
         };
-        let mut jet = jet(&[vortex.into()]);
+        let mut jet = jet([vortex.at_rest()]);
         jet.command(1.0);
         assert_eq!(run(&mut jet, 0.3), 1.0);
         jet.command(0.0);

@@ -52,7 +52,7 @@ mod tests {
             amplitude: -0.1,
             time_constant: 2.0,
         };
-        let mut drifting = sensor(&[drift.into()]);
+        let mut drifting = sensor([drift.at_rest()]);
         assert_eq!(read(&mut drifting, 0.0, 1.0), 0.0);
         let expected = -0.1 * (1.0 - (-1.0_f64).exp());
         assert!((read(&mut drifting, 2.0, 0.0) - expected).abs() < 1e-12);

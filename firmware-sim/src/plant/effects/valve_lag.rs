@@ -73,7 +73,7 @@ mod tests {
             opening_time: 0.01,
             closing_time: 0.03,
         };
-        let mut jet = jet(&[lag.into()]);
+        let mut jet = jet([lag.at_rest()]);
         jet.command(1.0);
         assert!((run(&mut jet, 0.01) - (1.0 - (-1.0_f64).exp())).abs() < 1e-9);
         let open = run(&mut jet, 0.2);

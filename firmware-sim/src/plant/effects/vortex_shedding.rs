@@ -105,7 +105,7 @@ mod tests {
             damping_ratio: 0.1,
             gain: 0.2,
         };
-        let mut flow = flow(&[effect.into()]);
+        let mut flow = flow([effect.at_rest()]);
         let t = 0.053_f64;
         let s = hold(&mut flow, 1.0, t);
         let omega = TAU * 12.0;

@@ -1,0 +1,307 @@
+//! Random flows, noise and commands.
+
+use rand::RngExt;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+
+use super::weight::Weight;
+use super::{Family, NoiseKind, RigError, RigPlan};
+use crate::command::Command;
+use crate::instrument::{Instrument, Noise, Unrest};
+use crate::plant::{
+    Altered, BasePlant, Character, DelayLaw, Effect, EffectError, PastTerm, Place, PlantSpec,
+    RateLaw, log_uniform,
+};
+use crate::stream::{Stream, stream};
+
+/// Draws of an effect before the heaviest so far is taken.
+const ATTEMPTS: usize = 24;
+
+/// An effect as it is drawn: of the catalogue, or altered.
+enum Drawn {
+    Effect(Effect),
+    Altered(Altered),
+}
+
+impl Drawn {
+    fn draw(name: &str, base: &BasePlant, rng: &mut ChaCha8Rng) -> Result<Self, EffectError> {
+        if Altered::NAMES.contains(&name) {
+            return Altered::draw(name, base, rng).map(Self::Altered);
+        }
+        Effect::draw(name, base, rng)
+            .map(Self::Effect)
+            .map_err(|error| match error {
+                EffectError::UnknownEffect { name, known } => EffectError::UnknownEffect {
+                    name,
+                    known: format!("{known}, {}", Altered::NAMES.join(", ")),
+                },
+                other => other,
+            })
+    }
+
+    /// Name, what it resembles, and where it acts.
+    fn identity(&self) -> (&'static str, &'static str, Place) {
+        match self {
+            Self::Effect(e) => (e.name(), e.resembles(), e.place()),
+            Self::Altered(e) => (e.name(), e.resembles(), e.place()),
+        }
+    }
+
+    fn add_to(self, plant: &mut PlantSpec) {
+        match self {
+            Self::Effect(e) => plant.effects.push(e),
+            Self::Altered(e) => plant.altered.push(e),
+        }
+    }
+}
+
+impl RigPlan {
+    /// Draws the named effects and puts them into the plant.
+    pub(super) fn hide(&mut self, names: &[&str]) -> Result<(), RigError> {
+        let mut rng = stream(self.seed, Stream::Effects);
+        let mut identities: Vec<(&str, &str, Place)> = Vec::new();
+        for name in names {
+            let identity = Drawn::draw(name, &self.plant.base, &mut rng.clone())?.identity();
+            let clash = identities.iter().find(|other| {
+                let both_transport = [other.2, identity.2] == [Place::Transport; 2];
+                other.1 == identity.1 || both_transport
+            });
+            if let Some((other, _, _)) = clash {
+                return Err(RigError::Exclusive(
+                    (*other).to_owned(),
+                    identity.0.to_owned(),
+                ));
+            }
+            identities.push(identity);
+        }
+        if identities
+            .iter()
+            .any(|(_, _, place)| *place == Place::Transport)
+        {
+            // The hidden law is all there is.
+            self.plant.base = self.plant.base.with_fixed_delay(&mut rng);
+        }
+        let bare = self.plant.clone();
+        // Effects are drawn for the friction that the flow reaches, not for what drives it.
+        let reached = BasePlant {
+            gain: bare.base.gain / bare.character.overshoot(),
+            ..bare.base
+        };
+        let weight = Weight::new(&self.commands()[4].0, self.instrument.standard_error());
+        for name in names {
+            let mut best: Option<(f64, PlantSpec)> = None;
+            for _ in 0..ATTEMPTS {
+                let mut alone = bare.clone();
+                Drawn::draw(name, &reached, &mut rng)?.add_to(&mut alone);
+                // Without levels or a stream some show nothing: their usual range has to do.
+                let silent = |e: &Effect| e.needs_levels() || e.channel().is_some();
+                let found = if alone.effects.iter().any(silent) {
+                    f64::INFINITY
+                } else {
+                    weight.of(&bare, &alone)?
+                };
+                if best.as_ref().is_none_or(|(most, _)| found > *most) {
+                    best = Some((found, alone));
+                }
+                if found >= 1.0 {
+                    break;
+                }
+            }
+            if let Some((_, alone)) = best {
+                self.plant.effects.extend(alone.effects);
+                self.plant.altered.extend(alone.altered);
+            }
+        }
+        if self.plant.effects.iter().any(Effect::needs_levels) {
+            self.plant.base = self.plant.base.with_one_time_constant();
+        }
+        let wanders = self.plant.effects.iter().any(|e| e.channel().is_some());
+        self.free_stream = wanders || rng.random_bool(0.2);
+        Ok(())
+    }
+}
+
+impl Family {
+    /// A flow of the family with its delay, without effects.
+    pub(super) fn draw(self, rng: &mut ChaCha8Rng) -> PlantSpec {
+        let mut base = BasePlant::draw(rng);
+        let level = base.gain;
+        let share = |rng: &mut ChaCha8Rng| rng.random_range(0.0..1.0);
+        base.rate_law = match share(rng) {
+            x if x < 0.45 => RateLaw::Interpolated,
+            x if x < 0.80 => RateLaw::Bilinear,
+            _ => RateLaw::Switched,
+        };
+        base.delay = match share(rng) {
+            x if x < 0.25 => DelayLaw::Fixed {
+                delay_s: rng.random_range(0.020..0.060),
+            },
+            x if x < 0.80 => base.delay,
+            x if x < 0.92 => {
+                let rise_s = rng.random_range(0.006..0.015);
+                DelayLaw::Clamped {
+                    floor_s: rng.random_range(0.020..0.045),
+                    rise_s,
+                    level: rng.random_range(0.3..0.8) * level,
+                }
+            }
+            _ => {
+                let rise_s = rng.random_range(0.020..0.060);
+                let more = rng.random_range(0.008..0.025);
+                DelayLaw::EdgeDependent {
+                    rise_s,
+                    fall_s: if rise_s > 0.040 {
+                        rise_s - more
+                    } else {
+                        rise_s + more
+                    },
+                }
+            }
+        };
+        if self != Self::FirstOrder {
+            base.attach_s = log_uniform(rng, 0.020, 0.080);
+            base.separate_s = base.attach_s * log_uniform(rng, 0.7, 2.0);
+        }
+        let character = match self {
+            Self::FirstOrder => Character::FirstOrder,
+            Self::Memory1 => {
+                let gain = if rng.random_bool(0.75) {
+                    -rng.random_range(0.03..0.12)
+                } else {
+                    rng.random_range(0.03..0.08)
+                };
+                let term = PastTerm::new(
+                    rng.random_range(0.12..0.40),
+                    gain,
+                    rng.random_range(0.10..0.35),
+                );
+                Character::Memory(vec![with_form(term, level, rng)])
+            }
+            Self::Memory2 => {
+                let mut term = |nearest: f64, furthest: f64| {
+                    let mut signed = |low: f64, high: f64| {
+                        let size = rng.random_range(low..high);
+                        if rng.random_bool(0.5) { size } else { -size }
+                    };
+                    let (gain, lost) = (signed(0.02, 0.10), signed(0.03, 0.20));
+                    let term = PastTerm::new(rng.random_range(nearest..furthest), gain, lost);
+                    with_form(term, level, rng)
+                };
+                Character::Memory(vec![term(0.08, 0.20), term(0.22, 0.45)])
+            }
+            Self::Inertia => {
+                let time_s = rng.random_range(0.006..0.014);
+                if rng.random_bool(0.5) {
+                    Character::Inertia { time_s }
+                } else {
+                    Character::SecondLag { time_s }
+                }
+            }
+            Self::Wake => Character::Wake {
+                time_s: rng.random_range(0.25..0.70),
+                pull: rng.random_range(0.15..0.40),
+            },
+            Self::RateOfY => Character::RateOfFriction {
+                slope: if rng.random_bool(0.6) {
+                    rng.random_range(0.4..1.2)
+                } else {
+                    -rng.random_range(0.25..0.5)
+                } / level,
+            },
+        };
+        base.gain = level * character.overshoot();
+        PlantSpec {
+            character,
+            ..PlantSpec::new(base, &[])
+        }
+    }
+}
+
+/// Two of five memories are not exactly in the bilinear class: smeared or bounded.
+fn with_form(term: PastTerm, level: f64, rng: &mut ChaCha8Rng) -> PastTerm {
+    match rng.random_range(0..5) {
+        0 => PastTerm {
+            smear_s: rng.random_range(0.010..0.040),
+            ..term
+        },
+        1 => PastTerm {
+            limit: rng.random_range(0.6..1.5) * level,
+            ..term
+        },
+        _ => term,
+    }
+}
+
+impl NoiseKind {
+    pub(super) fn draw(self, rng: &mut ChaCha8Rng) -> Instrument {
+        let mut instrument = Instrument {
+            noise: Noise {
+                white: rng.random_range(0.020..0.035),
+                coloured: rng.random_range(0.025..0.040),
+                correlation_s: log_uniform(rng, 0.010, 0.040),
+            },
+            ..Instrument::default()
+        };
+        let unrest = &mut instrument.unrest;
+        match self {
+            Self::White => {
+                instrument.noise.white = rng.random_range(0.030..0.050);
+                instrument.noise.coloured = 0.0;
+            }
+            Self::Coloured => {}
+            Self::Wander => {
+                unrest.wander = rng.random_range(0.015..0.040);
+                unrest.wander_s = log_uniform(rng, 0.5, 2.0);
+            }
+            Self::Scatter => instrument.level_scatter = rng.random_range(0.02..0.05),
+            Self::HeavyTails => {
+                instrument.noise.white = 0.0;
+                unrest.tails = rng.random_range(0.025..0.045);
+            }
+            Self::Outliers => {
+                *unrest = Unrest {
+                    outliers: log_uniform(rng, 0.001, 0.004),
+                    outlier_size: rng.random_range(0.2..0.6),
+                    ..Unrest::default()
+                };
+            }
+        }
+        instrument
+    }
+}
+
+/// Frequencies (Hz) and duties of five different squares.
+pub(super) fn squares(rng: &mut ChaCha8Rng) -> Vec<(f64, f64)> {
+    let mut all = vec![
+        (2.0, 0.3),
+        (2.0, 0.6),
+        (3.0, 0.5),
+        (4.0, 0.5),
+        (4.0, 0.8),
+        (5.0, 0.4),
+        (6.0, 0.6),
+        (8.0, 0.5),
+        (8.0, 0.8),
+        (10.0, 0.5),
+    ];
+    all.shuffle(rng);
+    all.truncate(5);
+    all
+}
+
+/// A random telegraph with its own duty and pace.
+pub(super) fn telegraph(name: &str, rng: &mut ChaCha8Rng) -> Command {
+    let [on, off] = [(); 2].map(|()| rng.random_range(200..=600));
+    Command::telegraph(name, on, off, rng)
+}
+
+/// The same kind of command with levels from `low` to 1.
+pub(super) fn graded(command: Command, low: f64, rng: &mut ChaCha8Rng) -> Command {
+    if command.name.starts_with("random") {
+        let name = command.name.replace("random", "levels");
+        return Command::random_levels(&name, low, 1.0, rng);
+    }
+    let size = rng.random_range(0.4..1.0);
+    let turned = low < 0.0 && rng.random_bool(0.5);
+    command.map(|u| if turned { -size * u } else { size * u })
+}

@@ -1,0 +1,475 @@
+//! Rigs of every family: flows wider than the model's class, with effects in the catalogue's laws and in
+//! others, noise that is not only white, and nuisances that are no effect at all.
+//!
+//! A [`RigPlan`] is drawn from a seed and determines its data set bit for bit.
+
+mod draw;
+mod nuisance;
+mod weight;
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use rand::RngExt;
+use recordings::{DataError, DataSet, Record, Use};
+use thiserror::Error;
+
+use crate::command::{Command, LEAD_SAMPLES};
+use crate::instrument::{Instrument, InstrumentError};
+use crate::plant::{
+    DelayLaw, Effect, EffectError, FreeStream, Parameter, PlantError, PlantSpec, Rig,
+    SAMPLE_PERIOD_S, ShowsWith,
+};
+use crate::stream::{Stream, stream};
+
+pub use nuisance::{Nuisance, Nuisances};
+
+/// The kind of flow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Family {
+    /// One time constant each way: the leanest bilinear model is the truth.
+    FirstOrder,
+    /// The flow feels one moment of its own past.
+    Memory1,
+    /// The flow feels two moments of its own past.
+    Memory2,
+    /// The flow is heavy, or a second lag follows the first.
+    Inertia,
+    /// A slow wake pulls back.
+    Wake,
+    /// The separation rate depends on the friction.
+    RateOfY,
+}
+
+impl Family {
+    /// Every family, in the order of tables.
+    pub const ALL: [Self; 6] = [
+        Self::FirstOrder,
+        Self::Memory1,
+        Self::Memory2,
+        Self::Inertia,
+        Self::Wake,
+        Self::RateOfY,
+    ];
+
+    /// Name for tables and command lines.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::FirstOrder => "first-order",
+            Self::Memory1 => "memory1",
+            Self::Memory2 => "memory2",
+            Self::Inertia => "inertia",
+            Self::Wake => "wake",
+            Self::RateOfY => "rate-of-y",
+        }
+    }
+
+    /// The family of that name.
+    pub fn of(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|family| family.name() == name)
+    }
+}
+
+/// What the repeats are disturbed by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum NoiseKind {
+    /// White only.
+    White,
+    /// White and first-order coloured, 10–40 ms.
+    Coloured,
+    /// With a slow component of 0.5–2 s.
+    Wander,
+    /// The level scatters between repeats by a few per cent.
+    Scatter,
+    /// White noise with the tails of Student's t.
+    HeavyTails,
+    /// Now and then a reading is far off.
+    Outliers,
+}
+
+impl NoiseKind {
+    /// Every kind.
+    pub const ALL: [Self; 6] = [
+        Self::White,
+        Self::Coloured,
+        Self::Wander,
+        Self::Scatter,
+        Self::HeavyTails,
+        Self::Outliers,
+    ];
+
+    /// Name for tables and command lines.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::White => "white",
+            Self::Coloured => "coloured",
+            Self::Wander => "wander",
+            Self::Scatter => "scatter",
+            Self::HeavyTails => "heavy-tails",
+            Self::Outliers => "outliers",
+        }
+    }
+
+    /// The kind of that name.
+    pub fn of(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+}
+
+/// Why a rig could not be drawn or recorded.
+#[derive(Debug, Error)]
+pub enum RigError {
+    /// An effect is unknown or impossible.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+    /// The rig is impossible.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// The instrument is impossible.
+    #[error(transparent)]
+    Instrument(#[from] InstrumentError),
+    /// What the rig gave is no recording.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// Two effects want the same part of the rig.
+    #[error("`{0}` and `{1}` exclude each other; hide one of them")]
+    Exclusive(String, String),
+}
+
+/// In which units the rig is written down: the same samples, other numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Units {
+    /// Recorded times are the rig's times this factor.
+    pub time: f64,
+    /// Recorded y are the rig's y times this factor.
+    pub y: f64,
+}
+
+impl Units {
+    /// Seconds and friction gain, as simulated.
+    pub const OWN: Self = Self { time: 1.0, y: 1.0 };
+}
+
+/// Everything that determines a data set, bit for bit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RigPlan {
+    /// The kind of flow.
+    pub family: Family,
+    /// The rig with what it hides.
+    pub plant: PlantSpec,
+    /// What the repeats are disturbed by.
+    pub noise: NoiseKind,
+    /// How it is measured.
+    pub instrument: Instrument,
+    /// What is neither flow nor effect nor noise.
+    pub nuisances: Nuisances,
+    /// Whether the free stream wanders and is recorded as the channel `u_inf`.
+    pub free_stream: bool,
+    /// In which units it is written down.
+    pub units: Units,
+    /// Seed of commands, free stream and noise.
+    pub seed: u64,
+}
+
+/// A data set and what is really behind it.
+#[derive(Debug, Clone)]
+pub struct Recorded {
+    /// What a user of the tool would have.
+    pub data: DataSet,
+    /// The readings without noise, per record in the order of the data set (recorded y).
+    pub noise_free: Vec<Vec<f64>>,
+}
+
+impl RigPlan {
+    /// A random rig of a family that hides the named effects: of the catalogue, or laws of
+    /// [`Altered`](crate::plant::Altered).
+    ///
+    /// Effects are drawn from their usual ranges until they matter: what no change of the flow's own
+    /// constants imitates is at least twice the noise of the average, where their range allows it.
+    ///
+    /// # Errors
+    /// [`RigError`] for unknown names and for effects that exclude each other.
+    pub fn draw(
+        family: Family,
+        hidden: &[&str],
+        noise: NoiseKind,
+        nuisances: &[Nuisance],
+        seed: u64,
+    ) -> Result<Self, RigError> {
+        let instrument = noise.draw(&mut stream(seed, Stream::Instrument));
+        let nuisances = Nuisances::draw(nuisances, &mut stream(seed, Stream::Nuisances));
+        let mut plan = Self {
+            family,
+            plant: family.draw(&mut stream(seed, Stream::Base)),
+            noise,
+            instrument,
+            nuisances,
+            free_stream: false,
+            units: Units::OWN,
+            seed,
+        };
+        plan.hide(hidden)?;
+        Ok(plan)
+    }
+
+    /// The same rig written down in other units.
+    #[must_use]
+    pub fn in_units(mut self, units: Units) -> Self {
+        self.units = units;
+        self
+    }
+
+    /// The names that a diagnosis should find: effects of the catalogue, also where the rig has them in
+    /// another law.
+    pub fn hidden(&self) -> Vec<&'static str> {
+        let effects = self.plant.effects.iter().map(Effect::name);
+        let altered = self.plant.altered.iter().map(|e| e.resembles());
+        effects.chain(altered).collect()
+    }
+
+    /// Names that would be no error beside the hidden ones: true of the rig, though nobody hid them.
+    pub fn also_right(&self) -> Vec<&'static str> {
+        let delay = match self.plant.delay() {
+            DelayLaw::Fixed { .. } => None,
+            DelayLaw::StateDependent { .. } | DelayLaw::Clamped { .. } => {
+                Some("state-dependent-delay")
+            }
+            DelayLaw::EdgeDependent { .. } => Some("edge-dependent-delay"),
+        };
+        let drift = (self.nuisances.drift != 0.0).then_some("thermal-drift");
+        delay.into_iter().chain(drift).collect()
+    }
+
+    /// Effects of the catalogue with their true parameters, in the rig's own units; those in other laws
+    /// have no true parameters.
+    pub fn exact(&self) -> Vec<(&'static str, Vec<Parameter>)> {
+        let effects = self.plant.effects.iter();
+        effects.map(|e| (e.name(), e.parameters())).collect()
+    }
+
+    /// The commands of the set: a step, squares and random telegraphs, five to identify on and three held
+    /// out; many levels when the input is graded or a hidden effect only shows with those.
+    pub fn commands(&self) -> Vec<(Command, Use)> {
+        let mut rng = stream(self.seed, Stream::Commands);
+        let squares = draw::squares(&mut rng);
+        let random = ["random-a", "random-b"].map(|name| draw::telegraph(name, &mut rng));
+        let [first, second] = random;
+        let mut all = vec![(Command::step(), Use::Identify)];
+        for (i, (frequency, duty)) in squares.into_iter().enumerate() {
+            let role = if i < 3 { Use::Identify } else { Use::Validate };
+            all.push((Command::square(frequency, duty), role));
+        }
+        all.insert(4, (first, Use::Identify));
+        all.push((second, Use::Validate));
+
+        let shows_with = |wanted| self.plant.effects.iter().any(|e| e.shows_with() == wanted);
+        let signed = shows_with(ShowsWith::SignedLevels);
+        if signed || self.nuisances.graded || shows_with(ShowsWith::Levels) {
+            let low = if signed { -1.0 } else { 0.0 };
+            all = all
+                .into_iter()
+                .map(|(command, role)| (draw::graded(command, low, &mut rng), role))
+                .collect();
+        }
+        all
+    }
+
+    /// Runs the rig through every command and measures it.
+    ///
+    /// # Errors
+    /// [`RigError`] when an effect's parameters or the instrument are impossible.
+    pub fn build(&self) -> Result<Recorded, RigError> {
+        let mut tunnel = stream(self.seed, Stream::Tunnel);
+        let mut noise = stream(self.seed, Stream::Noise);
+        let mut nuisance = stream(self.seed, Stream::Nuisances);
+        let (mut records, mut noise_free) = (Vec::new(), Vec::new());
+        for (index, (command, role)) in self.commands().into_iter().enumerate() {
+            let n = command.levels.len();
+            // What happened before a record that begins in mid-run, which nobody wrote down.
+            let lead = self.nuisances.lead_samples;
+            let mut levels = Vec::with_capacity(lead + n);
+            let mut u = command.levels;
+            if lead > 0 {
+                let before = Command::random("before", &mut nuisance).levels;
+                levels.extend(before.into_iter().skip(LEAD_SAMPLES).take(lead));
+                u.rotate_left(LEAD_SAMPLES);
+            }
+            let lead = levels.len();
+            levels.extend(&u);
+            let stream = (self.free_stream).then(|| FreeStream::draw(&mut tunnel, levels.len()));
+            let readings = Rig::new(&self.plant, stream.clone())?.play(&levels);
+            let truth: Vec<f64> = readings
+                .into_iter()
+                .skip(lead)
+                .enumerate()
+                .map(|(k, y)| y + self.nuisances.zero(index * n + k, 8 * n))
+                .collect();
+            let measured = self.instrument.measure(&truth, noise.random())?;
+            let time = |k: usize| (lead + k) as f64 * SAMPLE_PERIOD_S;
+            let channels = stream.map_or_else(BTreeMap::new, |stream| {
+                let u_inf = (0..n).map(|k| stream.velocity(time(k))).collect();
+                BTreeMap::from([("u_inf".to_owned(), u_inf)])
+            });
+            let scaled = |x: Vec<f64>| -> Vec<f64> { x.iter().map(|y| y * self.units.y).collect() };
+            records.push(Record {
+                y_sd: Some(scaled(measured.standard_error)),
+                y_min: Some(scaled(measured.min)),
+                y_max: Some(scaled(measured.max)),
+                channels,
+                ..Record::new(
+                    &command.name,
+                    role,
+                    SAMPLE_PERIOD_S * self.units.time,
+                    u,
+                    scaled(measured.mean),
+                )
+            });
+            noise_free.push(scaled(truth));
+        }
+        // The title says nothing about what is hidden.
+        let title = Some(format!("Simulated rig {}", self.seed));
+        Ok(Recorded {
+            data: DataSet::from_records(title, records)?,
+            noise_free,
+        })
+    }
+
+    /// The answer as TOML text for people and scoring scripts.
+    pub fn answer(&self) -> String {
+        let list = |names: Vec<&str>| {
+            let quoted: Vec<String> = names.iter().map(|n| format!("\"{n}\"")).collect();
+            quoted.join(", ")
+        };
+        let mut text = format!(
+            "# what is hidden in this set\n\nfamily = \"{}\"\nhidden = [{}]\nalso_right = [{}]\n\
+             noise = \"{}\"\nstandard_error = {:.5}\nseed = {}\n",
+            self.family.name(),
+            list(self.hidden()),
+            list(self.also_right()),
+            self.noise.name(),
+            self.instrument.standard_error() * self.units.y,
+            self.seed
+        );
+        if self.units != Units::OWN {
+            // Writing to a String cannot fail.
+            let _ = write!(
+                text,
+                "\n# what follows is in the rig's own units; recorded times and y are these times the factors\n\
+                 [units]\ntime = {}\ny = {}\n",
+                self.units.time, self.units.y
+            );
+        }
+        text + &self.nuisances.to_toml() + "\n" + &self.plant.to_toml()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::Altered;
+
+    #[test]
+    fn every_family_records_eight_runs_near_its_truth_and_repeats_bit_for_bit() {
+        for (family, noise) in Family::ALL.into_iter().zip(NoiseKind::ALL) {
+            assert_eq!(Family::of(family.name()), Some(family));
+            assert_eq!(NoiseKind::of(noise.name()), Some(noise));
+            let plan = RigPlan::draw(family, &[], noise, &[], 5).unwrap();
+            let set = plan.build().unwrap();
+            assert_eq!(set.data.hash, plan.build().unwrap().data.hash);
+            assert!(set.data.is_on_off());
+            assert_eq!(
+                (set.data.identify().count(), set.data.validate().count()),
+                (5, 3)
+            );
+            let highest = (set.noise_free.iter().flatten()).fold(0.0_f64, |m, y| m.max(*y));
+            assert!((0.7..1.5).contains(&highest), "{family:?}: {highest}");
+            for (record, truth) in set.data.records.iter().zip(&set.noise_free) {
+                assert_eq!(record.y.len(), 10_000);
+                let sd = record.y_sd.as_deref().unwrap();
+                let floor = (sd.iter().map(|s| s * s).sum::<f64>() / 1e4).sqrt();
+                let off = record.y.iter().zip(truth).map(|(a, b)| (a - b) * (a - b));
+                let ratio = (off.sum::<f64>() / 1e4).sqrt() / floor;
+                // Slow parts and scatter have few independent samples in a record.
+                assert!((0.6..1.6).contains(&ratio), "{noise:?}: {ratio}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_effect_and_every_altered_law_can_be_hidden_in_every_family() {
+        let names: Vec<&str> = Effect::NAMES
+            .iter()
+            .chain(Altered::NAMES)
+            .copied()
+            .collect();
+        for (seed, name) in (0..).zip(names) {
+            let family = Family::ALL[seed as usize % 6];
+            let plan = RigPlan::draw(family, &[name], NoiseKind::Coloured, &[], seed).unwrap();
+            assert_eq!(plan.hidden().len(), 1);
+            assert!(Effect::NAMES.contains(&plan.hidden()[0]));
+            assert_eq!(
+                plan.exact().len(),
+                usize::from(Effect::NAMES.contains(&name))
+            );
+            assert!(plan.answer().contains(name), "{name}");
+            Rig::new(&plan.plant, None).unwrap();
+        }
+    }
+
+    #[test]
+    fn nuisances_do_what_they_say() {
+        let plan = |nuisances: &[Nuisance]| {
+            RigPlan::draw(Family::Wake, &[], NoiseKind::White, nuisances, 3).unwrap()
+        };
+        let first = |nuisances: &[Nuisance]| plan(nuisances).build().unwrap().noise_free[0][0];
+        assert_eq!(first(&[]), 0.0);
+        let offset = plan(&[Nuisance::Offset]).nuisances.offset;
+        assert!(offset.abs() > 0.01 && first(&[Nuisance::Offset]) == offset);
+        let drifting = plan(&[Nuisance::Drift]).build().unwrap().noise_free;
+        let quiet = plan(&[]).build().unwrap().noise_free;
+        let crept = drifting[7][9_999] - quiet[7][9_999];
+        let drift = plan(&[Nuisance::Drift]).nuisances.drift;
+        assert!((crept - drift).abs() < 1e-3 * drift.abs());
+        let graded = plan(&[Nuisance::Graded]).build().unwrap().data;
+        assert!(!graded.is_on_off());
+        let mid_run = plan(&[Nuisance::MidRun]).build().unwrap();
+        assert!(mid_run.noise_free.iter().any(|y| y[0] > 0.1));
+        assert!(mid_run.data.is_on_off());
+    }
+
+    #[test]
+    fn other_units_are_the_same_samples() {
+        let plan =
+            RigPlan::draw(Family::Memory1, &["valve-lag"], NoiseKind::White, &[], 9).unwrap();
+        let own = plan.build().unwrap().data;
+        let units = Units {
+            time: 20.0,
+            y: 0.02,
+        };
+        let twin = plan.in_units(units);
+        assert!(twin.answer().contains("[units]\ntime = 20\ny = 0.02"));
+        let twin = twin.build().unwrap().data;
+        assert!((twin.sample_period_s - 0.02).abs() < 1e-15);
+        for (a, b) in own.records.iter().zip(&twin.records) {
+            assert_eq!(a.u, b.u);
+            assert_eq!(a.y[777] * 0.02, b.y[777]);
+        }
+    }
+
+    #[test]
+    fn wrong_names_and_impossible_pairs_are_refused() {
+        let draw = |names: &[&str]| RigPlan::draw(Family::Wake, names, NoiseKind::White, &[], 1);
+        assert!(
+            draw(&["gremlin"])
+                .unwrap_err()
+                .to_string()
+                .contains("two-reservoirs")
+        );
+        for pair in [
+            ["valve-lag", "ramp-valve"],
+            ["clamped-delay", "edge-dependent-delay"],
+        ] {
+            assert!(matches!(draw(&pair), Err(RigError::Exclusive(_, _))));
+        }
+    }
+}

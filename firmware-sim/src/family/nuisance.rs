@@ -1,0 +1,93 @@
+//! What is neither flow nor effect nor noise, and must not be taken for an effect.
+
+use std::fmt::Write as _;
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+/// A kind of nuisance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Nuisance {
+    /// The sensor's zero is off by a few per cent.
+    Offset,
+    /// The records begin while the rig is running.
+    MidRun,
+    /// The zero drifts over the whole session, through all records.
+    Drift,
+    /// The valve is told levels between off and on.
+    Graded,
+}
+
+impl Nuisance {
+    /// Every kind.
+    pub const ALL: [Self; 4] = [Self::Offset, Self::MidRun, Self::Drift, Self::Graded];
+
+    /// Name for tables and command lines.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Offset => "offset",
+            Self::MidRun => "mid-run",
+            Self::Drift => "drift",
+            Self::Graded => "graded",
+        }
+    }
+
+    /// The nuisance of that name.
+    pub fn of(name: &str) -> Option<Self> {
+        Self::ALL
+            .into_iter()
+            .find(|nuisance| nuisance.name() == name)
+    }
+}
+
+/// The nuisances of a rig, with their sizes.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Nuisances {
+    /// Where the sensor's zero is (y).
+    pub offset: f64,
+    /// Samples that ran before each record and were not written down.
+    pub lead_samples: usize,
+    /// By how much the zero drifts from the first sample of the session to the last (y).
+    pub drift: f64,
+    /// Whether commands have levels between off and on.
+    pub graded: bool,
+}
+
+impl Nuisances {
+    pub(super) fn draw(kinds: &[Nuisance], rng: &mut ChaCha8Rng) -> Self {
+        let mut all = Self::default();
+        let mut signed = |low: f64, high: f64| {
+            let size = rng.random_range(low..high);
+            if rng.random_bool(0.5) { size } else { -size }
+        };
+        for kind in kinds {
+            match kind {
+                Nuisance::Offset => all.offset = signed(0.02, 0.08),
+                Nuisance::MidRun => all.lead_samples = signed(1200.0, 3000.0).abs() as usize,
+                Nuisance::Drift => all.drift = signed(0.03, 0.10),
+                Nuisance::Graded => all.graded = true,
+            }
+        }
+        all
+    }
+
+    /// The sensor's zero at sample `k` of a session of `samples` (y).
+    pub(super) fn zero(&self, k: usize, samples: usize) -> f64 {
+        self.offset + self.drift * k as f64 / samples as f64
+    }
+
+    /// The table `[nuisances]`; empty without any.
+    pub(super) fn to_toml(self) -> String {
+        if self == Self::default() {
+            return String::new();
+        }
+        let mut text = "\n[nuisances]\n".to_owned();
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "offset = {}\nlead_samples = {}\ndrift = {}\ngraded = {}",
+            self.offset, self.lead_samples, self.drift, self.graded
+        );
+        text
+    }
+}

@@ -1,0 +1,91 @@
+//! The film follows with two lags: film and substrate.
+
+use rand_chacha::ChaCha8Rng;
+
+use crate::plant::base::{BasePlant, log_uniform};
+use crate::plant::effects::{Card, Limits, Physics};
+use crate::plant::part::{Part, Piece, Place, SensorPart, Surroundings};
+
+/// τ₁·ẋ = felt − x, τ₂·ẏ = x − y.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TwoFilmLags {
+    /// Longer time constant (s).
+    pub first_time: f64,
+    /// Shorter time constant (s).
+    pub second_time: f64,
+}
+
+impl Physics for TwoFilmLags {
+    const NAME: &'static str = "two-film-lags";
+    const RESEMBLES: &'static str = "hot-film-lag";
+    const PLACE: Place = Place::FilmLag;
+    const PARAMETERS: &'static [Card<Self>] = &[
+        Card::new("first_time", "s", Limits::TIME, |e| &mut e.first_time),
+        Card::new("second_time", "s", Limits::TIME, |e| &mut e.second_time),
+    ];
+
+    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
+        Self {
+            first_time: log_uniform(rng, 0.015, 0.080),
+            second_time: log_uniform(rng, 0.004, 0.014),
+        }
+    }
+
+    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+        Part::Sensor(Box::new(Film {
+            law: *self,
+            first: 0.0,
+            second: 0.0,
+        }))
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Film {
+    law: TwoFilmLags,
+    first: f64,
+    second: f64,
+}
+
+impl SensorPart for Film {
+    fn takes_time(&self) -> bool {
+        true
+    }
+
+    fn jump(&mut self, _to: f64) -> f64 {
+        self.second
+    }
+
+    /// Each lag sees the mean of what it follows over the piece.
+    fn advance(&mut self, piece: &Piece) -> f64 {
+        let before = self.first;
+        let felt = 0.5 * (piece.from + piece.to);
+        self.first = felt + (before - felt) * (-piece.dt / self.law.first_time).exp();
+        let felt = 0.5 * (before + self.first);
+        self.second = felt + (self.second - felt) * (-piece.dt / self.law.second_time).exp();
+        self.second
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::sensor::bench::{read, sensor};
+
+    #[test]
+    fn a_step_is_followed_by_the_closed_form() {
+        let (a, b) = (0.03, 0.01);
+        let law = TwoFilmLags {
+            first_time: a,
+            second_time: b,
+        };
+        let mut film = sensor([law.at_rest()]);
+        film.jump(1.0);
+        for _ in 0..400 {
+            film.advance(5e-5, 1.0);
+        }
+        let t = 0.02_f64;
+        let expected = 1.0 - (a * (-t / a).exp() - b * (-t / b).exp()) / (a - b);
+        assert!((read(&mut film, t, 0.0) - expected).abs() < 1e-5);
+    }
+}

@@ -192,7 +192,7 @@ fn others(plant: &PlantSpec, seed: u64) -> anyhow::Result<Vec<Trial<Disturbed<Ri
         others.push(trial(CaseGroup::Effect, &name, &with, usual)?);
     }
     let delayed = |factor: f64| BasePlant {
-        delay: scaled(plant.base.delay, factor),
+        delay: plant.base.delay.scaled(factor),
         ..plant.base
     };
     let stronger = |factor: f64| BasePlant {
@@ -227,27 +227,6 @@ fn others(plant: &PlantSpec, seed: u64) -> anyhow::Result<Vec<Trial<Disturbed<Ri
         others.push(trial(CaseGroup::Disturbance, name, &plant, under)?);
     }
     Ok(others)
-}
-
-fn scaled(delay: DelayLaw, factor: f64) -> DelayLaw {
-    match delay {
-        DelayLaw::Fixed { delay_s } => DelayLaw::Fixed {
-            delay_s: delay_s * factor,
-        },
-        DelayLaw::StateDependent {
-            floor_s,
-            rise_s,
-            rate,
-        } => DelayLaw::StateDependent {
-            floor_s: floor_s * factor,
-            rise_s: rise_s * factor,
-            rate,
-        },
-        DelayLaw::EdgeDependent { rise_s, fall_s } => DelayLaw::EdgeDependent {
-            rise_s: rise_s * factor,
-            fall_s: fall_s * factor,
-        },
-    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Whether an effect matters: what no change of the flow's own constants imitates, against the noise.
 
 use crate::command::Command;
-use crate::plant::{BasePlant, DelayLaw, PlantError, PlantSpec, Rig};
+use crate::plant::{BasePlant, PlantError, PlantSpec, Rig};
 
 /// An effect should change the readings by this many standard errors …
 const TOTAL: f64 = 4.0;
@@ -65,33 +65,6 @@ impl Weight {
 /// The flow with each of its constants a little larger.
 fn moved(base: &BasePlant) -> Vec<BasePlant> {
     let more = 1.0 + STEP;
-    let later = match base.delay {
-        DelayLaw::Fixed { delay_s } => DelayLaw::Fixed {
-            delay_s: more * delay_s,
-        },
-        DelayLaw::StateDependent {
-            floor_s,
-            rise_s,
-            rate,
-        } => DelayLaw::StateDependent {
-            floor_s: more * floor_s,
-            rise_s,
-            rate,
-        },
-        DelayLaw::Clamped {
-            floor_s,
-            rise_s,
-            level,
-        } => DelayLaw::Clamped {
-            floor_s: more * floor_s,
-            rise_s,
-            level,
-        },
-        DelayLaw::EdgeDependent { rise_s, fall_s } => DelayLaw::EdgeDependent {
-            rise_s: more * rise_s,
-            fall_s: more * fall_s,
-        },
-    };
     vec![
         BasePlant {
             attach_s: more * base.attach_s,
@@ -106,7 +79,7 @@ fn moved(base: &BasePlant) -> Vec<BasePlant> {
             ..*base
         },
         BasePlant {
-            delay: later,
+            delay: base.delay.scaled(more),
             ..*base
         },
     ]

@@ -52,6 +52,40 @@ pub enum DelayLaw {
     },
 }
 
+impl DelayLaw {
+    /// The same law with every delay `factor` times as long.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        match self {
+            Self::Fixed { delay_s } => Self::Fixed {
+                delay_s: factor * delay_s,
+            },
+            Self::StateDependent {
+                floor_s,
+                rise_s,
+                rate,
+            } => Self::StateDependent {
+                floor_s: factor * floor_s,
+                rise_s: factor * rise_s,
+                rate,
+            },
+            Self::Clamped {
+                floor_s,
+                rise_s,
+                level,
+            } => Self::Clamped {
+                floor_s: factor * floor_s,
+                rise_s: factor * rise_s,
+                level,
+            },
+            Self::EdgeDependent { rise_s, fall_s } => Self::EdgeDependent {
+                rise_s: factor * rise_s,
+                fall_s: factor * fall_s,
+            },
+        }
+    }
+}
+
 /// What a jet between off and on does to the *rate* of the flow. An on/off jet makes no difference
 /// between the three; jets of intermediate strength (a lagging valve, a drooping plenum) do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -52,7 +52,9 @@ impl Bench {
                 rate,
             } => (floor_s, rise_s, rate),
             DelayLaw::Fixed { delay_s } => (delay_s, 0.0, 1.0),
-            DelayLaw::EdgeDependent { rise_s, .. } => (rise_s, 0.0, 1.0),
+            DelayLaw::Clamped { .. } | DelayLaw::EdgeDependent { .. } => {
+                unreachable!("plants are drawn with the exponential law")
+            }
         };
         let model = Model {
             sample_period_s: 0.001,
@@ -203,7 +205,9 @@ impl Bench {
         let delay_s = match self.base.delay {
             DelayLaw::StateDependent { floor_s, .. } => floor_s,
             DelayLaw::Fixed { delay_s } => delay_s,
-            DelayLaw::EdgeDependent { rise_s, fall_s } => 0.5 * (rise_s + fall_s),
+            DelayLaw::Clamped { .. } | DelayLaw::EdgeDependent { .. } => {
+                unreachable!("plants are drawn with the exponential law")
+            }
         };
         controller.with_smith(FirstOrder {
             gain: self.base.gain,

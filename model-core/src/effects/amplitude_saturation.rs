@@ -52,3 +52,18 @@ impl<T: Real> Physics<T> for AmplitudeSaturation<T> {
         Self { cubic }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::{flow, prepared};
+
+    #[test]
+    fn the_cubic_sets_the_level() {
+        for cubic in [-0.1, 0.0, 0.4, 3.0] {
+            let effect: AmplitudeSaturation<f64> = prepared(&[cubic]);
+            let s = flow(&effect, |_| 0.9)[1999];
+            assert!((s + cubic * s * s * s - 0.9).abs() < 1e-9, "{cubic}: {s}");
+        }
+    }
+}

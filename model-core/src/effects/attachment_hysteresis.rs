@@ -66,3 +66,25 @@ impl<T: Real> Physics<T> for AttachmentHysteresis<T> {
         Self { upper, lower, gain }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::{flow, prepared};
+
+    #[test]
+    fn between_the_thresholds_the_flow_stays_what_it_was() {
+        let relay: AttachmentHysteresis<f64> = prepared(&[0.6, 0.3, 0.2]);
+        // To 0.45 from below, then over the upper threshold, then to 0.45 again.
+        let s = flow(
+            &relay,
+            |k| if (600..1200).contains(&k) { 0.7 } else { 0.45 },
+        );
+        assert!((s[599] - 0.45).abs() < 1e-4, "{}", s[599]);
+        assert!((s[1199] - 0.9).abs() < 1e-4, "{}", s[1199]);
+        assert!((s[1999] - 0.65).abs() < 1e-4, "{}", s[1999]);
+        let s = flow(&relay, |k| if k < 800 { 0.7 } else { 0.0 });
+        // Attached at 0 the flow would stay at the gain: it lets go below the lower threshold.
+        assert!(s[1999].abs() < 1e-4, "{}", s[1999]);
+    }
+}

@@ -80,3 +80,50 @@ impl<T: Real> Physics<T> for BoucWenHysteresis<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::prepared;
+
+    /// z along a path of s.
+    fn loop_of(path: impl Iterator<Item = f64>) -> std::vec::Vec<f64> {
+        let effect: BoucWenHysteresis<f64> = prepared(&[1.0, 2.0, 0.5, -1.0]);
+        let (mut z, mut before) = (0.0, 0.0);
+        let at = Instant {
+            command: 0.0,
+            flow: 0.0,
+            arrived: 0.0,
+            present: 0.0,
+            channels: &[],
+        };
+        let along = path.map(|now| {
+            let seen = Flow {
+                now,
+                before,
+                next: now,
+                relaxation: 1.0,
+            };
+            before = now;
+            effect.drive(&mut z, &seen, &at)
+        });
+        along.collect()
+    }
+
+    #[test]
+    fn it_begins_elastic_and_ends_at_its_limit() {
+        let z = loop_of((1..=100_000).map(|k| f64::from(k) * 1e-4));
+        // ż = ṡ for small s, and nothing more where A = (β + γ)·z.
+        assert!((z[9] - 1e-3).abs() < 1e-5, "{}", z[9]);
+        assert!((z[99_999] - 1.0 / 2.5).abs() < 1e-3, "{}", z[99_999]);
+    }
+
+    #[test]
+    fn the_loop_does_not_depend_on_the_speed() {
+        let path = |n: i32| (1..=n).map(move |k| (f64::from(k) / f64::from(n) * 9.0).sin());
+        let (fast, slow) = (loop_of(path(20_000)), loop_of(path(40_000)));
+        for (fast, slow) in fast.iter().zip(slow.iter().skip(1).step_by(2)) {
+            assert!((fast - slow).abs() < 1e-3, "{fast} {slow}");
+        }
+    }
+}

@@ -60,3 +60,20 @@ impl<T: Real, const LEN: usize> Physics<T> for EchoPath<T, LEN> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::{jets, prepared};
+
+    #[test]
+    fn the_echo_comes_later_and_adds_its_gain() {
+        let echo: EchoPath<f64, 64> = prepared(&[-0.25, 0.0305]);
+        let j = jets(&echo, |k| if k < 10 { 0.0 } else { 1.0 });
+        assert_eq!(j[10], 1.0);
+        assert_eq!(j[39], 1.0);
+        // Half of the way between two samples.
+        assert!((j[40] - 0.875).abs() < 1e-9, "{}", j[40]);
+        assert!((j[41] - 0.75).abs() < 1e-9 && (j[999] - 0.75).abs() < 1e-9);
+    }
+}

@@ -43,3 +43,16 @@ impl<T: Real> Physics<T> for ElectricalPickup<T> {
         Self { gain }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::{prepared, readings};
+
+    #[test]
+    fn the_command_shows_at_once_and_leaves_nothing_behind() {
+        let pickup: ElectricalPickup<f64> = prepared(&[0.07]);
+        let y = readings(&pickup, |_| 0.2, |k| if k == 3 { 1.0 } else { 0.0 });
+        assert_eq!(y[2..5], [0.2, 0.27, 0.2]);
+    }
+}

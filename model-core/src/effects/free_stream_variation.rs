@@ -60,3 +60,29 @@ impl<T: Real> Physics<T> for FreeStreamVariation<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::prepared;
+
+    fn jet(gain: f64, channels: &[f64]) -> f64 {
+        let effect: FreeStreamVariation<f64> = prepared(&[gain]);
+        let at = Instant {
+            command: 1.0,
+            flow: 0.0,
+            arrived: 0.0,
+            present: 0.0,
+            channels,
+        };
+        effect.jet(&mut (), 0.5, &at)
+    }
+
+    #[test]
+    fn the_jet_follows_the_stream_relative_to_its_reference() {
+        assert_eq!(jet(-1.0, &[10.0]), 0.5);
+        assert!((jet(-1.0, &[11.0]) - 0.45).abs() < 1e-12);
+        assert!((jet(2.0, &[9.0]) - 0.4).abs() < 1e-12);
+        assert_eq!(jet(2.0, &[]), 0.5);
+    }
+}

@@ -64,3 +64,29 @@ impl<T: Real> Physics<T> for HotFilmNonlinearity<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::{prepared, readings};
+
+    #[test]
+    fn it_is_calibrated_at_its_ends_and_bends_between() {
+        let film: HotFilmNonlinearity<f64> = prepared(&[3.0, 0.05]);
+        let y = readings(&film, |k| k as f64 / 500.0 - 0.5, |_| 0.0);
+        assert!(y[250].abs() < 1e-12 && (y[750] - 1.0).abs() < 1e-12);
+        assert!(y[500] > 0.6, "concave: {}", y[500]);
+        assert!(y.windows(2).all(|pair| pair[1] >= pair[0]));
+        // It cannot tell a reversed flow.
+        assert_eq!(y[0], y[200]);
+    }
+
+    /// For a weak overheat E is linear in (s + s0)^(1/3).
+    #[test]
+    fn a_small_ratio_leaves_the_cube_root() {
+        let film: HotFilmNonlinearity<f64> = prepared(&[1e-6, 0.1]);
+        let root = |s: f64| (s + 0.1).cbrt();
+        let expected = (root(0.5) - root(0.0)) / (root(1.0) - root(0.0));
+        assert!((readings(&film, |_| 0.5, |_| 0.0)[0] - expected).abs() < 1e-4);
+    }
+}

@@ -46,3 +46,22 @@ impl<T: Real> Physics<T> for InputNonlinearity<T> {
         Self { quadratic, cubic }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::{jets, prepared};
+
+    #[test]
+    fn the_curve_goes_through_zero_and_scales_with_the_unit_of_u() {
+        let curve: InputNonlinearity<f64> = prepared(&[0.2, -0.1]);
+        assert_eq!(jets(&curve, |_| 0.0)[0], 0.0);
+        assert!((jets(&curve, |_| 1.0)[0] - 1.1).abs() < 1e-12);
+        assert!((jets(&curve, |_| -0.5)[0] - (-0.5 + 0.05 + 0.0125)).abs() < 1e-12);
+        let percent: InputNonlinearity<f64> = prepared(&[
+            0.2 * Unit::PerU.scale(1.0, 1.0, 100.0),
+            -0.1 * Unit::PerUSquared.scale(1.0, 1.0, 100.0),
+        ]);
+        assert!((jets(&percent, |_| 100.0)[0] - 110.0).abs() < 1e-9);
+    }
+}

@@ -6,6 +6,8 @@
 
 pub mod amplitude_saturation;
 pub mod attachment_hysteresis;
+#[cfg(test)]
+mod bench;
 pub mod bouc_wen_hysteresis;
 pub mod constant_delay;
 pub mod dry_friction;

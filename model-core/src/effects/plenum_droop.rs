@@ -72,3 +72,28 @@ impl<T: Real> Physics<T> for PlenumDroop<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::{jets, prepared};
+
+    #[test]
+    fn steady_blowing_costs_the_loss_that_is_spoken_of() {
+        let parameters = [0.05, 5.0];
+        let plenum: PlenumDroop<f64> = prepared(&parameters);
+        let j = jets(&plenum, |_| 1.0);
+        let (percent, unit) = loss(&parameters);
+        assert_eq!((percent, unit), (20.0, "%"));
+        assert!((j[999] - 0.8).abs() < 1e-9, "{}", j[999]);
+        assert!(j[0] == 1.0 && j.windows(2).all(|pair| pair[1] <= pair[0]));
+    }
+
+    #[test]
+    fn the_pressure_comes_back_and_stays_positive() {
+        let plenum: PlenumDroop<f64> = prepared(&[0.1, 500.0]);
+        let j = jets(&plenum, |k| if k < 100 || k > 900 { 1.0 } else { 0.0 });
+        assert!(j.iter().all(|j| *j >= 0.0));
+        assert!(j[99] < 0.05 && (j[901] - 1.0).abs() < 1e-3);
+    }
+}

@@ -54,3 +54,24 @@ impl<T: Real> Physics<T> for QuadraticDrag<T> {
         Self { coefficient }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::{flow, prepared};
+
+    #[test]
+    fn it_slows_the_way_and_leaves_the_end() {
+        for coefficient in [0.0, 30.0, 1000.0] {
+            let drag: QuadraticDrag<f64> = prepared(&[coefficient]);
+            let s = flow(&drag, |_| 0.8);
+            let mut before = 0.0;
+            for s in &s {
+                let (step, free): (f64, f64) = (s - before, 0.02 * (0.8 - before));
+                assert!((step + coefficient * step * step.abs() - free).abs() < 1e-9);
+                before = *s;
+            }
+            assert!((s[1999] - 0.8).abs() < 1e-3);
+        }
+    }
+}

@@ -37,3 +37,15 @@ impl<T: Real> Physics<T> for RectifyingSensor {
         Self
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::readings;
+
+    #[test]
+    fn it_shows_the_size() {
+        let y = readings(&RectifyingSensor, |k| k as f64 - 2.0, |_| 0.0);
+        assert_eq!(y[..4], [2.0, 1.0, 0.0, 1.0]);
+    }
+}

@@ -52,3 +52,17 @@ impl<T: Real> Physics<T> for SensorSaturation<T> {
         Self { lower, upper }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::{prepared, readings};
+
+    #[test]
+    fn it_cuts_at_both_limits() {
+        let range: SensorSaturation<f64> = prepared(&[-0.05, 0.8]);
+        let y = readings(&range, |k| k as f64 / 500.0 - 1.0, |_| 0.0);
+        assert_eq!((y[0], y[999]), (-0.05, 0.8));
+        assert!((y[600] - 0.2).abs() < 1e-12);
+    }
+}

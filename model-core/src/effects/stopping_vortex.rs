@@ -79,3 +79,24 @@ impl<T: Real> Physics<T> for StoppingVortex<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::{jets, prepared};
+
+    /// ∫w dt = τ for an edge of 1, however long the samples are.
+    #[test]
+    fn the_vortex_of_an_edge_has_the_area_of_its_decay() {
+        let vortex: StoppingVortex<f64> = prepared(&[0.5, 0.030]);
+        let jet = |k| if (100..600).contains(&k) { 1.0 } else { 0.0 };
+        let j = jets(&vortex, jet);
+        let added = |from: usize, to: usize| -> f64 {
+            (from..to).map(|k| j[k] - jet(k)).sum::<f64>() * 0.001
+        };
+        let (rising, falling) = (added(100, 600), added(600, 1000));
+        let area = -0.5 * 0.030;
+        assert!((falling - area).abs() < 1e-6, "{rising} {falling}");
+        assert!(rising.abs() < 1e-6);
+    }
+}

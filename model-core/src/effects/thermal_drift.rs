@@ -60,3 +60,20 @@ impl<T: Real> Physics<T> for ThermalDrift<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::{prepared, readings};
+
+    #[test]
+    fn it_begins_at_nothing_and_takes_its_time() {
+        let drift: ThermalDrift<f64> = prepared(&[-0.2, 0.5]);
+        let y = readings(&drift, |_| 0.3, |_| 0.0);
+        assert_eq!(y[0], 0.3);
+        for k in [1_usize, 500, 999] {
+            let expected = 0.3 - 0.2 * (1.0 - (-(k as f64) / 500.0).exp());
+            assert!((y[k] - expected).abs() < 1e-12, "{k}");
+        }
+    }
+}

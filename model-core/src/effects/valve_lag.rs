@@ -60,3 +60,19 @@ impl<T: Real> Physics<T> for ValveLag<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::{jets, prepared};
+
+    #[test]
+    fn it_opens_and_closes_with_its_own_times() {
+        let lag: ValveLag<f64> = prepared(&[0.010, 0.020]);
+        let v = jets(&lag, |k| if k < 500 { 1.0 } else { 0.0 });
+        let left = (-1.0_f64).exp();
+        assert!((v[9] - (1.0 - left)).abs() < 1e-12);
+        assert!((v[499] - 1.0).abs() < 1e-12);
+        assert!((v[519] - left).abs() < 1e-12);
+    }
+}

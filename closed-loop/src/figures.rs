@@ -1,9 +1,10 @@
 //! What a closed-loop run amounts to.
 
 use crate::run::{SAMPLE_PERIOD_S, Trace};
+use serde::Serialize;
 
 /// Figures of a run against its reference, in y and SI units.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// Mean friction gain.
     pub mean: f64,

@@ -15,6 +15,7 @@ use crate::fit::{
 use crate::model::{Model, Start};
 use crate::simulate::SimulateError;
 use model_core::effect::Spec;
+use serde::Serialize;
 use thiserror::Error;
 
 /// The lean model is kept when its error is within this factor of the other's.
@@ -52,8 +53,9 @@ pub enum ExtendError {
 }
 
 /// Which structure the effects were added to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Structure {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StructureKept {
     /// That of the given model.
     Given,
     /// One lag each and one input.
@@ -66,7 +68,7 @@ pub struct Extended {
     /// The model.
     pub model: Model,
     /// Where its structure comes from.
-    pub structure: Structure,
+    pub structure: StructureKept,
     /// Parameters of the added effects: by effect, by name.
     pub parameters: BTreeMap<String, BTreeMap<String, ParameterEstimate>>,
     /// Root mean square error of the free run on the identify records, y.
@@ -216,13 +218,13 @@ pub fn extend(
         (Ok(given), Ok(lean)) => {
             let as_good = given.mean_square() * AS_GOOD * AS_GOOD;
             if lean.mean_square() <= as_good {
-                (lean, Structure::Lean)
+                (lean, StructureKept::Lean)
             } else {
-                (given, Structure::Given)
+                (given, StructureKept::Given)
             }
         }
-        (Ok(given), Err(_)) => (given, Structure::Given),
-        (Err(_), Ok(lean)) => (lean, Structure::Lean),
+        (Ok(given), Err(_)) => (given, StructureKept::Given),
+        (Err(_), Ok(lean)) => (lean, StructureKept::Lean),
         (Err(error), Err(_)) => return Err(error),
     };
     let parameters = specs.iter().map(|spec| {

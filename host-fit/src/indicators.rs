@@ -2,8 +2,8 @@
 //! (9)–(11), the error's size and the noise floor.
 
 use crate::data::{Record, Use};
-use crate::model::Model;
-use crate::simulate::SimulateError;
+use crate::model::{Model, Rounding};
+use crate::simulate::{Signals, SimulateError, Simulator};
 use serde::{Deserialize, Serialize};
 
 /// Indicators of a free run over a record, or over several together.
@@ -128,6 +128,25 @@ impl Scores {
     pub fn held_out(&self) -> Option<&Indicators> {
         self.validate.as_ref().or(self.identify.as_ref())
     }
+}
+
+/// √Σ (y_{k+1} − prediction from the measured past)² over the identify records
+/// among `records` (as the model sees them, see [`Model::targets`]).
+///
+/// # Errors
+/// A missing channel.
+pub fn one_step_norm(model: &Model, records: &[Record]) -> Result<f64, SimulateError> {
+    let simulator = Simulator::with_values(model, &model.values(), Rounding::Samples);
+    let mut sum = 0.0;
+    for record in records.iter().filter(|r| r.role == Use::Identify) {
+        let signals = Signals::of(model, record)?;
+        simulator.predict(&signals, |k, predicted: f64| {
+            if k >= model.warm_up() {
+                sum += record.y.get(k).map_or(0.0, |y| (y - predicted).powi(2));
+            }
+        });
+    }
+    Ok(sum.sqrt())
 }
 
 /// Runs `model` free over every record and judges it; also gives the runs.

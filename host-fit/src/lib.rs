@@ -5,6 +5,7 @@ pub mod delay;
 pub mod design;
 pub mod diagnose;
 pub mod dual;
+pub mod excitation;
 pub mod experiment;
 pub mod extend;
 pub mod fit;
@@ -17,6 +18,7 @@ pub mod residual;
 pub mod rules;
 pub mod search;
 pub mod simulate;
+pub mod steps;
 pub mod target;
 pub mod user_effect;
 

@@ -34,6 +34,7 @@ enum Command {
     Extend(commands::extend::Args),
     Simulate(commands::simulate::Args),
     Effects(commands::effects::Args),
+    Rules(commands::rules::Args),
     Codegen(commands::codegen::Args),
 }
 
@@ -51,6 +52,7 @@ fn main() -> ExitCode {
         Command::Extend(args) => commands::extend::run(args, console),
         Command::Simulate(args) => commands::simulate::run(args, console),
         Command::Effects(args) => commands::effects::run(args, console),
+        Command::Rules(args) => commands::rules::run(args, console),
         Command::Codegen(args) => commands::codegen::run(args, console),
     };
     match result {

@@ -24,7 +24,7 @@ pub(crate) struct Plants {
     pub(crate) blown: f64,
     /// The plant with something else about it.
     pub(crate) others: Vec<Trial<Disturbed<Rig>>>,
-    /// Effects of the model that no simulated plant has; the plants are without them.
+    /// What of the model no simulated plant has, one sentence each; the plants are without it.
     pub(crate) left_out: Vec<String>,
 }
 
@@ -34,11 +34,10 @@ impl Plants {
     /// # Errors
     /// When the model does not settle or its constants are no plant's.
     pub(crate) fn of(model: &Model, seed: u64) -> anyhow::Result<Self> {
-        let plant = nearest_plant(model)?;
-        let unknown = model.effects.iter().filter(|added| !is_known(added));
+        let (plant, left_out) = nearest_plant(model)?;
         Ok(Self {
             blown: plant.base.gain,
-            left_out: unknown.map(|added| added.name.clone()).collect(),
+            left_out,
             nearest: trial(
                 CaseGroup::Plant,
                 "continuous-time plant, noisy sensor",
@@ -56,7 +55,7 @@ impl Plants {
 ///
 /// # Errors
 /// When the model does not settle or its constants are no plant's.
-fn nearest_plant(model: &Model) -> anyhow::Result<PlantSpec> {
+fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
     let bare = Model {
         effects: Vec::new(),
         ..model.clone()
@@ -83,13 +82,17 @@ fn nearest_plant(model: &Model) -> anyhow::Result<PlantSpec> {
         delay,
         rate_law: RateLaw::default(),
     };
-    let effects = model
-        .effects
-        .iter()
-        .filter(|added| is_known(added))
-        .map(physical_effect)
-        .collect::<anyhow::Result<Vec<_>>>()?;
-    Ok(PlantSpec::new(base, &effects))
+    let (mut effects, mut left_out) = (Vec::new(), Vec::new());
+    for added in &model.effects {
+        match physical_effect(added) {
+            Ok(effect) => effects.push(effect),
+            Err(error) => left_out.push(format!(
+                "tried on plants without {}, which the simulator does not have so: {error:#}",
+                added.name
+            )),
+        }
+    }
+    Ok((PlantSpec::new(base, &effects), left_out))
 }
 
 /// The law in continuous time; where the plants have no such law, the longest of
@@ -115,18 +118,14 @@ fn transport(law: &TransportLaw, period: f64) -> DelayLaw {
     }
 }
 
-fn is_known(added: &Added) -> bool {
-    Effect::NAMES.contains(&added.name.as_str())
-}
-
 fn physical_effect(added: &Added) -> anyhow::Result<Effect> {
     // The kind by its name, the values from the model.
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let base = BasePlant::draw(&mut rng);
-    let mut effect = Effect::draw(&added.name, &base, &mut rng).context(NO_PLANT)?;
+    let mut effect = Effect::draw(&added.name, &base, &mut rng)?;
     let names = model_core::effects::spec(&added.name).map_or(&[][..], |spec| spec.parameters);
     for (parameter, value) in names.iter().zip(&added.parameters) {
-        effect = effect.with(parameter.name, *value).context(NO_PLANT)?;
+        effect = effect.with(parameter.name, *value)?;
     }
     Ok(effect)
 }
@@ -252,7 +251,8 @@ mod tests {
         let mut model = paper();
         let spec = model_core::effects::spec("plenum-droop").unwrap();
         model.add(spec, &[1.0, 0.0], None);
-        let spec = nearest_plant(&model).unwrap();
+        let (spec, left_out) = nearest_plant(&model).unwrap();
+        assert!(left_out.is_empty());
         assert_eq!(spec.effects.len(), 1);
         let mut rig = Rig::new(&spec, None).unwrap();
         let y = rig.play(&[1.0; 4000]);

@@ -92,7 +92,11 @@ pub struct Rulebook {
 /// The rules of every room, in the order in which the way of the data meets them.
 #[must_use]
 pub fn books() -> Vec<Rulebook> {
-    vec![crate::residual::RULES.book()]
+    vec![
+        crate::excitation::RULES.book(),
+        crate::fit::RULES.book(),
+        crate::residual::RULES.book(),
+    ]
 }
 
 /// Writes a structure of rules, its values in force as the constant `RULES`, and its [`Rulebook`].

@@ -1,4 +1,4 @@
-//! Recordings: records of command and response, read, checked, averaged and judged for what they can tell.
+//! Recordings: records of command and response, read, checked and averaged.
 //!
 //! A data set is a folder with `dataset.toml` and CSV files, or one CSV file. Everything is checked when it is loaded
 //! ([`DataSet::load`]) or put together in memory ([`DataSet::from_records`]); every fault is one paragraph that names
@@ -8,7 +8,6 @@
 mod average;
 mod averaging;
 mod error;
-mod excitation;
 mod folder;
 mod folding;
 mod hash;
@@ -23,7 +22,6 @@ mod table;
 pub use average::average_files;
 pub use averaging::{Align, AverageError, AverageSummary, Averaging, Defect, Dropped};
 pub use error::{DataError, Place, Problem};
-pub use excitation::{Demand, Excitation, ExcitationError, RecordExcitation, check_excitation};
 pub use record::{Record, Use};
 pub use set::DataSet;
 pub use table::InputFile;

@@ -155,6 +155,12 @@ impl InputFile {
         })
     }
 
+    /// Where sample `k` stands in the user's file, for messages.
+    #[must_use]
+    pub fn place(&self, k: Option<usize>) -> Place {
+        self.origin.place("", k)
+    }
+
     /// Refuses a command that is not on/off.
     ///
     /// # Errors
@@ -162,8 +168,7 @@ impl InputFile {
     pub fn require_on_off(&self) -> Result<(), DataError> {
         match self.u.iter().position(|&u| u != 0.0 && u != 1.0) {
             Some(k) => Err(self
-                .origin
-                .place("", Some(k))
+                .place(Some(k))
                 .in_column("u")
                 .error(Problem::NotOnOff(self.u[k]))),
             None => Ok(()),

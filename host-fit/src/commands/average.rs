@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
-use host_fit::data::{Align, AverageSummary, Averaging, average_files};
+use host_fit::data::{Align, Averaging};
+use host_fit::steps;
 
 use super::Console;
 
@@ -59,24 +59,9 @@ pub(super) fn not_negative(text: &str) -> Result<f64, String> {
     }
 }
 
-#[derive(serde::Serialize)]
-struct Document<'a> {
-    dataset: &'a Path,
-    hash: &'a str,
-    recordings: &'a [AverageSummary],
-}
-
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let paths: Vec<&Path> = args.recordings.iter().map(PathBuf::as_path).collect();
-    let stems: Vec<_> = paths.iter().filter_map(|p| p.file_stem()).collect();
-    if let Some(name) = args
-        .validate
-        .iter()
-        .find(|n| !stems.iter().any(|s| *s == n.as_str()))
-    {
-        bail!("--validate {name}: no recording has this name; give a file name without its ending");
-    }
     let averaging = Averaging {
         period_s: args.period,
         start_s: args.start,
@@ -94,58 +79,12 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         sizes.iter().sum(),
         "averaging {wide_bar} {bytes}/{total_bytes} {bytes_per_sec} {eta}",
     );
-    let (mut set, summaries) =
-        average_files(&paths, &args.validate, &averaging, &mut |file, bytes| {
-            bar.set_position(sizes.iter().take(file).sum::<u64>() + bytes);
-        })?;
+    let mut progress = |file: usize, bytes| {
+        bar.set_position(sizes.iter().take(file).sum::<u64>() + bytes);
+    };
+    let mut average = steps::average(&paths, &args.validate, &averaging, &mut progress)?;
     bar.finish_and_clear();
-    set.title.clone_from(&args.title);
-    set.save(&args.out)?;
-    for summary in &summaries {
-        console.say(&words(summary))?;
-    }
-    console.say(&format!(
-        "written to {}, hash {}",
-        args.out.display(),
-        set.hash
-    ))?;
-    console.document(&Document {
-        dataset: &args.out,
-        hash: &set.hash,
-        recordings: &summaries,
-    })
-}
-
-fn words(s: &AverageSummary) -> String {
-    let mut text = format!(
-        "{}: {} periods of {} samples ({} s) averaged, aligned on {}",
-        s.name,
-        s.periods_used,
-        s.period_samples,
-        s.period_samples as f64 * s.sample_period_s,
-        if s.aligned_on_edges {
-            "edges"
-        } else {
-            "the period"
-        },
-    );
-    match s.mean_standard_error {
-        Some(e) => text.push_str(&format!("; standard error of y {e:.2e} (rms)")),
-        None => text.push_str("; one period alone gives no standard error"),
-    }
-    for d in &s.dropped {
-        text.push_str(&format!(
-            "\n  dropped {}: {}, first at line {}",
-            d.periods,
-            d.defect.words(),
-            d.first_line
-        ));
-    }
-    if s.left_over_samples > 0 {
-        text.push_str(&format!(
-            "\n  {} samples at the end are no whole period",
-            s.left_over_samples
-        ));
-    }
-    text
+    average.set.title.clone_from(&args.title);
+    average.set.save(&args.out)?;
+    console.show(&average, &[("dataset", &args.out)], &[&args.out])
 }

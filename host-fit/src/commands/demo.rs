@@ -2,25 +2,23 @@
 
 use std::path::{Path, PathBuf};
 
-use closed_loop::{Figures, OpenLoop, Relay, run as close_the_loop};
+use closed_loop::{Figures, OpenLoop, Relay, SAMPLE_PERIOD_S, run as close_the_loop};
 use firmware_sim::hidden_set::HiddenSetPlan;
 use firmware_sim::plant::{PlantSpec, Rig};
-use host_fit::codegen::generate;
 use host_fit::data::DataSet;
-use host_fit::design::{TrackRequest, run_law, track};
-use host_fit::diagnose::{Options, diagnose};
-use host_fit::indicators::score;
-use host_fit::model::{Law, Model, Track};
+use host_fit::design::{TrackRequest, run_law};
+use host_fit::diagnose::Options;
+use host_fit::indicators::Indicators;
+use host_fit::model::Model;
 use host_fit::output::{Staging, write_atomic};
-use host_fit::picture::{ClosedLoop, Column, LoopRun, Report, closed_loop};
+use host_fit::picture::{Column, Report};
+use host_fit::steps::{self, DelayKind, Design, DesignRequest, IdentifyRequest, Outcome};
 use model_core::control::HoldTimes;
 
 use super::Console;
-use super::compare::provenance;
-use super::diagnose::{ladder_picture, ladder_table, report_diagnosis, verdict_words};
-use super::identify::{DelayKind, Request};
-use super::interrupt::watch;
-use super::scores::{aligned, overlays, report_table};
+use super::drawings::{LoopPicture, ladder_picture, loop_picture};
+use super::page::{provenance, report_finding, report_runs, report_scores};
+use super::words::{aligned, ladder_table};
 
 /// Show the whole way on bundled data: identify, compare, find the missing effect, add it, generate constants, close
 /// the loop; leaves a report, models and data to play with.
@@ -68,14 +66,14 @@ const TARGET: f64 = 0.7;
 const TIMES: HoldTimes = HoldTimes { on: 10, off: 10 };
 
 /// A few lags are enough to show the way, and quick.
-fn request(delay: DelayKind) -> Request {
-    Request {
+fn request(delay: DelayKind) -> IdentifyRequest {
+    IdentifyRequest {
         delay,
         n1: Some(2),
         n2: Some(2),
         max_lag: Some(150),
         evaluations: 3_000,
-        ..Request::default()
+        ..IdentifyRequest::default()
     }
 }
 
@@ -95,27 +93,25 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         "recordings → model → missing effect → constants → loop",
     );
     let fits = real_input(&data, out, console, &mut report)?;
-    let (mut model, words) = hidden_effect(&data, out, console, &mut report)?;
-    let law = track(
+    let (model, words) = hidden_effect(&data, out, console, &mut report)?;
+    let design = steps::design(
         &model,
-        &TrackRequest {
+        &DesignRequest::Track(TrackRequest {
             target: TARGET,
-            min_on_s: 0.001 * f64::from(TIMES.on),
-            min_off_s: 0.001 * f64::from(TIMES.off),
+            min_on_s: SAMPLE_PERIOD_S * f64::from(TIMES.on),
+            min_off_s: SAMPLE_PERIOD_S * f64::from(TIMES.off),
             switches_per_s: None,
             air: None,
             ramp_per_s: None,
             least_air: false,
-        },
-    )?
-    .law;
-    model.law = Some(Law::Track(law.clone()));
-    model.save(&out.join("controlled.toml"))?;
-    let constants = generate(&model)?;
+        }),
+    )?;
+    design.model.save(&out.join("controlled.toml"))?;
+    let constants = steps::constants(&design.model)?;
     write_atomic(&out.join("identified.rs"), |file| {
-        file.write_all(constants.as_bytes())
+        file.write_all(constants.text.as_bytes())
     })?;
-    let figures = the_loop(&model, &law, console, &mut report)?;
+    let figures = the_loop(&design, console, &mut report)?;
     write_atomic(&out.join("report.html"), |file| {
         file.write_all(report.html().as_bytes())
     })?;
@@ -152,11 +148,9 @@ fn real_input(
         ),
     ];
     for ((kind, name, file), fit) in kinds.into_iter().zip(&mut fits) {
-        let found = request(kind).identify(&set, console)?;
+        let found = steps::identify(&set, &request(kind), &console.watch())?;
         found.model.save(&out.join(file))?;
-        let percent = |i: &Option<host_fit::indicators::Indicators>| {
-            i.as_ref().map_or(f64::NAN, |i| i.fit_percent)
-        };
+        let percent = |i: &Option<Indicators>| i.as_ref().map_or(f64::NAN, |i| i.fit_percent);
         *fit = percent(&found.scores.validate);
         rows.push(vec![
             name.to_owned(),
@@ -164,14 +158,11 @@ fn real_input(
             format!("{:.1}", *fit),
         ]);
         report.subsection(name);
-        report_table(report, &found.scores);
-        let (_, free) = score(&found.model, &set.records)?;
-        runs.push((name, free));
+        report_scores(report, &found.scores);
+        runs.push((name, steps::compare(&found.model, &set)?.runs));
     }
     let runs: Vec<(&str, &[Vec<f64>])> = runs.iter().map(|(n, r)| (*n, r.as_slice())).collect();
-    for (_, svg) in overlays(&set.records, &runs) {
-        report.figure(&svg, "");
-    }
+    report_runs(report, &set.records, &runs);
     provenance(report, &set);
     console.say("flow over a ramp (2-D Navier–Stokes), free run")?;
     console.say(&aligned(
@@ -190,38 +181,34 @@ fn hidden_effect(
     report: &mut Report,
 ) -> anyhow::Result<(Model, String)> {
     let set = DataSet::load(&data.join("hidden-ramp"))?;
-    let found = request(DelayKind::StateDependent).identify(&set, console)?;
+    let request = request(DelayKind::StateDependent);
+    let found = steps::identify(&set, &request, &console.watch())?;
     found.model.save(&out.join("hidden-before.toml"))?;
-    let bar = console.spinner("trying every effect");
-    let diagnosis = diagnose(&found.model, &set.records, &Options::default(), watch())?;
-    bar.finish_and_clear();
-    let (headline, meaning) = verdict_words(&diagnosis);
+    let finding = steps::diagnose(&found.model, &set, &Options::default(), &console.watch())?;
+    let (headline, meaning) = (&finding.headline, &finding.meaning);
     console.say(&format!(
         "\na ramp with a hidden effect: {headline}\n{meaning}"
     ))?;
-    console.say(&ladder_table(&diagnosis))?;
-    report_diagnosis(report, &set, &diagnosis);
-    let svg = ladder_picture(&diagnosis, &set);
+    console.say(&ladder_table(&finding.diagnosis))?;
+    report_finding(report, &set, &finding);
+    let svg = ladder_picture(&finding.diagnosis, &set);
     write_atomic(&out.join("ladder.svg"), |file| {
         file.write_all(svg.as_bytes())
     })?;
-    let model = Model {
-        training: found.model.training.clone(),
-        ..diagnosis.model.clone()
-    };
-    let (scores, runs) = score(&model, &set.records)?;
     report.section("With what was missing");
-    report_table(report, &scores);
-    let (_, before) = score(&found.model, &set.records)?;
-    for (_, svg) in overlays(&set.records, &[("before", &before), ("after", &runs)]) {
-        report.figure(&svg, "");
-    }
-    model.save(&out.join("hidden-after.toml"))?;
+    report_scores(report, &finding.scores);
+    let runs = [("before", &finding.runs_before), ("after", &finding.runs)];
+    let shown = runs
+        .iter()
+        .filter_map(|(name, runs)| Some((*name, runs.as_deref()?)));
+    report_runs(report, &set.records, &shown.collect::<Vec<_>>());
+    finding.model.save(&out.join("hidden-after.toml"))?;
     provenance(report, &set);
-    Ok((model, format!("{headline}. {meaning}")))
+    let words = format!("{headline}. {meaning}");
+    Ok((finding.model, words))
 }
 
-#[derive(serde::Serialize)]
+#[derive(Clone, Copy, serde::Serialize)]
 struct LoopRow {
     controller: &'static str,
     mean_friction: f64,
@@ -250,8 +237,7 @@ fn hidden_plant() -> anyhow::Result<PlantSpec> {
 /// hidden set. The law runs in single precision as its generated constants do on
 /// the board: the golden run in `identified.rs` is of this code.
 fn the_loop(
-    model: &Model,
-    law: &Track,
+    design: &Design,
     console: Console,
     report: &mut Report,
 ) -> anyhow::Result<Vec<LoopRow>> {
@@ -261,49 +247,33 @@ fn the_loop(
     let references = || std::iter::repeat_n(TARGET, SAMPLES);
     let steady = close_the_loop(&mut OpenLoop::steady(), &mut rig()?, references());
     let relay = close_the_loop(&mut Relay::new(TIMES, 0.02), &mut rig()?, references());
-    let designed = run_law(model, law, &mut rig()?, references());
-    let mut rows = Vec::new();
-    let mut series = Vec::new();
-    for (controller, trace) in [
+    let Outcome::Track(track) = &design.outcome else {
+        anyhow::bail!("the demo designs a tracking law");
+    };
+    let designed = run_law(&design.model, &track.law, &mut rig()?, references());
+    let runs = [
         ("steady blowing", &steady),
         ("relay", &relay),
         ("the generated law", &designed),
-    ] {
+    ];
+    let rows = runs.map(|(controller, trace)| {
         let figures = Figures::of(trace, 1000);
-        rows.push(LoopRow {
+        LoopRow {
             controller,
             mean_friction: figures.mean,
             rms_error: figures.rms,
             switches_per_s: figures.switches_per_s,
             air: figures.air,
-        });
-        let y: Vec<f64> = trace.samples.iter().map(|s| s.friction).collect();
-        let u: Vec<f64> = trace
-            .samples
-            .iter()
-            .map(|s| f64::from(u8::from(s.on)))
-            .collect();
-        series.push((controller, y, u));
-    }
-    let runs: Vec<LoopRun<'_>> = series
-        .iter()
-        .map(|(label, y, u)| LoopRun {
-            label,
-            y,
-            u,
-            air: &[],
-        })
-        .collect();
+        }
+    });
     report.section("In the loop at 1 kHz, on the plant");
     report.figure(
-        &closed_loop(&ClosedLoop {
+        &loop_picture(&LoopPicture {
             title: "Held at 0.7",
-            y_label: "friction gain y",
-            air_label: "air used",
-            sample_period_s: model.sample_period_s,
-            reference: &vec![TARGET; SAMPLES],
+            air: false,
+            reference: &[TARGET; SAMPLES],
             runs: &runs,
-            window_s: Some((0.0, 3.0)),
+            seconds: 3.0,
         }),
         "",
     );
@@ -342,5 +312,5 @@ fn the_loop(
         &table,
         1,
     ))?;
-    Ok(rows)
+    Ok(rows.to_vec())
 }

@@ -1,20 +1,18 @@
 //! `host-fit design`: an on/off law from a model, tried in the loop before it is written.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Context;
-use closed_loop::{Figures, Trace};
-use host_fit::design::{
-    Case, CaseGroup, JUDGED_FROM, MaximiseRequest, Optimum, Outside, Planned, Proof, Steady,
-    TrackDesign, TrackRequest, maximise, prove, prove_pulses, track,
-};
-use host_fit::model::{Law, Model};
+use host_fit::design::{MaximiseRequest, Proof, TrackRequest};
+use host_fit::model::Model;
 use host_fit::output::write_atomic;
-use host_fit::picture::{ClosedLoop, LoopRun, closed_loop};
+use host_fit::steps::{self, Design, DesignRequest};
 use serde::Serialize;
 
 use super::Console;
 use super::average::{not_negative, positive};
+use super::drawings::proof_picture;
+use super::words::Words;
 use crate::plants::Plants;
 
 /// Design an on/off law for the valve from a model and write it into the model file.
@@ -87,91 +85,56 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A law and how it did on the simulated plants.
 #[derive(Serialize)]
-struct Document<'a> {
-    model: &'a Path,
-    picture: &'a Path,
-    law: &'a Law,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    track: Option<TrackDocument<'a>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    maximise: Option<MaximiseDocument>,
-    cases: Vec<CaseDocument<'a>>,
-    relay: FiguresDocument,
-}
-
-#[derive(Serialize)]
-struct TrackDocument<'a> {
-    reachable: [f64; 2],
-    natural: Steady,
-    blown: Steady,
-    equivalent_duty: f64,
-    duty_on_model: f64,
-    remarks: &'a [String],
-}
-
-#[derive(Serialize)]
-struct MaximiseDocument {
-    mean: f64,
-    mean_after_minutes: f64,
-    mean_detuned: f64,
-    range: [f64; 2],
-    duty: f64,
-    steady_mean: Option<f64>,
-    refused: usize,
-    refused_mean: Option<f64>,
-    pole_moduli: [f64; 2],
-    outside: Option<Outside>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    planned: Option<Planned>,
-}
-
-#[derive(Serialize)]
-struct CaseDocument<'a> {
-    group: CaseGroup,
-    name: &'a str,
+struct Tried {
     #[serde(flatten)]
-    figures: FiguresDocument,
-    steady_mean: f64,
-    lowest_mean: f64,
-    kept: bool,
+    design: Design,
+    #[serde(flatten)]
+    proof: Option<Proof>,
+    /// What the plants are without, one sentence each.
+    not_tried: Vec<String>,
 }
 
-#[derive(Serialize)]
-struct FiguresDocument {
-    mean: f64,
-    rms: f64,
-    offset: f64,
-    peak_to_peak: f64,
-    switches_per_s: f64,
-    air: f64,
-    settling_s: Option<f64>,
-}
-
-impl From<Figures> for FiguresDocument {
-    fn from(f: Figures) -> Self {
-        Self {
-            mean: f.mean,
-            rms: f.rms,
-            offset: f.offset,
-            peak_to_peak: f.peak_to_peak,
-            switches_per_s: f.switches_per_s,
-            air: f.air,
-            settling_s: f.settling_s,
-        }
+impl Words for Tried {
+    fn words(&self) -> String {
+        let notes = self.not_tried.iter().map(|why| format!("note: {why}"));
+        let told = std::iter::once(self.design.words()).chain(notes);
+        let told = told.chain(self.proof.as_ref().map(Words::words));
+        told.collect::<Vec<_>>().join("\n")
     }
 }
 
-impl<'a> From<&'a Case> for CaseDocument<'a> {
-    fn from(case: &'a Case) -> Self {
-        Self {
-            group: case.group,
-            name: &case.name,
-            figures: case.figures.into(),
-            steady_mean: case.steady,
-            lowest_mean: case.lowest,
-            kept: case.kept,
+impl Args {
+    fn request(&self) -> DesignRequest {
+        match self.goal {
+            Goal::Track => DesignRequest::Track(TrackRequest {
+                // Asked for before.
+                target: self.target.unwrap_or(f64::NAN),
+                min_on_s: self.min_on,
+                min_off_s: self.min_off,
+                switches_per_s: self.max_switches,
+                air: self.max_air,
+                ramp_per_s: self.ramp,
+                least_air: self.least_air,
+            }),
+            Goal::Maximise => DesignRequest::Maximise(MaximiseRequest {
+                min_on_s: self.min_on,
+                min_off_s: self.min_off,
+                air_price: self.air_price,
+                pulses: self.pulses.into(),
+                longest_period_s: 3.0,
+                horizon_s: self.horizon,
+            }),
         }
+    }
+
+    fn picture(&self) -> PathBuf {
+        self.picture.clone().unwrap_or_else(|| {
+            let stem = self.output.file_stem().unwrap_or_default();
+            let name = format!("{}-loop.svg", stem.to_string_lossy());
+            self.output.with_file_name(name)
+        })
     }
 }
 
@@ -183,299 +146,40 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
             .error(clap::error::ErrorKind::MissingRequiredArgument, problem)
             .exit();
     }
-    let mut model = Model::load(&args.model)?;
-    let plants = Plants::of(&model, args.seed)?;
+    let model = Model::load(&args.model)?;
     let bar = console.progress(0, "{spinner} designing and trying in the loop {elapsed}");
-    let (law, design, proof) = match args.goal {
-        Goal::Track => {
-            let design = track(&model, &request(args))?;
-            let proof = prove(&model, &design.law, &plants.nearest, &plants.others);
-            (Law::Track(design.law.clone()), Design::Track(design), proof)
-        }
-        Goal::Maximise => {
-            let optimum = maximise(
-                &model,
-                &MaximiseRequest {
-                    min_on_s: args.min_on,
-                    min_off_s: args.min_off,
-                    air_price: args.air_price,
-                    pulses: args.pulses.into(),
-                    longest_period_s: 3.0,
-                    horizon_s: args.horizon,
-                },
-            )?;
-            let proof = prove_pulses(&optimum.law, plants.blown, &plants.nearest, &plants.others);
-            (
-                Law::Maximise(optimum.law.clone()),
-                Design::Maximise(optimum),
-                proof,
-            )
-        }
-    };
+    let design = steps::design(&model, &args.request())?;
+    // A law is worth having also where the simulator has no plant to try it on.
+    let plants = Plants::of(&model, args.seed);
+    let proof = plants
+        .as_ref()
+        .ok()
+        .map(|plants| steps::try_out(&design, plants.blown, &plants.nearest, &plants.others));
     bar.finish_and_clear();
-    let picture = args.picture.clone().unwrap_or_else(|| {
-        let stem = args
-            .output
-            .file_stem()
-            .unwrap_or_default()
-            .to_string_lossy();
-        args.output.with_file_name(format!("{stem}-loop.svg"))
-    });
-    let svg = draw(&proof, args.goal);
-    write_atomic(&picture, |file| file.write_all(svg.as_bytes())).context("saving the picture")?;
-    if let Some(path) = &args.csv {
-        let csv = proof.trace.to_csv();
-        write_atomic(path, |file| file.write_all(csv.as_bytes())).context("saving the run")?;
+    let (picture, csv) = (args.picture(), args.csv.as_ref());
+    let mut keys = vec![("model", args.output.as_path())];
+    let mut written = vec![args.output.as_path()];
+    if let Some(proof) = &proof {
+        let svg = proof_picture(proof, args.goal == Goal::Track);
+        write_atomic(&picture, |file| file.write_all(svg.as_bytes()))
+            .context("saving the picture")?;
+        keys.push(("picture", &picture));
+        written.push(&picture);
+        if let Some(path) = csv {
+            let csv = proof.trace.to_csv();
+            write_atomic(path, |file| file.write_all(csv.as_bytes())).context("saving the run")?;
+            written.push(path);
+        }
     }
-    model.law = Some(law.clone());
-    model.save(&args.output)?;
-
-    match &design {
-        Design::Track(design) => console.say(&track_words(design))?,
-        Design::Maximise(optimum) => console.say(&optimum_words(optimum))?,
-    }
-    if !plants.left_out.is_empty() {
-        console.say(&format!(
-            "note: tried on plants without {}, which the simulator does not know",
-            plants.left_out.join(", ")
-        ))?;
-    }
-    console.say(&case_table(&proof))?;
-    console.say(&format!(
-        "written to {}, picture {}",
-        args.output.display(),
-        picture.display()
-    ))?;
-    console.document(&Document {
-        model: &args.output,
-        picture: &picture,
-        law: &law,
-        track: match &design {
-            Design::Track(d) => Some(TrackDocument {
-                reachable: d.law.reachable,
-                natural: d.natural,
-                blown: d.blown,
-                equivalent_duty: d.equivalent_duty,
-                duty_on_model: d.duty,
-                remarks: &d.remarks,
-            }),
-            Design::Maximise(_) => None,
-        },
-        maximise: match &design {
-            Design::Maximise(o) => Some(MaximiseDocument {
-                mean: o.mean,
-                mean_after_minutes: o.mean_after_minutes,
-                mean_detuned: o.mean_detuned,
-                range: o.range,
-                duty: o.duty,
-                steady_mean: o.steady_mean,
-                refused: o.refused,
-                refused_mean: o.refused_mean,
-                pole_moduli: o.moduli,
-                outside: o.outside,
-                planned: o.planned,
-            }),
-            Design::Track(_) => None,
-        },
-        cases: proof.cases.iter().map(CaseDocument::from).collect(),
-        relay: Figures::of(&proof.compared, JUDGED_FROM).into(),
-    })
-}
-
-enum Design {
-    Track(TrackDesign),
-    Maximise(Optimum),
-}
-
-fn request(args: &Args) -> TrackRequest {
-    TrackRequest {
-        // Asked for before with `--goal track`.
-        target: args.target.unwrap_or(f64::NAN),
-        min_on_s: args.min_on,
-        min_off_s: args.min_off,
-        switches_per_s: args.max_switches,
-        air: args.max_air,
-        ramp_per_s: args.ramp,
-        least_air: args.least_air,
-    }
-}
-
-fn track_words(design: &TrackDesign) -> String {
-    let law = &design.law;
-    let mut text = format!(
-        "holds {} of the interval ({:.3}, {:.3}); duty {:.3} on the model, u_eq = {:.3}\n\
-         shortest times {} ms open, {} ms closed; looks up to {} ms ahead",
-        law.reference,
-        law.reachable[0],
-        law.reachable[1],
-        design.duty,
-        design.equivalent_duty,
-        law.hold.on,
-        law.hold.off,
-        law.look_ahead
-    );
-    for remark in &design.remarks {
-        text.push_str("\nnote: ");
-        text.push_str(remark);
-    }
-    text
-}
-
-fn optimum_words(optimum: &Optimum) -> String {
-    let law = &optimum.law;
-    let mut text = if law.period == 1 {
-        format!("best: steady blowing, mean friction {:.3}", optimum.mean)
-    } else {
-        let pulses: Vec<String> = law
-            .pulses
-            .iter()
-            .map(|(first, length)| format!("{length} ms from {first} ms"))
-            .collect();
-        format!(
-            "best: period {} ms, open {}; mean friction {:.3} with {:.1} % of the air ({} under steady blowing)",
-            law.period,
-            pulses.join(" and "),
-            optimum.mean,
-            100.0 * optimum.duty,
-            optimum
-                .steady_mean
-                .map_or("the model grows".to_owned(), |mean| format!("{mean:.3}"))
-        )
+    design.model.save(&args.output)?;
+    let not_tried = match plants {
+        Ok(plants) => plants.left_out,
+        Err(error) => vec![format!("the law was not tried on a plant: {error:#}")],
     };
-    text.push_str(&format!(
-        "\nafter four minutes {:.3}; with the period 2 % off {:.3}; pole moduli {:.5} closed, {:.5} open",
-        optimum.mean_after_minutes, optimum.mean_detuned, optimum.moduli[0], optimum.moduli[1]
-    ));
-    if optimum.mean_detuned < 0.9 * optimum.mean {
-        text.push_str(
-            "\nnote: a sharp resonance of the model; try it on the rig before relying on it",
-        );
-    }
-    if let Some(mean) = optimum.refused_mean {
-        text.push_str(&format!(
-            "\nrefused: {} pulse trains that looked better (up to {mean:.3}) but grow in a long run: instabilities of the model",
-            optimum.refused
-        ));
-    }
-    if let Some(planned) = &optimum.planned {
-        text.push_str(&format!(
-            "\nfree commands over {} s from rest ({}, every {:.0} ms): value {:.3} with {:.1} % of the air (steady blowing {:.3}); {}",
-            planned.horizon_s,
-            if planned.exact { "all tried" } else { "beam search" },
-            1000.0 * planned.block_s,
-            planned.value,
-            100.0 * planned.duty,
-            planned.steady_value,
-            match planned.cycle_s {
-                None => "planning again and again, the valve comes to rest or the model grows".to_owned(),
-                Some(cycle_s) => format!(
-                    "planning again and again runs into a cycle of {:.0} ms ({:.0} % of it irregular), tried with the others",
-                    1000.0 * cycle_s,
-                    100.0 * planned.irregular
-                ),
-            }
-        ));
-    }
-    match &optimum.outside {
-        None => text.push_str("\nnote: the model file says nothing of what was recorded; the optimum may be an extrapolation"),
-        Some(outside) if outside.is_inside() => text.push_str("\ninside what was recorded"),
-        Some(outside) => text.push_str(&format!(
-            "\noutside what was recorded: friction by {:.3}, duty by {:.3}, on-times by a factor {:.2}",
-            outside.friction, outside.duty, outside.on_time_factor
-        )),
-    }
-    text
-}
-
-fn case_table(proof: &Proof) -> String {
-    let mut text = format!(
-        "{:<44} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>7} {:>6}  attachment",
-        "in the loop, from 4 s to 12 s",
-        "mean",
-        "rms",
-        "offset",
-        "p2p",
-        "sw/s",
-        "air",
-        "settle",
-        "steady"
-    );
-    let mut line = |name: &str, f: &Figures, steady: Option<f64>, kept: Option<bool>| {
-        let settling = f
-            .settling_s
-            .map_or("never".to_owned(), |s| format!("{s:.2} s"));
-        let steady = steady.map_or(String::new(), |s| format!("{s:.3}"));
-        let kept = match kept {
-            Some(true) => "kept",
-            Some(false) => "LOST",
-            None => "",
-        };
-        let name: String = name.chars().take(44).collect();
-        text.push_str(&format!(
-            "\n{name:<44} {:>6.3} {:>6.3} {:>+7.3} {:>6.3} {:>6.1} {:>6.3} {settling:>7} {steady:>6}  {kept}",
-            f.mean, f.rms, f.offset, f.peak_to_peak, f.switches_per_s, f.air
-        ));
+    let tried = Tried {
+        design,
+        proof,
+        not_tried,
     };
-    for case in &proof.cases {
-        line(
-            &case.name,
-            &case.figures,
-            Some(case.steady),
-            Some(case.kept),
-        );
-    }
-    line(
-        proof.compared_name,
-        &Figures::of(&proof.compared, JUDGED_FROM),
-        None,
-        None,
-    );
-    text
-}
-
-fn draw(proof: &Proof, goal: Goal) -> String {
-    let column = |trace: &Trace| -> (Vec<f64>, Vec<f64>, Vec<f64>) {
-        let y = trace.samples.iter().map(|s| s.friction).collect();
-        let u: Vec<f64> = trace
-            .samples
-            .iter()
-            .map(|s| f64::from(u8::from(s.on)))
-            .collect();
-        let air = u
-            .iter()
-            .scan(0.0, |sum, on| {
-                *sum += on * 0.001;
-                Some(*sum)
-            })
-            .collect();
-        (y, u, air)
-    };
-    let (law, other) = (column(&proof.trace), column(&proof.compared));
-    let reference: Vec<f64> = match goal {
-        Goal::Track => proof.trace.samples.iter().map(|s| s.reference).collect(),
-        Goal::Maximise => Vec::new(),
-    };
-    let runs = [
-        LoopRun {
-            label: proof.compared_name,
-            y: &other.0,
-            u: &other.1,
-            air: &other.2,
-        },
-        LoopRun {
-            label: "the designed law",
-            y: &law.0,
-            u: &law.1,
-            air: &law.2,
-        },
-    ];
-    closed_loop(&ClosedLoop {
-        title: "The law on the continuous-time plant, noisy sensor",
-        y_label: "friction gain y",
-        air_label: "",
-        sample_period_s: 0.001,
-        reference: &reference,
-        runs: &runs,
-        window_s: Some((0.0, 6.0)),
-    })
+    console.show(&tried, &keys, &written)
 }

@@ -1,9 +1,17 @@
-//! The commands of the program, one file each: arguments in, library calls, words or one JSON document out.
+//! The commands of the program, one file each: they parse, call [`host_fit::steps`] and hand the result to one of three
+//! renderers: [`words`], [`page`] with its [`drawings`], and JSON, which is the result itself ([`Console::show`]).
 
+use std::collections::BTreeMap;
 use std::io::{self, IsTerminal, Write};
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
+use host_fit::search::Snapshot;
+use host_fit::steps::Onlooker;
 use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use words::Words;
 
 pub(crate) mod average;
 pub(crate) mod codegen;
@@ -12,13 +20,17 @@ pub(crate) mod delay;
 pub(crate) mod demo;
 pub(crate) mod design;
 pub(crate) mod diagnose;
+mod drawings;
 mod effect_files;
 pub(crate) mod effects;
 pub(crate) mod extend;
 pub(crate) mod identify;
 mod interrupt;
-mod scores;
+mod load;
+mod page;
+pub(crate) mod rules;
 pub(crate) mod simulate;
+mod words;
 
 /// How a command talks to the user.
 #[derive(Debug, Clone, Copy)]
@@ -28,7 +40,33 @@ pub(crate) struct Console {
 }
 
 impl Console {
-    /// Prints a result in words; silent with `--json`.
+    /// Prints a result: in words with the files that were `written`, or as the one JSON document, which names the
+    /// files of `keys` before the result's own keys.
+    pub(crate) fn show<T: Words + Serialize>(
+        self,
+        result: &T,
+        keys: &[(&str, &Path)],
+        written: &[&Path],
+    ) -> anyhow::Result<()> {
+        #[derive(Serialize)]
+        struct Document<'a, T> {
+            #[serde(flatten)]
+            files: BTreeMap<&'a str, &'a Path>,
+            #[serde(flatten)]
+            result: &'a T,
+        }
+        if self.json {
+            let files = keys.iter().copied().collect();
+            return self.document(&Document { files, result });
+        }
+        print(&result.words())?;
+        for path in written {
+            print(&format!("written to {}", path.display()))?;
+        }
+        Ok(())
+    }
+
+    /// Prints a text; silent with `--json`.
     pub(crate) fn say(self, text: &str) -> anyhow::Result<()> {
         if self.json {
             return Ok(());
@@ -36,17 +74,8 @@ impl Console {
         print(text)
     }
 
-    /// Warns at once, before a long computation: on standard error where that is a terminal, otherwise among the words
-    /// of the result; with `--json` the document is to carry it.
-    pub(crate) fn warn(self, text: &str) -> anyhow::Result<()> {
-        if io::stderr().is_terminal() {
-            return Ok(writeln!(io::stderr(), "warning: {text}")?);
-        }
-        self.say(&format!("warning: {text}"))
-    }
-
-    /// Prints the JSON document of the command; silent without `--json`.
-    pub(crate) fn document(self, value: &impl serde::Serialize) -> anyhow::Result<()> {
+    /// Prints a JSON document; silent without `--json`.
+    pub(crate) fn document(self, value: &impl Serialize) -> anyhow::Result<()> {
         if !self.json {
             return Ok(());
         }
@@ -67,11 +96,56 @@ impl Console {
         bar
     }
 
-    /// A sign of life on standard error while `what` goes on; invisible when that is no terminal.
-    pub(crate) fn spinner(self, what: &str) -> ProgressBar {
-        let bar = self.progress(0, "{spinner} {msg} ({elapsed})");
-        bar.set_message(what.to_owned());
-        bar
+    /// Shows on standard error what a step is at, and lets Ctrl-C end it.
+    pub(crate) fn watch(self) -> Watch {
+        Watch {
+            console: self,
+            bar: self.progress(0, "{spinner} {msg} ({elapsed})"),
+            interrupt: interrupt::watch(),
+        }
+    }
+}
+
+/// The user, watching a step.
+pub(crate) struct Watch {
+    console: Console,
+    bar: ProgressBar,
+    interrupt: &'static AtomicBool,
+}
+
+impl Onlooker for Watch {
+    fn begins(&self, what: &str) {
+        self.bar.set_message(what.to_owned());
+        self.bar.reset_elapsed();
+    }
+
+    fn sees(&self, snapshot: &Snapshot) {
+        self.bar.set_message(format!(
+            "{} evaluations, best {:.5}",
+            snapshot.evaluations, snapshot.best
+        ));
+    }
+
+    /// A warning goes to standard error where that is a terminal, otherwise among the words of the result; with
+    /// `--json` the document carries it.
+    fn hears(&self, warning: &str) {
+        let text = format!("warning: {warning}");
+        if io::stderr().is_terminal() {
+            self.bar.suspend(|| eprintln!("{text}"));
+        } else {
+            // A reader that has gone away will not miss it.
+            let _ = self.console.say(&text);
+        }
+    }
+
+    fn interrupt(&self) -> &AtomicBool {
+        self.interrupt
+    }
+}
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
     }
 }
 

@@ -53,10 +53,11 @@ pub struct Planned {
     pub irregular: f64,
 }
 
-/// The best pulses and what they are worth.
-#[derive(Clone, Debug, PartialEq)]
+/// The best pulses and what they are worth. Serialises to the keys under `maximise` of `design --json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Optimum {
     /// The law.
+    #[serde(skip)]
     pub law: Maximise,
     /// Mean friction of the model from 20 s to 40 s.
     pub mean: f64,
@@ -78,10 +79,12 @@ pub struct Optimum {
     /// The best of those: its mean friction before it grew.
     pub refused_mean: Option<f64>,
     /// Largest pole moduli, valve closed and open.
+    #[serde(rename = "pole_moduli")]
     pub moduli: [f64; 2],
     /// Where the optimum leaves what was recorded; `None` if nothing is known of that.
     pub outside: Option<Outside>,
     /// The search over a finite horizon, if asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub planned: Option<Planned>,
 }
 

@@ -9,7 +9,7 @@ use closed_loop::{
     Controlled, Controller, Figures, ModelFlow, OpenLoop, Relay, Trace, TrackingController, run,
 };
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Samples of a trial.
 pub const TRIAL_SAMPLES: usize = 12_000;
@@ -44,35 +44,45 @@ pub struct Trial<F> {
 }
 
 /// One law on one flow.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Case {
     /// What it is about.
     pub group: CaseGroup,
     /// What is different, in words.
     pub name: String,
     /// What came of it, from 4 s on.
+    #[serde(flatten)]
     pub figures: Figures,
     /// Mean friction of the same flow under steady blowing.
+    #[serde(rename = "steady_mean")]
     pub steady: f64,
     /// Lowest 250 ms mean of the friction.
+    #[serde(rename = "lowest_mean")]
     pub lowest: f64,
     /// Whether the flow stays attached wherever steady blowing keeps it so: the
     /// lowest mean is above half of what was asked for or steady blowing gives.
     pub kept: bool,
 }
 
-/// All trials of a law.
-#[derive(Clone, Debug, PartialEq)]
+/// All trials of a law. Serialises to the keys `cases` and `relay` of `design --json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Proof {
     /// The trials.
     pub cases: Vec<Case>,
     /// The run on the plant as it is.
+    #[serde(skip)]
     pub trace: Trace,
     /// Something simpler on the same plant: a relay with the same hold times, or
-    /// steady blowing.
+    /// steady blowing; here its figures.
+    #[serde(rename = "relay", serialize_with = "figures")]
     pub compared: Trace,
     /// What it is.
+    #[serde(skip)]
     pub compared_name: &'static str,
+}
+
+fn figures<S: Serializer>(trace: &Trace, to: S) -> Result<S::Ok, S::Error> {
+    Figures::of(trace, JUDGED_FROM).serialize(to)
 }
 
 fn steadily(reference: f64) -> impl Iterator<Item = f64> {

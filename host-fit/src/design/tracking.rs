@@ -9,6 +9,7 @@ use model_core::control::budget::Budget;
 use model_core::control::tracking::Unusable;
 use model_core::control::{Reachable, Tracking};
 use model_core::delay::Transport;
+use serde::{Serialize, Serializer};
 
 /// What is wanted of a tracking law.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,10 +31,11 @@ pub struct TrackRequest {
     pub least_air: bool,
 }
 
-/// A tracking law and what the design rests on.
-#[derive(Clone, Debug, PartialEq)]
+/// A tracking law and what the design rests on. Serialises to the keys under `track` of `design --json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrackDesign {
-    /// The law.
+    /// The law; here only its interval.
+    #[serde(rename = "reachable", serialize_with = "reachable")]
     pub law: Track,
     /// The flow with the valve closed.
     pub natural: Steady,
@@ -43,9 +45,14 @@ pub struct TrackDesign {
     /// (α·y* − d)/(Σb + y*·Σc).
     pub equivalent_duty: f64,
     /// The duty that the law takes on the model.
+    #[serde(rename = "duty_on_model")]
     pub duty: f64,
     /// What deserves to be said.
     pub remarks: Vec<String>,
+}
+
+fn reachable<S: Serializer>(law: &Track, to: S) -> Result<S::Ok, S::Error> {
+    law.reachable.serialize(to)
 }
 
 /// Samples by which a pulse can be cut at its arrival when the delay changes

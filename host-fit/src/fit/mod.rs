@@ -5,6 +5,7 @@ mod drift;
 mod free_run;
 mod lean;
 mod levenberg;
+mod rules;
 mod starts;
 
 pub use candidate::{CandidateError, fit_with_effect};
@@ -13,3 +14,4 @@ pub use drift::restart_after;
 pub use free_run::{Fit, FitOptions, fit};
 pub use lean::{lean_base, settle_fixed_delay};
 pub use levenberg::StopReason;
+pub use rules::{RULES, Rules};

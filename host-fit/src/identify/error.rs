@@ -84,6 +84,17 @@ pub enum IdentifyError {
     NotConverged(#[from] linalg::NotConverged),
 }
 
+impl IdentifyError {
+    /// The record that is at fault, if it is one alone.
+    #[must_use]
+    pub fn record(&self) -> Option<&str> {
+        match self {
+            Self::TooShort { record, .. } | Self::BadSignal { record, .. } => Some(record),
+            _ => None,
+        }
+    }
+}
+
 /// Refuses data and structures that no search can make a model of.
 pub(crate) fn check(records: &[&Record], structure: &Structure) -> Result<(), IdentifyError> {
     let refuse = |what: String, remedy: &str| {

@@ -3,13 +3,16 @@
 use crate::data::{Record, Use};
 use crate::fit::{FitOptions, fit};
 use crate::model::Model;
+use serde::Serialize;
 
 /// Output-error refinement of the coefficients, delays unchanged.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Refinement {
     /// ε over the identify records before and after.
+    #[serde(rename = "identify_epsilon")]
     pub identify: (f64, f64),
     /// ε over the validate records before and after, if there are any.
+    #[serde(rename = "validate_epsilon")]
     pub validate: Option<(f64, f64)>,
     /// Whether the refined coefficients are those of the returned model: the
     /// held-out ε fell or, without held-out records, the one fitted.

@@ -103,6 +103,12 @@ pub(crate) fn inverse_where_known(a: &[f64], n: usize) -> Option<(Vec<f64>, Vec<
     Some((inverse.collect(), (0..n).map(takes_part).collect()))
 }
 
+/// Eigenvalues of a symmetric matrix (row-major, `n` × `n`). `None` if the decomposition fails.
+pub(crate) fn symmetric_eigenvalues(a: &[f64], n: usize) -> Option<Vec<f64>> {
+    let matrix = Mat::from_fn(n, n, |i, j| a[i * n + j]);
+    matrix.self_adjoint_eigenvalues(Side::Lower).ok()
+}
+
 /// Adds AᵀB to `out`; A and B are `rows` × `size`, column by column, `out` is
 /// `size` × `size`, column by column. Slices of other lengths are left alone.
 pub(crate) fn add_cross_products(out: &mut [f64], a: &[f64], b: &[f64], rows: usize, size: usize) {
@@ -232,5 +238,25 @@ mod tests {
             1e-12,
         );
         assert!(pole_magnitudes(&[0.0]).expect("converges").is_empty());
+    }
+
+    #[test]
+    fn eigenvalues_of_a_known_matrix() {
+        // Second differences: 2 − 2 cos(iπ/(n + 1)).
+        let n = 8;
+        let mut a = vec![0.0; n * n];
+        for i in 0..n {
+            a[i * n + i] = 2.0;
+            if i + 1 < n {
+                a[i * n + i + 1] = -1.0;
+                a[(i + 1) * n + i] = -1.0;
+            }
+        }
+        let mut found = symmetric_eigenvalues(&a, n).unwrap();
+        found.sort_by(f64::total_cmp);
+        for (i, value) in found.iter().enumerate() {
+            let exact = 2.0 - 2.0 * ((i + 1) as f64 * std::f64::consts::PI / (n + 1) as f64).cos();
+            assert!((value - exact).abs() < 1e-12);
+        }
     }
 }

@@ -5,15 +5,25 @@
 //! single step they are d per edge and no more. Beside the pairs, the whole span of delays is judged at once: the
 //! eigenvalues of the covariance of lagged inputs tell how many of them are free of the others.
 
-use crate::record::Record;
-use crate::set::DataSet;
+use crate::data::{DataSet, Place, Record, Use};
+use crate::linalg::symmetric_eigenvalues;
+use crate::rules::rules;
 
-/// Lags put side by side in the covariance.
-const MOST_LAGS: usize = 32;
-/// An eigenvalue below this share of the largest stands for a direction that noise decides.
-const NEGLIGIBLE: f64 = 0.01;
-/// Delays count as alike when they differ at less than this share of the samples at which they could.
-const ALIKE: f64 = 0.1;
+rules! {
+    /// What the commands of a data set can tell, and what deserves a remark.
+    pub struct Rules in "excitation";
+
+    /// Lags put side by side in the covariance.
+    lags: usize = 32, "", "judgement";
+    /// An eigenvalue below this share of the largest stands for a direction that noise decides.
+    negligible: f64 = 0.01, "share of the largest", "judgement: a tenth of the amplitude";
+    /// A command that separates fewer of the lags than this share leaves the rest to noise.
+    separated: f64 = 0.25, "share of the lags", "judgement";
+    /// Delays count as alike when they differ at less than this share of the samples at which they could.
+    alike: f64 = 0.1, "share of the samples", "judgement";
+    /// Fewer edges than this say nothing of how delays depend on the flow.
+    fewest_edges: usize = 4, "edges", "judgement";
+}
 
 /// What a fit is going to ask of the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,29 +45,43 @@ pub enum ExcitationError {
     NoIdentifyRecord,
     /// u never changes.
     #[error(
-        "the command is constant ({0}) in every identify record, so its effect cannot be told from the flow's own motion; record at least one switching of the command"
+        "{place}: the command is constant ({level}) in every identify record, so its effect cannot be told from the flow's own motion; record at least one switching of the command"
     )]
-    ConstantInput(f64),
+    ConstantInput {
+        /// The first identify record.
+        place: Box<Place>,
+        /// Its command.
+        level: f64,
+    },
     /// y never changes.
     #[error(
-        "the output is constant ({0}) in every identify record; check the sensor and the column y"
+        "{place}: the output is constant ({level}) in every identify record; check the sensor and the column y"
     )]
-    ConstantOutput(f64),
+    ConstantOutput {
+        /// The first identify record.
+        place: Box<Place>,
+        /// Its output.
+        level: f64,
+    },
     /// Records shorter than the model's memory.
     #[error(
-        "the longest identify record has {longest} samples, no more than the longest lag of {max_lag}; record for longer or lower the longest lag (--max-lag)"
+        "{place}: the longest identify record has {longest} samples, no more than the longest lag of {max_lag}; record for longer or lower the longest lag (--max-lag)"
     )]
     TooShort {
-        /// Samples in the longest identify record.
+        /// The longest identify record.
+        place: Box<Place>,
+        /// Its samples.
         longest: usize,
         /// The longest lag asked for.
         max_lag: usize,
     },
     /// Fewer equations than unknowns.
     #[error(
-        "the identify records give {equations} equations for {coefficients} coefficients; record for longer or use fewer lags"
+        "{place}: the identify records give {equations} equations for {coefficients} coefficients; record for longer or use fewer lags"
     )]
     TooFewSamples {
+        /// The longest identify record.
+        place: Box<Place>,
         /// Number of one-step equations.
         equations: usize,
         /// Number of unknowns.
@@ -152,7 +176,7 @@ impl Excitation {
             .iter()
             .map(|r| r.rising_edges + r.falling_edges)
             .sum();
-        if edges < 4 {
+        if edges < RULES.fewest_edges {
             remarks.push(format!(
                 "The command switches only {edges} time(s): a delay and time constants can be estimated, but nothing about how they depend on the flow."
             ));
@@ -164,12 +188,15 @@ impl Excitation {
                 *last as f64 * sample_period_s
             ));
         }
-        if edges >= 4 && self.distinct_on_times <= 1 && self.distinct_off_times <= 1 {
+        if edges >= RULES.fewest_edges
+            && self.distinct_on_times <= 1
+            && self.distinct_off_times <= 1
+        {
             remarks.push(
                 "All on-times are equal and all off-times are equal: a slow effect (droop, drift, hysteresis) cannot be told from the response itself. Add a record with other times.".into(),
             );
         }
-        if 4 * self.lags_separated < self.lags_tried {
+        if (self.lags_separated as f64) < RULES.separated * self.lags_tried as f64 {
             remarks.push(format!(
                 "Of {} input delays spread over the lags asked for, the commands separate about {}: least squares over many input delays will be decided by noise.",
                 self.lags_tried, self.lags_separated
@@ -184,34 +211,40 @@ impl Excitation {
 /// # Errors
 /// [`ExcitationError`] when no record is for identification, u or y is constant in all that are, or they are too short.
 pub fn check_excitation(set: &DataSet, demand: Demand) -> Result<Excitation, ExcitationError> {
-    let records: Vec<&Record> = set.identify().collect();
-    let longest = records
-        .iter()
-        .map(|r| r.len())
-        .max()
-        .ok_or(ExcitationError::NoIdentifyRecord)?;
+    let all = set.records.iter().enumerate();
+    let records: Vec<(usize, &Record)> = all.filter(|(_, r)| r.role == Use::Identify).collect();
+    let at = |index: usize| Box::new(set.place(index, None));
+    let Some((first, any)) = records.first() else {
+        return Err(ExcitationError::NoIdentifyRecord);
+    };
     // A record that starts blowing has its edge against the zero history.
     let varies = |r: &Record| r.u.iter().any(|u| Some(u) != r.u.first());
-    if !records.iter().any(|r| varies(r)) {
-        let level = records.first().and_then(|r| r.u.first()).copied();
-        return Err(ExcitationError::ConstantInput(level.unwrap_or(0.0)));
+    if !records.iter().any(|(_, r)| varies(r)) {
+        return Err(ExcitationError::ConstantInput {
+            place: at(*first),
+            level: any.u.first().copied().unwrap_or(0.0),
+        });
     }
-    if records
-        .iter()
-        .all(|r| r.y.iter().all(|y| Some(y) == r.y.first()))
-    {
-        let level = records.first().and_then(|r| r.y.first()).copied();
-        return Err(ExcitationError::ConstantOutput(level.unwrap_or(0.0)));
+    let still = |r: &Record| r.y.iter().all(|y| Some(y) == r.y.first());
+    if records.iter().all(|(_, r)| still(r)) {
+        return Err(ExcitationError::ConstantOutput {
+            place: at(*first),
+            level: any.y.first().copied().unwrap_or(0.0),
+        });
     }
+    let longest = records.iter().max_by_key(|(_, r)| r.len());
+    let (index, longest) = longest.map_or((0, 0), |(index, r)| (*index, r.len()));
     if longest <= demand.max_lag {
         return Err(ExcitationError::TooShort {
+            place: at(index),
             longest,
             max_lag: demand.max_lag,
         });
     }
-    let equations: usize = records.iter().map(|r| r.len() - 1).sum();
+    let equations: usize = records.iter().map(|(_, r)| r.len() - 1).sum();
     if equations < demand.coefficients {
         return Err(ExcitationError::TooFewSamples {
+            place: at(index),
             equations,
             coefficients: demand.coefficients,
         });
@@ -270,7 +303,7 @@ fn alike_ranges(separation: &[f64]) -> Vec<(usize, usize)> {
     let mut ranges: Vec<(usize, usize)> = Vec::new();
     for (d, &s) in separation.iter().enumerate() {
         reached = reached.max(s);
-        if s < ALIKE * reached {
+        if s < RULES.alike * reached {
             match ranges.last_mut() {
                 Some(range) if range.1 + 1 == d => range.1 = d,
                 _ => ranges.push((d, d)),
@@ -282,7 +315,7 @@ fn alike_ranges(separation: &[f64]) -> Vec<(usize, usize)> {
 
 /// Lags spread over 0 … max_lag: how many are tried, how many the covariance separates, its condition number.
 fn separated_lags(records: &[&Record], max_lag: usize) -> (usize, usize, f64) {
-    let count = MOST_LAGS.min(max_lag + 1);
+    let count = RULES.lags.min(max_lag + 1);
     let step = max_lag as f64 / (count - 1).max(1) as f64;
     let lags: Vec<usize> = (0..count)
         .map(|i| (i as f64 * step).round() as usize)
@@ -314,12 +347,13 @@ fn separated_lags(records: &[&Record], max_lag: usize) -> (usize, usize, f64) {
             }
         }
     }
-    let eigenvalues = symmetric_eigenvalues(covariance, count);
+    // Without a decomposition nothing is known to be separated.
+    let eigenvalues = symmetric_eigenvalues(&covariance, count).unwrap_or_default();
     let largest = eigenvalues.iter().copied().fold(0.0, f64::max);
     let smallest = eigenvalues.iter().copied().fold(f64::INFINITY, f64::min);
     let separated = eigenvalues
         .iter()
-        .filter(|e| **e > NEGLIGIBLE * largest && largest > 0.0)
+        .filter(|e| **e > RULES.negligible * largest && largest > 0.0)
         .count();
     let condition = if smallest > 0.0 {
         (largest / smallest).min(1e16)
@@ -329,49 +363,10 @@ fn separated_lags(records: &[&Record], max_lag: usize) -> (usize, usize, f64) {
     (count, separated, condition)
 }
 
-/// Eigenvalues of a symmetric matrix (row-major, n × n), by cyclic Jacobi rotations; for n up to a few dozen.
-fn symmetric_eigenvalues(mut a: Vec<f64>, n: usize) -> Vec<f64> {
-    let size: f64 = a.iter().map(|x| x * x).sum();
-    for _ in 0..50 {
-        let mut off = 0.0;
-        for p in 0..n {
-            for q in p + 1..n {
-                off += a[p * n + q] * a[p * n + q];
-            }
-        }
-        if off <= 1e-28 * size {
-            break;
-        }
-        for p in 0..n {
-            for q in p + 1..n {
-                let apq = a[p * n + q];
-                if apq == 0.0 {
-                    continue;
-                }
-                let theta = (a[q * n + q] - a[p * n + p]) / (2.0 * apq);
-                let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-                let c = 1.0 / (t * t + 1.0).sqrt();
-                let s = t * c;
-                for k in 0..n {
-                    let (x, y) = (a[k * n + p], a[k * n + q]);
-                    a[k * n + p] = c * x - s * y;
-                    a[k * n + q] = s * x + c * y;
-                }
-                for k in 0..n {
-                    let (x, y) = (a[p * n + k], a[q * n + k]);
-                    a[p * n + k] = c * x - s * y;
-                    a[q * n + k] = s * x + c * y;
-                }
-            }
-        }
-    }
-    (0..n).map(|i| a[i * n + i]).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Use;
+    use crate::data::Use;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -452,26 +447,6 @@ mod tests {
         );
         assert!(random.condition < square.condition);
         assert!(step.remarks[0].contains("1 time"), "{:?}", step.remarks);
-    }
-
-    #[test]
-    fn eigenvalues_of_a_known_matrix() {
-        // Second differences: 2 − 2 cos(iπ/(n + 1)).
-        let n = 8;
-        let mut a = vec![0.0; n * n];
-        for i in 0..n {
-            a[i * n + i] = 2.0;
-            if i + 1 < n {
-                a[i * n + i + 1] = -1.0;
-                a[(i + 1) * n + i] = -1.0;
-            }
-        }
-        let mut found = symmetric_eigenvalues(a, n);
-        found.sort_by(f64::total_cmp);
-        for (i, value) in found.iter().enumerate() {
-            let exact = 2.0 - 2.0 * ((i + 1) as f64 * std::f64::consts::PI / (n + 1) as f64).cos();
-            assert!((value - exact).abs() < 1e-12);
-        }
     }
 
     #[test]

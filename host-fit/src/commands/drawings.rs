@@ -1,0 +1,142 @@
+//! Results as pictures.
+
+use closed_loop::{SAMPLE_PERIOD_S, Trace};
+use host_fit::data::{DataSet, Record};
+use host_fit::design::Proof;
+use host_fit::diagnose::Diagnosis;
+use host_fit::picture::{
+    ClosedLoop, Ladder, LadderRecord, LadderStep, LoopRun, Overlay, Run, closed_loop, ladder,
+    overlay,
+};
+
+use super::words::role_name;
+
+/// One picture per record: measurement and free runs, labelled.
+pub(crate) fn overlays(records: &[Record], runs: &[(&str, &[Vec<f64>])]) -> Vec<(String, String)> {
+    let picture = |(index, record): (usize, &Record)| {
+        let models: Vec<Run<'_>> = runs
+            .iter()
+            .filter_map(|(label, runs)| {
+                let y = runs.get(index)?;
+                Some(Run { label, y })
+            })
+            .collect();
+        let title = format!("{} ({})", record.name, role_name(record.role));
+        let svg = overlay(&Overlay {
+            title: &title,
+            y_label: "friction gain y",
+            sample_period_s: record.sample_period_s,
+            t0_s: record.t0,
+            u: &record.u,
+            y: &record.y,
+            y_sd: record.y_sd.as_deref(),
+            y_min: record.y_min.as_deref(),
+            y_max: record.y_max.as_deref(),
+            models: &models,
+            window_s: None,
+        });
+        (record.name.clone(), svg)
+    };
+    records.iter().enumerate().map(picture).collect()
+}
+
+/// The held-out error step by step, as a picture.
+pub(crate) fn ladder_picture(diagnosis: &Diagnosis, set: &DataSet) -> String {
+    let finite = diagnosis
+        .ladder
+        .iter()
+        .filter(|rung| rung.validate_rmse.is_finite());
+    let steps: Vec<LadderStep<'_>> = finite
+        .map(|rung| LadderStep {
+            label: &rung.step,
+            rmse: rung.validate_rmse,
+        })
+        .collect();
+    let records: [LadderRecord<'_>; 0] = [];
+    ladder(&Ladder {
+        title: set.title.as_deref().unwrap_or("Held-out error"),
+        y_unit: "y",
+        steps: &steps,
+        records: &records,
+        noise_rmse: diagnosis.ladder.last().and_then(|rung| rung.noise_rmse),
+    })
+}
+
+/// The law beside something simpler on the plant.
+pub(crate) fn proof_picture(proof: &Proof, tracks: bool) -> String {
+    let runs = [
+        (proof.compared_name, &proof.compared),
+        ("the designed law", &proof.trace),
+    ];
+    let reference: Vec<f64> = match tracks {
+        true => proof.trace.samples.iter().map(|s| s.reference).collect(),
+        false => Vec::new(),
+    };
+    loop_picture(&LoopPicture {
+        title: "The law on the continuous-time plant, noisy sensor",
+        air: true,
+        reference: &reference,
+        runs: &runs,
+        seconds: 6.0,
+    })
+}
+
+/// Controllers beside each other on one flow.
+pub(crate) struct LoopPicture<'a> {
+    pub(crate) title: &'a str,
+    /// Whether the air used is shown.
+    pub(crate) air: bool,
+    /// y; empty for none.
+    pub(crate) reference: &'a [f64],
+    /// Labels and runs.
+    pub(crate) runs: &'a [(&'a str, &'a Trace)],
+    /// How much is shown.
+    pub(crate) seconds: f64,
+}
+
+pub(crate) fn loop_picture(picture: &LoopPicture<'_>) -> String {
+    struct Series {
+        y: Vec<f64>,
+        u: Vec<f64>,
+        air: Vec<f64>,
+    }
+    let series = |trace: &Trace| {
+        let on = trace.samples.iter().map(|s| f64::from(u8::from(s.on)));
+        let used = |sum: &mut f64, on: f64| {
+            *sum += on * SAMPLE_PERIOD_S;
+            Some(*sum)
+        };
+        Series {
+            y: trace.samples.iter().map(|s| s.friction).collect(),
+            air: if picture.air {
+                on.clone().scan(0.0, used).collect()
+            } else {
+                Vec::new()
+            },
+            u: on.collect(),
+        }
+    };
+    let all: Vec<(&str, Series)> = picture
+        .runs
+        .iter()
+        .map(|(label, trace)| (*label, series(trace)))
+        .collect();
+    let runs: Vec<LoopRun<'_>> = all
+        .iter()
+        .map(|(label, series)| LoopRun {
+            label,
+            y: &series.y,
+            u: &series.u,
+            air: &series.air,
+        })
+        .collect();
+    closed_loop(&ClosedLoop {
+        title: picture.title,
+        y_label: "friction gain y",
+        air_label: "",
+        sample_period_s: SAMPLE_PERIOD_S,
+        reference: picture.reference,
+        runs: &runs,
+        window_s: Some((0.0, picture.seconds)),
+    })
+}

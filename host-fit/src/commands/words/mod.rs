@@ -1,0 +1,440 @@
+//! Results in words: what a command prints without `--json`.
+
+mod delay;
+mod design;
+mod finding;
+
+pub(crate) use finding::ladder_table;
+pub(super) use finding::{ladder_rows, ranking_rows};
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use host_fit::data::{AverageSummary, Use};
+use host_fit::diagnose::ParameterEstimate;
+use host_fit::identify::Refinement;
+use host_fit::indicators::{Indicators, Scores};
+use host_fit::model::{Delay, Law, Model, TransportLaw};
+use host_fit::picture::significant;
+use host_fit::rules::Rulebook;
+use host_fit::steps::{
+    Average, Comparison, Constants, EffectEntry, Extension, Identification, Simulation,
+};
+
+use model_core::effect::Unit;
+
+/// A result that can be told.
+pub(crate) trait Words {
+    /// It in lines of text.
+    fn words(&self) -> String;
+}
+
+/// Pieces of text one below the other.
+fn lines(pieces: impl IntoIterator<Item = String>) -> String {
+    pieces.into_iter().collect::<Vec<_>>().join("\n")
+}
+
+impl Words for Average {
+    fn words(&self) -> String {
+        let each = self.recordings.iter().map(Words::words);
+        lines(each.chain([format!("hash {}", self.hash)]))
+    }
+}
+
+impl Words for AverageSummary {
+    fn words(&self) -> String {
+        let mut text = format!(
+            "{}: {} periods of {} samples ({} s) averaged, aligned on {}",
+            self.name,
+            self.periods_used,
+            self.period_samples,
+            self.period_samples as f64 * self.sample_period_s,
+            if self.aligned_on_edges {
+                "edges"
+            } else {
+                "the period"
+            },
+        );
+        match self.mean_standard_error {
+            Some(e) => text.push_str(&format!("; standard error of y {e:.2e} (rms)")),
+            None => text.push_str("; one period alone gives no standard error"),
+        }
+        for d in &self.dropped {
+            text.push_str(&format!(
+                "\n  dropped {}: {}, first at line {}",
+                d.periods,
+                d.defect.words(),
+                d.first_line
+            ));
+        }
+        if self.left_over_samples > 0 {
+            text.push_str(&format!(
+                "\n  {} samples at the end are no whole period",
+                self.left_over_samples
+            ));
+        }
+        text
+    }
+}
+
+impl Words for Identification {
+    fn words(&self) -> String {
+        let mut told = vec![
+            describe(&self.model),
+            format!(
+                "state lags {:?}, product lags {:?}",
+                self.model.state_lags, self.model.product_lags
+            ),
+            format!(
+                "{} {} after {} evaluations in {:.1} s; {}",
+                self.objective.name(),
+                short(self.objective_value),
+                self.evaluations,
+                self.wall_time_s,
+                self.stop
+            ),
+        ];
+        told.extend(self.refinement.as_ref().map(refinement_words));
+        told.extend(self.remarks.iter().cloned());
+        told.push(table(&self.scores));
+        lines(told)
+    }
+}
+
+fn refinement_words(refinement: &Refinement) -> String {
+    let pair = |(before, after): (f64, f64)| format!("{} → {}", short(before), short(after));
+    let mut text = format!(
+        "refined on the free run: identify ε {}",
+        pair(refinement.identify)
+    );
+    if let Some(validate) = refinement.validate {
+        text.push_str(&format!(", held-out ε {}", pair(validate)));
+    }
+    text.push_str(if refinement.kept {
+        "; kept"
+    } else {
+        "; not kept"
+    });
+    text
+}
+
+impl Words for Comparison {
+    fn words(&self) -> String {
+        let table = std::iter::once(table(&self.scores));
+        lines(table.chain(self.words.iter().cloned()))
+    }
+}
+
+impl Words for Extension {
+    fn words(&self) -> String {
+        let mut told = vec![describe(&self.model)];
+        if self.dropped_lags {
+            told.push("the leanest structure (one lag each) with the effect fits as well as the given one: it is kept".to_owned());
+        }
+        if !self.parameters.is_empty() {
+            told.push(parameter_table(&self.parameters));
+        }
+        told.push(changes(self.scores_before.as_ref(), &self.scores_after));
+        lines(told)
+    }
+}
+
+/// Fitted parameters as an aligned table.
+fn parameter_table(parameters: &BTreeMap<String, ParameterEstimate>) -> String {
+    let rows: Vec<Vec<String>> = parameters
+        .iter()
+        .map(|(name, p)| {
+            vec![
+                name.clone(),
+                p.unit.clone(),
+                short(p.value),
+                format!("{} … {}", short(p.low), short(p.high)),
+            ]
+        })
+        .collect();
+    aligned(&["parameter", "unit", "value", "95 % interval"], &rows, 2)
+}
+
+/// RMSE before → after → noise floor, record by record, the held-out ones and all together.
+fn changes(before: Option<&Scores>, after: &Scores) -> String {
+    let row = |name: &str, before: Option<&Indicators>, after: &Indicators| {
+        vec![
+            name.to_owned(),
+            role_name(after.role).to_owned(),
+            before.map_or_else(|| "diverges".into(), |b| format!("{:.5}", b.rmse)),
+            "→".to_owned(),
+            format!("{:.5}", after.rmse),
+            after
+                .noise_rmse
+                .map_or_else(|| "–".into(), |noise| format!("{noise:.5}")),
+        ]
+    };
+    let mut rows: Vec<Vec<String>> = after
+        .records
+        .iter()
+        .enumerate()
+        .map(|(index, a)| row(&a.name, before.and_then(|b| b.records.get(index)), a))
+        .collect();
+    let together = [
+        (before.map(|b| &b.identify), &after.identify),
+        (before.map(|b| &b.validate), &after.validate),
+    ];
+    for (b, a) in together {
+        if let Some(a) = a {
+            rows.push(row("together", b.and_then(Option::as_ref), a));
+        }
+    }
+    aligned(
+        &[
+            "record",
+            "use",
+            "RMSE before",
+            "",
+            "RMSE after",
+            "noise floor",
+        ],
+        &rows,
+        2,
+    )
+}
+
+impl Words for Simulation {
+    fn words(&self) -> String {
+        let run = format!(
+            "{} samples ({} s): mean y {:.4}, between {:.4} and {:.4}",
+            self.samples,
+            self.samples as f64 * self.sample_period_s,
+            self.mean,
+            self.lowest,
+            self.highest,
+        );
+        let outside = self.outside_training.iter();
+        lines(std::iter::once(run).chain(outside.map(|w| format!("extrapolation: {w}"))))
+    }
+}
+
+impl Words for Constants {
+    fn words(&self) -> String {
+        format!(
+            "{} bytes, effects: {}, law: {}",
+            self.bytes,
+            match self.effects.as_slice() {
+                [] => "none".to_owned(),
+                names => names.join(", "),
+            },
+            match &self.law {
+                None => "none".to_owned(),
+                Some(Law::Track(law)) => format!("holds {}", law.reference),
+                Some(Law::Maximise(law)) => format!("pulses every {} samples", law.period),
+            }
+        )
+    }
+}
+
+/// The effects in a few words each.
+pub(crate) fn effect_table(effects: &[EffectEntry]) -> String {
+    let row = |e: &EffectEntry| [e.name, e.place, e.summary].map(str::to_owned).to_vec();
+    let rows: Vec<Vec<String>> = effects.iter().map(row).collect();
+    aligned(&["effect", "place", "what it is"], &rows, 3)
+}
+
+impl Words for EffectEntry {
+    fn words(&self) -> String {
+        let mut told = vec![
+            format!("{} ({})", self.name, self.place),
+            self.summary.to_owned(),
+            self.equation.to_owned(),
+        ];
+        if let Some(channel) = self.channel {
+            told.push(format!("needs the measured channel `{channel}`"));
+        }
+        let parameters = self.parameters.iter().map(|p| {
+            vec![
+                p.name.to_owned(),
+                p.unit.to_owned(),
+                short(p.low),
+                short(p.high),
+            ]
+        });
+        let rows: Vec<Vec<String>> = parameters.collect();
+        if !rows.is_empty() {
+            told.push(aligned(&["parameter", "unit", "low", "high"], &rows, 2));
+        }
+        told.push(format!("source: {}", self.source));
+        lines(told)
+    }
+}
+
+impl Words for Rulebook {
+    fn words(&self) -> String {
+        let rows: Vec<Vec<String>> = self
+            .rules
+            .iter()
+            .map(|rule| {
+                vec![
+                    rule.name.clone(),
+                    rule.value.to_string(),
+                    rule.unit.to_owned(),
+                ]
+            })
+            .collect();
+        let table = aligned(&["rule", "value", "unit"], &rows, 3);
+        let mut told = vec![format!("{}: {}", self.room, self.about)];
+        let mut rows = table.lines();
+        told.extend(rows.next().map(str::to_owned));
+        for (row, rule) in rows.zip(&self.rules) {
+            told.push(row.to_owned());
+            told.push(format!("    {}", rule.meaning));
+            told.push(format!("    ({})", rule.calibrated));
+        }
+        told.push(String::new());
+        lines(told)
+    }
+}
+
+/// `identify` or `validate`.
+pub(crate) fn role_name(role: Use) -> &'static str {
+    match role {
+        Use::Identify => "identify",
+        Use::Validate => "validate",
+    }
+}
+
+/// The model in a few words: its structure, delays and effects.
+pub(crate) fn describe(model: &Model) -> String {
+    let delay = match &model.delay {
+        Delay::Fixed { delays } => format!("fixed delay {delays:?} samples"),
+        Delay::Law(law) => format!("delay {}", law_in_words(law)),
+    };
+    let kind = if model.averaging.averaged_model {
+        "averaged model"
+    } else {
+        "model"
+    };
+    let mut text = format!(
+        "{kind} N1 = {}, N2 = {}, N3 = {}; {delay}",
+        model.state_lags.len(),
+        model.product_lags.len(),
+        model.inputs()
+    );
+    if !model.effects.is_empty() {
+        let names: Vec<&str> = model.effects.iter().map(|e| e.name.as_str()).collect();
+        let _ = write!(text, "; with {}", names.join(", "));
+    }
+    text
+}
+
+/// The law with its values: times in ms, everything else in its unit.
+fn law_in_words(law: &TransportLaw) -> String {
+    let mut words = law
+        .spec
+        .law
+        .map_or(law.spec.name, |card| card.words)
+        .to_owned();
+    for (parameter, value) in law.spec.parameters.iter().zip(&law.parameters) {
+        let value = match parameter.unit {
+            Unit::Second => format!("{} ms", significant(1e3 * value, 3)),
+            _ => significant(*value, 4),
+        };
+        words = words.replacen("{}", &value, 1);
+    }
+    words
+}
+
+const HEAD: [&str; 8] = [
+    "record", "use", "FIT %", "rho", "RMSE", "noise", "epsilon", "inside",
+];
+
+fn row(i: &Indicators) -> [String; 8] {
+    // A free run that diverged has no numbers.
+    let number = |value: f64, digits: usize| {
+        if value.is_finite() {
+            format!("{value:.digits$}")
+        } else {
+            "–".to_owned()
+        }
+    };
+    [
+        i.name.clone(),
+        role_name(i.role).to_owned(),
+        number(i.fit_percent, 2),
+        number(i.correlation, 4),
+        number(i.rmse, 5),
+        i.noise_rmse
+            .map_or_else(|| "–".into(), |n| format!("{n:.5}")),
+        number(i.epsilon, 4),
+        i.inside_envelope
+            .map_or_else(|| "–".into(), |f| format!("{:.1} %", 100.0 * f)),
+    ]
+}
+
+/// The indicators, record by record and together.
+pub(crate) fn score_rows(scores: &Scores) -> Vec<[String; 8]> {
+    let mut all: Vec<[String; 8]> = scores.records.iter().map(row).collect();
+    for together in [&scores.identify, &scores.validate].into_iter().flatten() {
+        let mut together = row(together);
+        together[0] = "together".into();
+        all.push(together);
+    }
+    all
+}
+
+/// The indicators as an aligned table.
+fn table(scores: &Scores) -> String {
+    let rows: Vec<Vec<String>> = score_rows(scores).into_iter().map(Vec::from).collect();
+    aligned(&HEAD, &rows, 2)
+}
+
+/// Rows under a head, the first `left` columns left-aligned, the others right-aligned.
+pub(crate) fn aligned(head: &[&str], rows: &[Vec<String>], left: usize) -> String {
+    let width = |column: usize| {
+        rows.iter()
+            .filter_map(|row| row.get(column))
+            .map(|cell| cell.chars().count())
+            .chain(head.get(column).map(|cell| cell.chars().count()))
+            .max()
+            .unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..head.len()).map(width).collect();
+    let line = |cells: &[String]| {
+        let padded = cells.iter().zip(&widths).enumerate();
+        let text: Vec<String> = padded
+            .map(|(column, (cell, width))| {
+                if column < left {
+                    format!("{cell:<width$}")
+                } else {
+                    format!("{cell:>width$}")
+                }
+            })
+            .collect();
+        text.join("  ").trim_end().to_owned()
+    };
+    let head: Vec<String> = head.iter().map(|cell| (*cell).to_owned()).collect();
+    let mut text = line(&head);
+    for row in rows {
+        text.push('\n');
+        text.push_str(&line(row));
+    }
+    text
+}
+
+/// A number with three significant digits, for text.
+pub(crate) fn short(value: f64) -> String {
+    significant(value, 3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_line_up_whatever_the_letters() {
+        let rows = [
+            vec!["ρ-set".to_owned(), "1.0".to_owned()],
+            vec!["b".to_owned(), "–".to_owned()],
+        ];
+        let text = aligned(&["name", "value"], &rows, 1);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines, ["name   value", "ρ-set    1.0", "b          –"]);
+    }
+}

@@ -1,0 +1,44 @@
+//! Raw recordings to a data set.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::StepError;
+use crate::data::{AverageSummary, Averaging, DataSet, average_files};
+
+/// What averaging gave. Serialises to the keys of `average --json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Average {
+    /// The phase-averaged records.
+    #[serde(skip)]
+    pub set: DataSet,
+    /// Hash of the data set.
+    pub hash: String,
+    /// What became of each recording.
+    pub recordings: Vec<AverageSummary>,
+}
+
+/// Phase-averages raw recordings in constant memory; those named in `validate` (file name without its ending) are held
+/// out. `progress` hears the index of the file being read and the bytes read of it.
+///
+/// # Errors
+/// [`StepError`] naming file and line, or the name that no recording has.
+pub fn average(
+    recordings: &[&Path],
+    validate: &[String],
+    averaging: &Averaging,
+    progress: &mut dyn FnMut(usize, u64),
+) -> Result<Average, StepError> {
+    let stems: Vec<_> = recordings.iter().filter_map(|p| p.file_stem()).collect();
+    let unknown = |name: &&String| !stems.iter().any(|stem| *stem == name.as_str());
+    if let Some(name) = validate.iter().find(unknown) {
+        return Err(StepError::NoSuchRecording(name.clone()));
+    }
+    let (set, recordings) = average_files(recordings, validate, averaging, progress)?;
+    Ok(Average {
+        hash: set.hash.clone(),
+        set,
+        recordings,
+    })
+}

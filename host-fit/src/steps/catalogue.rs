@@ -1,0 +1,68 @@
+//! The effects that can be missing, as data.
+
+use model_core::effect::{Place, Spec};
+use model_core::effects::SPECS;
+use serde::Serialize;
+
+/// An effect of the catalogue. Serialises to the keys of `effects --json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EffectEntry {
+    /// Its name.
+    pub name: &'static str,
+    /// Where it acts: `jet`, `delay`, `flow` or `sensor`.
+    pub place: &'static str,
+    /// What it is.
+    pub summary: &'static str,
+    /// Its equation.
+    pub equation: &'static str,
+    /// The measured channel that it needs.
+    pub channel: Option<&'static str>,
+    /// Where it is described.
+    pub source: &'static str,
+    /// Its parameters.
+    pub parameters: Vec<ParameterEntry>,
+}
+
+/// A parameter of an effect.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterEntry {
+    /// Its name.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Lowest value that is tried.
+    pub low: f64,
+    /// Highest.
+    pub high: f64,
+}
+
+impl From<&'static Spec> for EffectEntry {
+    fn from(spec: &'static Spec) -> Self {
+        let parameters = spec.parameters.iter().map(|p| ParameterEntry {
+            name: p.name,
+            unit: p.unit.symbol(),
+            low: p.low,
+            high: p.high,
+        });
+        Self {
+            name: spec.name,
+            place: match spec.place {
+                Place::Jet => "jet",
+                Place::Delay => "delay",
+                Place::Flow => "flow",
+                Place::Sensor => "sensor",
+            },
+            summary: spec.summary,
+            equation: spec.equation,
+            channel: spec.channel,
+            source: spec.source,
+            parameters: parameters.collect(),
+        }
+    }
+}
+
+/// Every effect of the catalogue.
+#[must_use]
+pub fn catalogue() -> Vec<EffectEntry> {
+    SPECS.iter().map(EffectEntry::from).collect()
+}

@@ -1,0 +1,81 @@
+//! A control law from a model, and the law tried in the loop.
+
+use serde::Serialize;
+
+use super::StepError;
+use crate::design::{
+    MaximiseRequest, Optimum, Proof, TrackDesign, TrackRequest, Trial, maximise, prove,
+    prove_pulses, track,
+};
+use crate::model::{Law, Model};
+use closed_loop::Controlled;
+
+/// What a law is for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DesignRequest {
+    /// Hold the friction at a value.
+    Track(TrackRequest),
+    /// The most friction for the air.
+    Maximise(MaximiseRequest),
+}
+
+/// A designed law. Serialises to the keys of `design --json`, those of the trials left out: they are a [`Proof`]'s.
+#[derive(Clone, Debug, Serialize)]
+pub struct Design {
+    /// The model with its law.
+    #[serde(skip)]
+    pub model: Model,
+    /// The law.
+    pub law: Law,
+    /// What the design rests on.
+    #[serde(flatten)]
+    pub outcome: Outcome,
+}
+
+/// What a design rests on.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Outcome {
+    /// Of a tracking law.
+    Track(TrackDesign),
+    /// Of a maximising law.
+    Maximise(Optimum),
+}
+
+/// Designs the law that `request` asks for and puts it into the model.
+///
+/// # Errors
+/// [`StepError::Design`] with the reason: out of reach, a model that does not settle, not from rest, not at 1 kHz.
+pub fn design(model: &Model, request: &DesignRequest) -> Result<Design, StepError> {
+    let (law, outcome) = match request {
+        DesignRequest::Track(request) => {
+            let design = track(model, request)?;
+            (Law::Track(design.law.clone()), Outcome::Track(design))
+        }
+        DesignRequest::Maximise(request) => {
+            let optimum = maximise(model, request)?;
+            let law = Law::Maximise(optimum.law.clone());
+            (law, Outcome::Maximise(optimum))
+        }
+    };
+    Ok(Design {
+        model: Model {
+            law: Some(law.clone()),
+            ..model.clone()
+        },
+        law,
+        outcome,
+    })
+}
+
+/// Tries the law of `design` on the flow as it is expected (`plant`) and on others; a tracking law also on its own
+/// model. `blown` is the friction of the expected flow under steady blowing, y.
+pub fn try_out<F>(design: &Design, blown: f64, plant: &Trial<F>, others: &[Trial<F>]) -> Proof
+where
+    F: Controlled + Clone + Sync,
+{
+    match &design.law {
+        Law::Track(law) => prove(&design.model, law, plant, others),
+        Law::Maximise(law) => prove_pulses(law, blown, plant, others),
+    }
+}

@@ -1,0 +1,132 @@
+//! Why a step was not done.
+
+use crate::codegen::CodegenError;
+use crate::data::{AverageError, DataError, Place};
+use crate::design::DesignError;
+use crate::diagnose::DiagnoseError;
+use crate::excitation::ExcitationError;
+use crate::extend::ExtendError;
+use crate::identify::IdentifyError;
+use crate::model::{DefineError, ModelError};
+use crate::simulate::SimulateError;
+use crate::user_effect::DefinitionError;
+use thiserror::Error;
+
+/// Why a step was not done: one paragraph with the remedy.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum StepError {
+    /// The recordings are at fault.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// Raw recordings cannot be averaged.
+    #[error(transparent)]
+    Average(#[from] AverageError),
+    /// The recordings are in order, but say too little.
+    #[error(transparent)]
+    Excitation(#[from] ExcitationError),
+    /// The model file is at fault.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A user's own effect is at fault.
+    #[error(transparent)]
+    Definition(#[from] DefinitionError),
+    /// A user's own effect has the name of another.
+    #[error(transparent)]
+    Define(#[from] DefineError),
+    /// No model could be identified.
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    /// No model could be identified, because of one record.
+    #[error("{place}: {cause}")]
+    IdentifyRecord {
+        /// The record's file.
+        place: Box<Place>,
+        /// Why.
+        cause: IdentifyError,
+    },
+    /// A free run could not be made.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// There is no diagnosis.
+    #[error(transparent)]
+    Diagnose(#[from] DiagnoseError),
+    /// The model was not extended.
+    #[error(transparent)]
+    Extend(#[from] ExtendError),
+    /// No law was designed.
+    #[error(transparent)]
+    Design(#[from] DesignError),
+    /// No constants were generated.
+    #[error(transparent)]
+    Codegen(#[from] CodegenError),
+    /// A model and recordings of different sampling periods.
+    #[error(
+        "{place}: `sample_period_s` is {data}, but the model was made for {model} s; its lags would mean other times. \
+         Identify a model on this data, or resample it"
+    )]
+    SamplePeriod {
+        /// The recordings.
+        place: Box<Place>,
+        /// Their sampling period, s.
+        data: f64,
+        /// The model's, s.
+        model: f64,
+    },
+    /// Factors that are none.
+    #[error("--factors takes finite numbers that are not below 0, as in --factors 1")]
+    BadFactors,
+    /// Factors without a law.
+    #[error("--factors multiplies a delay law: add --delay state-dependent or --delay-law")]
+    FactorsWithoutLaw,
+    /// No delay law could be measured.
+    #[error(
+        "no delay law could be found on these records; prescribe one with --delay-law P0,P1,P2, or use --delay fixed"
+    )]
+    NoDelayLaw,
+    /// A command sampled otherwise than the model.
+    #[error(
+        "{place}: the samples are {input} s apart, but the model has a sample period of {model} s; resample the command"
+    )]
+    InputPeriod {
+        /// The command file.
+        place: Box<Place>,
+        /// Its sampling period, s.
+        input: f64,
+        /// The model's, s.
+        model: f64,
+    },
+    /// A model that starts from measurements, and none are given.
+    #[error(
+        "{place}: no column `y`, but this model starts from measurements (`start = \"measured\"`); \
+         add the measured y of the first {samples} samples (later values are not used)"
+    )]
+    NoMeasurements {
+        /// The command file.
+        place: Box<Place>,
+        /// How many are needed.
+        samples: usize,
+    },
+    /// A channel that the model's effects need.
+    #[error("{place}: no column `{channel}`, which the model's effects need; add it")]
+    NoChannel {
+        /// The command file.
+        place: Box<Place>,
+        /// The channel.
+        channel: String,
+    },
+    /// The model is unstable for this command.
+    #[error(
+        "the model's free run diverges at t = {time_s} s of {place}: it is unstable for this command; \
+         identify it again, with fewer lags or `--objective free-run`"
+    )]
+    Diverges {
+        /// The command file.
+        place: Box<Place>,
+        /// When, s.
+        time_s: f64,
+    },
+    /// A record that is to be held out and is not there.
+    #[error("--validate {0}: no recording has this name; give a file name without its ending")]
+    NoSuchRecording(String),
+}

@@ -1,0 +1,120 @@
+//! Effects added to a model.
+
+use std::collections::BTreeMap;
+
+use serde::{Serialize, Serializer};
+
+use super::onlooker::watched;
+use super::{Onlooker, StepError, check_period, trained_in_free_run};
+use crate::data::DataSet;
+use crate::diagnose::ParameterEstimate;
+use crate::extend::{Extended, StructureKept, extend as refit};
+use crate::indicators::{Indicators, Scores, score};
+use crate::model::Model;
+
+/// A model with effects added. Serialises to the keys of `extend --json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Extension {
+    /// The model.
+    #[serde(skip)]
+    pub model: Model,
+    /// The effects that were added: one name, or a list of them.
+    #[serde(rename = "effect", serialize_with = "one_or_several")]
+    pub effects: Vec<String>,
+    /// Their parameters by name; with the effect's name before it where several were added.
+    pub parameters: BTreeMap<String, ParameterEstimate>,
+    /// Held-out indicators before; none if the model diverges on these records.
+    pub before: Option<Indicators>,
+    /// Held-out indicators after.
+    pub after: Option<Indicators>,
+    /// Where the lags come from.
+    pub structure: StructureKept,
+    /// Whether lags of the given model were dropped: the leanest structure with the effects is as good.
+    #[serde(skip)]
+    pub dropped_lags: bool,
+    /// Record by record.
+    pub records: Vec<RecordChange>,
+    /// All indicators before.
+    #[serde(skip)]
+    pub scores_before: Option<Scores>,
+    /// All indicators after.
+    #[serde(skip)]
+    pub scores_after: Scores,
+}
+
+/// What a record's error was and is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RecordChange {
+    /// The record.
+    pub name: String,
+    /// Root mean square error of the free run before, y; none if it diverges.
+    pub before_rmse: Option<f64>,
+    /// After.
+    pub after_rmse: f64,
+    /// The noise floor, y; none without `y_sd`.
+    pub noise_rmse: Option<f64>,
+}
+
+fn one_or_several<S: Serializer>(effects: &[String], serializer: S) -> Result<S::Ok, S::Error> {
+    match effects {
+        [one] => one.serialize(serializer),
+        several => several.serialize(serializer),
+    }
+}
+
+/// Adds the effects called `effects` to `model` and refits everything on the identify records of `set`.
+///
+/// # Errors
+/// [`StepError`]: an unknown or doubled effect, a missing channel, a model that diverges from every start.
+pub fn extend(
+    model: &Model,
+    set: &DataSet,
+    effects: &[String],
+    onlooker: &dyn Onlooker,
+) -> Result<Extension, StepError> {
+    check_period(model, set)?;
+    let records = model.targets(&set.records);
+    // A model that diverges on these records can still be extended.
+    let scores_before = score(model, &records).ok().map(|(scores, _)| scores);
+    let Extended {
+        model: mut extended,
+        structure,
+        parameters,
+        ..
+    } = watched(onlooker, "refitting everything", || {
+        refit(model, &records, effects)
+    })?;
+    let (scores_after, _) = score(&extended, &records)?;
+    extended.training = trained_in_free_run(set, &scores_after, model.training.seed);
+    let several = parameters.len() > 1;
+    let named = |effect: &str, name: String| match several {
+        true => format!("{effect}.{name}"),
+        false => name,
+    };
+    let parameters = parameters.into_iter().flat_map(|(effect, own)| {
+        let each = own.into_iter();
+        each.map(move |(name, estimate)| (named(&effect, name), estimate))
+    });
+    let before_rmse = |index: usize| Some(scores_before.as_ref()?.records.get(index)?.rmse);
+    let changes = scores_after.records.iter().enumerate();
+    Ok(Extension {
+        effects: effects.to_vec(),
+        parameters: parameters.collect(),
+        before: scores_before.as_ref().and_then(Scores::held_out).cloned(),
+        after: scores_after.held_out().cloned(),
+        structure,
+        dropped_lags: structure == StructureKept::Lean
+            && model.state_lags.len() + model.product_lags.len() > 2,
+        records: changes
+            .map(|(index, after)| RecordChange {
+                name: after.name.clone(),
+                before_rmse: before_rmse(index),
+                after_rmse: after.rmse,
+                noise_rmse: after.noise_rmse,
+            })
+            .collect(),
+        model: extended,
+        scores_before,
+        scores_after,
+    })
+}

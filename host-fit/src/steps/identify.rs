@@ -1,0 +1,342 @@
+//! Recordings to a model.
+
+use serde::{Serialize, Serializer};
+
+use super::measured_law::measured_law;
+use super::onlooker::{Searching, watched};
+use super::{Onlooker, StepError, finite_fit, training};
+use crate::data::{DataSet, Record};
+use crate::excitation::{Demand, ExcitationError, check_excitation};
+use crate::extend::{effects_for, extend};
+use crate::fit;
+use crate::identify::{
+    DelayLaw, Identified, IdentifyError, IdentifyOptions, InputDelay, Objective, Refinement,
+    Structure, identify as search,
+};
+use crate::indicators::{Scores, one_step_norm, score_new};
+use crate::model::{Delay, Model, Start};
+use crate::search::{Settings, StopReason};
+use crate::user_effect::Definition;
+use model_core::recursion::LagConvention;
+
+/// What to identify and how.
+#[derive(Debug, Clone)]
+pub struct IdentifyRequest {
+    /// Where the input delays come from.
+    pub delay: DelayKind,
+    /// Factors f of the delay law, one per input, in place of searching them; empty to search.
+    pub factors: Vec<f64>,
+    /// Identify the model of the moving averages, eqs. (14) and (15).
+    pub averaged: bool,
+    /// Number of state lags N1; by default 5, for the averaged model 2.
+    pub n1: Option<u16>,
+    /// Number of product lags N2; by default 10, for the averaged model 2.
+    pub n2: Option<u16>,
+    /// Number of input delays N3; by default 1, for the averaged model 2.
+    pub n3: Option<u16>,
+    /// Longest lag and input delay, samples; by default 500, at most a quarter of the shortest record.
+    pub max_lag: Option<u16>,
+    /// What a lag means.
+    pub lags: LagConvention,
+    /// What the search minimises.
+    pub objective: Objective,
+    /// Most evaluations of the objective.
+    pub evaluations: usize,
+    /// Threads; the result does not depend on it.
+    pub threads: usize,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// Physical effects to add once the base model is there.
+    pub effects: Vec<String>,
+    /// The user's own effects.
+    pub definitions: Vec<&'static Definition>,
+}
+
+/// Where the input delays of a model come from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DelayKind {
+    /// Constant, eq. (3).
+    Fixed,
+    /// Falling with the averaged output, eq. (4); the law is measured on the records.
+    StateDependent,
+    /// The same with a prescribed law.
+    Prescribed(DelayLaw),
+}
+
+impl Default for IdentifyRequest {
+    fn default() -> Self {
+        let search = Settings::default();
+        Self {
+            delay: DelayKind::Fixed,
+            factors: Vec::new(),
+            averaged: false,
+            n1: None,
+            n2: None,
+            n3: None,
+            max_lag: None,
+            lags: LagConvention::OneStep,
+            objective: Objective::FreeRun,
+            evaluations: search.evaluations,
+            threads: search.threads,
+            seed: search.seed,
+            effects: Vec::new(),
+            definitions: Vec::new(),
+        }
+    }
+}
+
+/// An identified model. Serialises to the keys of `identify --json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Identification {
+    /// The model, with its effects and its training record.
+    #[serde(skip)]
+    pub model: Model,
+    /// What was minimised.
+    #[serde(serialize_with = "objective_name")]
+    pub objective: Objective,
+    /// Its value with least-squares coefficients.
+    pub objective_value: f64,
+    /// √Σ(y_{k+1} − prediction)² over the identify records.
+    pub one_step_norm: f64,
+    /// Evaluations of the objective.
+    pub evaluations: usize,
+    /// Time taken by the search, s.
+    pub wall_time_s: f64,
+    /// Indicators of the free run per record, and together.
+    #[serde(flatten)]
+    pub scores: Scores,
+    /// Lags and delays of the model.
+    pub delays: Delays,
+    /// Candidates that the search judged in closed form.
+    pub screened: usize,
+    /// Why the search ended.
+    #[serde(serialize_with = "stop_name")]
+    pub stop: StopReason,
+    /// The refinement on the free run, where one was made.
+    pub refinement: Option<Refinement>,
+    /// Largest pole magnitudes of the recursion, closed and open.
+    pub poles: [f64; 2],
+    /// What the user should know, one sentence each.
+    pub remarks: Vec<String>,
+    /// What the commands cannot tell about the model, one sentence each.
+    pub excitation: Vec<String>,
+}
+
+/// Lags and delays of a model.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Delays {
+    /// State lags τ, samples.
+    pub state: Vec<u16>,
+    /// Product lags τ̄, samples.
+    pub product: Vec<u16>,
+    /// Fixed input delays, samples; empty under a law.
+    pub input: Vec<u16>,
+    /// Factors of the delay law; empty without one.
+    pub factors: Vec<f64>,
+    /// Parameters of the delay law, in the order of its card; none for fixed delays.
+    pub law: Option<Vec<f64>>,
+}
+
+fn objective_name<S: Serializer>(objective: &Objective, to: S) -> Result<S::Ok, S::Error> {
+    objective.name().serialize(to)
+}
+
+fn stop_name<S: Serializer>(stop: &StopReason, to: S) -> Result<S::Ok, S::Error> {
+    stop.name().serialize(to)
+}
+
+impl Delays {
+    fn of(model: &Model) -> Self {
+        let (input, factors, law) = match &model.delay {
+            Delay::Fixed { delays } => (delays.clone(), Vec::new(), None),
+            Delay::Law(law) => (
+                Vec::new(),
+                law.factors.clone(),
+                Some(law.parameters.clone()),
+            ),
+        };
+        Self {
+            state: model.state_lags.clone(),
+            product: model.product_lags.clone(),
+            input,
+            factors,
+            law,
+        }
+    }
+}
+
+impl IdentifyRequest {
+    /// Sizes and conventions, without the input delay.
+    fn structure(&self, set: &DataSet) -> Result<Structure, StepError> {
+        let learning: Vec<&Record> = set.identify().collect();
+        let shortest = learning.iter().map(|r| r.len()).min();
+        let shortest = shortest.ok_or(ExcitationError::NoIdentifyRecord)?;
+        let at_rest = set.is_on_off() && starts_at_rest(&learning);
+        let size = |given: Option<u16>, full: u16, averaged: u16| -> usize {
+            given
+                .unwrap_or(if self.averaged { averaged } else { full })
+                .into()
+        };
+        let longest_lag = self.max_lag.unwrap_or_else(|| {
+            u16::try_from(shortest / 4).map_or(500, |quarter| quarter.clamp(1, 500))
+        });
+        Ok(Structure {
+            state_lags: size(self.n1, 5, 2).min(longest_lag.into()),
+            product_lags: size(self.n2, 10, 2).min(longest_lag.into()),
+            inputs: size(self.n3, 1, 2),
+            longest_lag,
+            convention: self.lags,
+            delay: InputDelay::Fixed { delays: None },
+            averaged: self.averaged,
+            constant: !at_rest,
+            start: if at_rest {
+                Start::Rest
+            } else {
+                Start::Measured
+            },
+        })
+    }
+
+    /// The input delay, and what is to be said about it.
+    fn input_delay(
+        &self,
+        set: &DataSet,
+        remarks: &mut Vec<String>,
+    ) -> Result<InputDelay, StepError> {
+        if self.factors.iter().any(|f| !(f.is_finite() && *f >= 0.0)) {
+            return Err(StepError::BadFactors);
+        }
+        let learning: Vec<&Record> = set.identify().collect();
+        let law = match self.delay {
+            DelayKind::Fixed if self.factors.is_empty() => {
+                return Ok(InputDelay::Fixed { delays: None });
+            }
+            DelayKind::Fixed => return Err(StepError::FactorsWithoutLaw),
+            DelayKind::Prescribed(law) => law,
+            DelayKind::StateDependent => measured_law(set, &learning, remarks)?,
+        };
+        Ok(InputDelay::StateDependent {
+            law,
+            factors: (!self.factors.is_empty()).then(|| self.factors.clone()),
+        })
+    }
+}
+
+/// Whether records begin near y = 0, as a flow at rest does.
+fn starts_at_rest(records: &[&Record]) -> bool {
+    records.iter().all(|record| {
+        let largest = record.y.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
+        let near = fit::RULES.near_rest * largest;
+        record.y.first().is_some_and(|y| y.abs() <= near)
+    })
+}
+
+/// The error with the file of the record that it is about.
+fn located(set: &DataSet, error: IdentifyError) -> StepError {
+    let at_fault = |r: &Record| Some(r.name.as_str()) == error.record();
+    match set.records.iter().position(at_fault) {
+        Some(index) => StepError::IdentifyRecord {
+            place: Box::new(set.place(index, None)),
+            cause: error,
+        },
+        None => error.into(),
+    }
+}
+
+/// What to do about a model that holds on its own records only.
+fn overfitted(scores: &Scores) -> Option<String> {
+    let (own, held_out) = (
+        finite_fit(scores.identify.as_ref())?,
+        finite_fit(scores.validate.as_ref())?,
+    );
+    (held_out < own - fit::RULES.overfitted_points).then(|| {
+        format!(
+            "The model fits what it learned from ({own:.0} % FIT) far better than what was held out ({held_out:.0} %): \
+             it has more lags than these records can tell. Use fewer (`--n1 2 --n2 2`), more varied records, or \
+             `diagnose`, which starts from the fewest lags and adds physical effects."
+        )
+    })
+}
+
+/// Identifies a model on the identify records of `set`: the delays by search, the coefficients by least squares inside
+/// it, refined on the free run where that is the objective and the held-out error falls.
+///
+/// # Errors
+/// [`StepError`]: data that cannot bear a fit (naming the file), a request that contradicts itself, no stable model.
+pub fn identify(
+    set: &DataSet,
+    request: &IdentifyRequest,
+    onlooker: &dyn Onlooker,
+) -> Result<Identification, StepError> {
+    let mut structure = request.structure(set)?;
+    let demand = Demand {
+        max_lag: structure.longest_lag.into(),
+        coefficients: structure.coefficients(),
+    };
+    let excitation = check_excitation(set, demand)?.remarks;
+    for remark in &excitation {
+        onlooker.hears(remark);
+    }
+    let mut remarks = Vec::new();
+    if structure.start == Start::Measured {
+        remarks.push(
+            "the records do not start at rest or the input is not on/off: the model has a constant term, and \
+             free runs follow the measurement for as long as the longest lag"
+                .to_owned(),
+        );
+    }
+    structure.delay = request.input_delay(set, &mut remarks)?;
+    let options = IdentifyOptions {
+        structure,
+        objective: request.objective,
+        search: Settings {
+            evaluations: request.evaluations,
+            seed: request.seed,
+            threads: request.threads,
+            ..Settings::default()
+        },
+        ..IdentifyOptions::default()
+    };
+    let identified: Identified = watched(onlooker, "searching the delays", || {
+        let progress = Searching(onlooker);
+        search(&set.records, &options, &progress, onlooker.interrupt())
+    })
+    .map_err(|error| located(set, error))?;
+    let mut model = identified.model;
+    for definition in &request.definitions {
+        model.define(definition)?;
+    }
+    let records = model.targets(&set.records);
+    if !request.effects.is_empty() {
+        effects_for(&model, &request.effects)?;
+        model = watched(onlooker, "refitting with the effects", || {
+            extend(&model, &records, &request.effects)
+        })?
+        .model;
+    }
+    let (scores, diverged) = score_new(&model, &records)?;
+    remarks.extend(diverged.iter().map(ToString::to_string));
+    remarks.extend(overfitted(&scores));
+    let (name, value) = (identified.objective.name(), identified.objective_value);
+    model.training = training(set, &scores, request.seed, name, value);
+    Ok(Identification {
+        objective: identified.objective,
+        objective_value: value,
+        one_step_norm: if model.effects.is_empty() {
+            one_step_norm(&model, &records)?
+        } else {
+            identified.one_step_norm
+        },
+        evaluations: identified.evaluations,
+        wall_time_s: identified.wall_time.as_secs_f64(),
+        scores,
+        delays: Delays::of(&model),
+        screened: identified.screened,
+        stop: identified.stop,
+        refinement: identified.refinement,
+        poles: [identified.pole_off, identified.pole_on],
+        remarks,
+        excitation,
+        model,
+    })
+}

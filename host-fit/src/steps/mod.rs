@@ -1,0 +1,96 @@
+//! The way from recordings to constants on a board, one function per step.
+//!
+//! | step | from | to |
+//! |---|---|---|
+//! | [`average`] | raw recordings | a [`DataSet`] |
+//! | [`measure_delays`] | a data set | [`DelayReport`] |
+//! | [`identify`] | a data set | [`Identification`] |
+//! | [`compare`] | a model and a data set | [`Comparison`] |
+//! | [`diagnose`] | a model and a data set | [`Finding`] |
+//! | [`extend`] | a model, a data set and effects | [`Extension`] |
+//! | [`simulate`] | a model and a command | [`Simulation`] |
+//! | [`design`] | a model and a goal | [`Design`] |
+//! | [`try_out`] | a design and flows | [`Proof`](crate::design::Proof) |
+//! | [`constants`] | a model | [`Constants`] |
+//!
+//! [`catalogue`] lists the effects that can be missing.
+//!
+//! Every result serialises to the JSON document that the program prints for the step, without the paths of the files
+//! that the program wrote; what only a picture needs is left out of the document. The program itself is these
+//! functions, a parser before them and three renderers (words, JSON, pages) behind them.
+
+mod average;
+mod catalogue;
+mod compare;
+mod constants;
+mod delay;
+mod design;
+mod diagnose;
+mod error;
+mod extend;
+mod identify;
+mod measured_law;
+mod onlooker;
+mod simulate;
+mod verdict;
+
+pub use average::{Average, average};
+pub use catalogue::{EffectEntry, ParameterEntry, catalogue};
+pub use compare::{Comparison, compare};
+pub use constants::{Constants, constants};
+pub use delay::{DelayReport, EdgeReport, measure_delays};
+pub use design::{Design, DesignRequest, Outcome, design, try_out};
+pub use diagnose::{Finding, diagnose};
+pub use error::StepError;
+pub use extend::{Extension, RecordChange, extend};
+pub use identify::{DelayKind, Delays, Identification, IdentifyRequest, identify};
+pub use onlooker::Onlooker;
+pub use simulate::{Simulation, simulate};
+
+use crate::data::DataSet;
+use crate::indicators::{Indicators, Scores};
+use crate::model::{Model, Training};
+
+/// Sampling periods that differ by less than this share are the same, printed with different digits.
+const SAME_PERIOD: f64 = 1e-6;
+
+/// Refuses data that were sampled otherwise than the model.
+fn check_period(model: &Model, set: &DataSet) -> Result<(), StepError> {
+    if (set.sample_period_s / model.sample_period_s - 1.0).abs() <= SAME_PERIOD {
+        return Ok(());
+    }
+    Err(StepError::SamplePeriod {
+        place: Box::new(set.place(0, None)),
+        data: set.sample_period_s,
+        model: model.sample_period_s,
+    })
+}
+
+/// FIT in percent; none where there is no run or it diverged.
+fn finite_fit(indicators: Option<&Indicators>) -> Option<f64> {
+    indicators
+        .map(|i| i.fit_percent)
+        .filter(|fit| fit.is_finite())
+}
+
+/// What a model file says of the data its model was made from.
+fn training(set: &DataSet, scores: &Scores, seed: u64, objective: &str, value: f64) -> Training {
+    let learning: Vec<_> = set.identify().collect();
+    Training {
+        data_hash: set.hash.clone(),
+        tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+        seed,
+        objective: objective.to_owned(),
+        objective_value: value,
+        identify_fit_percent: finite_fit(scores.identify.as_ref()).unwrap_or(0.0),
+        validate_fit_percent: finite_fit(scores.validate.as_ref()),
+        ..Training::envelope(&learning)
+    }
+}
+
+/// [`training`] of a model that was fitted in free run.
+fn trained_in_free_run(set: &DataSet, scores: &Scores, seed: u64) -> Training {
+    let epsilon = scores.identify.as_ref().map_or(0.0, |i| i.epsilon);
+    let finite = if epsilon.is_finite() { epsilon } else { 0.0 };
+    training(set, scores, seed, "free-run", finite)
+}

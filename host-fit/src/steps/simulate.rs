@@ -1,0 +1,107 @@
+//! A model's free run over a command.
+
+use std::io;
+
+use serde::Serialize;
+
+use super::{SAME_PERIOD, StepError};
+use crate::data::InputFile;
+use crate::model::{Model, Start};
+use crate::simulate::Signals;
+
+/// A free run. Serialises to the keys of `simulate --json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Simulation {
+    /// Its length.
+    pub samples: usize,
+    /// Mean of y.
+    pub mean: f64,
+    /// Lowest y.
+    pub lowest: f64,
+    /// Highest y.
+    pub highest: f64,
+    /// Where the run leaves what the model was made from, one sentence each.
+    pub outside_training: Vec<String>,
+    /// Sampling period, s.
+    #[serde(skip)]
+    pub sample_period_s: f64,
+    /// Time of the first sample, s.
+    #[serde(skip)]
+    pub t0_s: f64,
+    /// The command.
+    #[serde(skip)]
+    pub u: Vec<f64>,
+    /// The run.
+    #[serde(skip)]
+    pub y: Vec<f64>,
+}
+
+impl Simulation {
+    /// Writes the run as CSV with the columns t, u, y.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn write_csv(&self, out: impl io::Write) -> io::Result<()> {
+        let mut csv = csv::Writer::from_writer(out);
+        csv.write_record(["t", "u", "y"])?;
+        for (k, (u, y)) in self.u.iter().zip(&self.y).enumerate() {
+            let t = self.t0_s + k as f64 * self.sample_period_s;
+            // Times as they were given: sums of a period would print 0.30000000000000004.
+            let t = (t * 1e9).round() / 1e9;
+            csv.write_record([t.to_string(), u.to_string(), y.to_string()])?;
+        }
+        csv.flush()
+    }
+}
+
+/// Runs `model` free over `input`.
+///
+/// # Errors
+/// [`StepError`] when the sampling periods differ, a column is missing or the run diverges.
+pub fn simulate(model: &Model, input: &InputFile) -> Result<Simulation, StepError> {
+    let place = || Box::new(input.place(None));
+    let period = model.sample_period_s;
+    if (input.sample_period_s / period - 1.0).abs() > SAME_PERIOD {
+        return Err(StepError::InputPeriod {
+            place: place(),
+            input: input.sample_period_s,
+            model: period,
+        });
+    }
+    if input.y.is_none() && model.start == Start::Measured {
+        return Err(StepError::NoMeasurements {
+            place: place(),
+            samples: model.warm_up(),
+        });
+    }
+    let channels = model.channels().into_iter().map(|channel| {
+        let values = input.channels.get(&channel).map(Vec::as_slice);
+        values.ok_or_else(|| StepError::NoChannel {
+            place: place(),
+            channel,
+        })
+    });
+    let measured = input.y.as_deref();
+    let signals = Signals {
+        u: &input.u,
+        y: measured.filter(|_| model.start == Start::Measured),
+        channels: channels.collect::<Result<_, _>>()?,
+    };
+    let y = model
+        .run_free(&signals)
+        .map_err(|sample| StepError::Diverges {
+            place: place(),
+            time_s: input.t0 + sample as f64 * period,
+        })?;
+    Ok(Simulation {
+        samples: y.len(),
+        mean: y.iter().sum::<f64>() / y.len().max(1) as f64,
+        lowest: y.iter().copied().fold(f64::INFINITY, f64::min),
+        highest: y.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        outside_training: model.outside_training(&input.u, &y),
+        sample_period_s: period,
+        t0_s: input.t0,
+        u: input.u.clone(),
+        y,
+    })
+}

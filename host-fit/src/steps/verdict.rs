@@ -1,0 +1,112 @@
+//! A diagnosis in plain language.
+
+use crate::diagnose::{Diagnosis, HeldOutBy, Rung, Verdict};
+use crate::picture::significant;
+use crate::residual::NoiseSource;
+
+/// Headline and meaning of a diagnosis, in words.
+pub(super) fn words(diagnosis: &Diagnosis) -> (String, String) {
+    let (headline, mut meaning) = finding(diagnosis);
+    match diagnosis.held_out_by {
+        HeldOutBy::Records => {}
+        HeldOutBy::Turns => meaning.push_str(
+            " No record is marked `validate`: each in turn was judged by models that had not seen it.",
+        ),
+        HeldOutBy::End => meaning.push_str(
+            " There is one record only: its end was judged by models that saw its beginning; a second record would say more.",
+        ),
+    }
+    if let Some(seconds) = diagnosis.restarted_s {
+        meaning.push_str(&format!(
+            " The rig integrates and its free run drifts: all errors here are of free runs that start anew from the measurement every {} s.",
+            significant(seconds, 3)
+        ));
+    }
+    if let Some(separation) = &diagnosis.separation {
+        meaning.push_str(&format!(
+            " To tell {} apart, play this: {} (`--experiment command.csv` writes it).",
+            separation.effects.join(" and "),
+            separation.experiment.words().trim_end_matches('.')
+        ));
+    }
+    (headline, meaning)
+}
+
+fn finding(diagnosis: &Diagnosis) -> (String, String) {
+    let rmse = |rung: Option<&Rung>| rung.map_or(f64::NAN, |rung| rung.validate_rmse);
+    let first = rmse(diagnosis.ladder.first());
+    let last = rmse(diagnosis.ladder.last());
+    let noise = diagnosis.noise_estimate;
+    let floor = match diagnosis.noise_source {
+        NoiseSource::Measured => format!(
+            "the noise floor is {} ({:.2} times it is left)",
+            significant(noise, 3),
+            last / noise
+        ),
+        NoiseSource::Repeats => format!(
+            "there is no y_sd; how y differs between repeats of the command puts the noise floor at {} ({:.2} times it is left)",
+            significant(noise, 3),
+            last / noise
+        ),
+        NoiseSource::Scatter => format!(
+            "the noise floor is not known: there is no y_sd and no repeat; from sample to sample y scatters by {}",
+            significant(noise, 3)
+        ),
+    };
+    match diagnosis.verdict {
+        Verdict::NothingMissing => (
+            "nothing is missing".to_owned(),
+            format!(
+                "Refitted, the model's held-out error is {}: {floor}. No effect of the catalogue lowers it significantly.",
+                significant(last, 3)
+            ),
+        ),
+        Verdict::EffectMissing => {
+            let headline = match diagnosis.missing.as_slice() {
+                [one] => format!("{one} is missing"),
+                several => format!("{} are missing", several.join(" and ")),
+            };
+            let mut meaning = format!(
+                "With {} the held-out error falls from {} to {}; {floor}.",
+                if diagnosis.missing.len() == 1 {
+                    "it"
+                } else {
+                    "them"
+                },
+                significant(first, 3),
+                significant(last, 3)
+            );
+            let found = diagnosis
+                .ranking
+                .iter()
+                .filter(|r| diagnosis.missing.contains(&r.effect));
+            for entry in found.filter(|entry| !entry.confounded_with.is_empty()) {
+                meaning.push_str(&format!(
+                    " These records cannot tell {} from {}.",
+                    entry.effect,
+                    entry.confounded_with.join(", ")
+                ));
+            }
+            (headline, meaning)
+        }
+        Verdict::Unexplained => (
+            "something is missing that the catalogue does not have".to_owned(),
+            match diagnosis
+                .ladder
+                .last()
+                .map(|rung| rung.effects.join(" and "))
+            {
+                Some(tried) if !tried.is_empty() => format!(
+                    "The best that the catalogue does is {tried}: the held-out error is then {} and {floor}. \
+                     That is too little to name them as the cause; they are not in the model \
+                     (`host-fit extend` adds them all the same).",
+                    significant(last, 3)
+                ),
+                _ => format!(
+                    "The held-out error is {} and {floor}; no effect of the catalogue, nor several, explains most of it.",
+                    significant(last, 3)
+                ),
+            },
+        ),
+    }
+}

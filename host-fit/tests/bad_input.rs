@@ -5,7 +5,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use host_fit::data::{Averaging, DataSet, Excitation, InputFile, average_files};
+use host_fit::data::{Averaging, DataSet, InputFile, average_files};
+use host_fit::excitation::Excitation;
 use proptest::prelude::*;
 
 fn csv(rows: usize) -> String {

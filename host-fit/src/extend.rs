@@ -16,6 +16,7 @@ use crate::model::{Model, Start};
 use crate::simulate::SimulateError;
 use model_core::effect::Spec;
 use serde::Serialize;
+use strsim::levenshtein;
 use thiserror::Error;
 
 /// The lean model is kept when its error is within this factor of the other's.
@@ -80,7 +81,7 @@ pub struct Extended {
 pub fn nearest_name(name: &str, known: &[&str]) -> String {
     let nearest = known
         .iter()
-        .map(|known| (distance(name, known), *known))
+        .map(|known| (levenshtein(name, known), *known))
         .min();
     let hint = match nearest {
         Some((edits, nearest)) if edits <= 1 + nearest.len() / 3 => {
@@ -93,26 +94,6 @@ pub fn nearest_name(name: &str, known: &[&str]) -> String {
         name.escape_debug(),
         known.join(", ")
     )
-}
-
-/// Edits (insert, delete, replace) from one word to another.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().take(100).enumerate() {
-        let mut corner = i;
-        let mut left = i + 1;
-        for (cell, y) in row.iter_mut().skip(1).zip(&b) {
-            let replaced = corner + usize::from(x != *y);
-            corner = *cell;
-            left = replaced.min(left + 1).min(corner + 1);
-            *cell = left;
-        }
-        if let Some(first) = row.first_mut() {
-            *first = i + 1;
-        }
-    }
-    row.last().copied().unwrap_or(0)
 }
 
 /// The effects called `names`, which are new to `model`: of the catalogue, or
@@ -268,9 +249,6 @@ mod tests {
 
     #[test]
     fn a_misspelt_effect_is_answered_with_the_nearest() {
-        assert_eq!(distance("kitten", "sitting"), 3);
-        assert_eq!(distance("", "abc"), 3);
-        assert_eq!(distance("abc", ""), 3);
         let known = ["valve-lag", "plenum-droop"];
         let text = nearest_name("plenum-drop", &known);
         assert!(text.contains("Did you mean `plenum-droop`?"), "{text}");

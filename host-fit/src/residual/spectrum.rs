@@ -5,7 +5,7 @@ use super::explained::Errors;
 use super::rules::RULES;
 use super::{Interval, Where};
 use crate::picture::FailureBin;
-use std::f64::consts::TAU;
+use realfft::{RealFftPlanner, RealToComplex};
 
 /// Energies of one piece in each band.
 struct Piece {
@@ -25,6 +25,7 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
         limits.push((limits.last()? * 2.0).min(length as f64 / 2.0));
     }
     let bands = limits.len() - 1;
+    let transform = RealFftPlanner::new().plan_fft_forward(length);
     let mut pieces = Vec::new();
     for (record, e) in errors.residual.iter().enumerate() {
         let (simulated, noise) = (&errors.simulated[record], &errors.noise[record]);
@@ -32,8 +33,8 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
         while from + length <= e.len() {
             let span = from..from + length;
             pieces.push(Piece {
-                error: energies(&e[span.clone()], &limits),
-                model: energies(&simulated[span.clone()], &limits),
+                error: energies(&*transform, &e[span.clone()], &limits),
+                model: energies(&*transform, &simulated[span.clone()], &limits),
                 noise: noise[span].iter().sum(),
             });
             from += length;
@@ -122,56 +123,28 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
 
 /// Energy in each band of lines, summed so that all bands give Σ x²
 /// (without the mean's, which no frequency has).
-fn energies(x: &[f64], limits: &[f64]) -> Vec<f64> {
+fn energies(transform: &dyn RealToComplex<f64>, x: &[f64], limits: &[f64]) -> Vec<f64> {
     let n = x.len();
     let mean = x.iter().sum::<f64>() / n as f64;
-    let (mut re, mut im) = (x.iter().map(|x| x - mean).collect::<Vec<_>>(), vec![0.0; n]);
-    transform(&mut re, &mut im);
-    limits
-        .windows(2)
-        .map(|band| {
-            let lines = (band[0].floor() as usize + 1)..=(band[1] as usize);
-            lines
-                .map(|i| {
-                    let twice = if 2 * i == n { 1.0 } else { 2.0 };
-                    twice * (re[i] * re[i] + im[i] * im[i]) / n as f64
-                })
-                .sum()
-        })
-        .collect()
-}
-
-/// Radix-2 Fourier transform in place; lengths are powers of two.
-fn transform(re: &mut [f64], im: &mut [f64]) {
-    let n = re.len();
-    let bits = n.ilog2();
-    for i in 0..n {
-        let j = i.reverse_bits() >> (usize::BITS - bits);
-        if i < j {
-            re.swap(i, j);
-            im.swap(i, j);
-        }
-    }
-    let mut size = 2;
-    while size <= n {
-        let half = size / 2;
-        for start in (0..n).step_by(size) {
-            for k in 0..half {
-                let angle = -TAU * k as f64 / size as f64;
-                let (s, c) = angle.sin_cos();
-                let (a, b) = (start + k, start + k + half);
-                let (r, i) = (re[b] * c - im[b] * s, re[b] * s + im[b] * c);
-                (re[b], im[b]) = (re[a] - r, im[a] - i);
-                (re[a], im[a]) = (re[a] + r, im[a] + i);
-            }
-        }
-        size *= 2;
-    }
+    let mut deviations: Vec<f64> = x.iter().map(|x| x - mean).collect();
+    let mut lines = transform.make_output_vec();
+    // Cannot fail: the transform was planned for pieces of this length.
+    let _ = transform.process(&mut deviations, &mut lines);
+    let band = |band: &[f64]| {
+        let within = (band[0].floor() as usize + 1)..=(band[1] as usize);
+        let energy = within.map(|i| {
+            let twice = if 2 * i == n { 1.0 } else { 2.0 };
+            twice * lines[i].norm_sqr() / n as f64
+        });
+        energy.sum()
+    };
+    limits.windows(2).map(band).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     #[test]
     fn bands_add_up_to_the_energy_and_a_tone_is_in_its_band() {
@@ -181,7 +154,8 @@ mod tests {
         let limits = [
             0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 512.0,
         ];
-        let bands = energies(&x, &limits);
+        let transform = RealFftPlanner::new().plan_fft_forward(x.len());
+        let bands = energies(&*transform, &x, &limits);
         let mean = x.iter().sum::<f64>() / 1024.0;
         let energy: f64 = x.iter().map(|x| (x - mean) * (x - mean)).sum();
         assert!((bands.iter().sum::<f64>() / energy - 1.0).abs() < 1e-12);

@@ -145,7 +145,6 @@ pub(crate) fn report_finding(report: &mut Report, set: &DataSet, found: &Finding
                 rmse: r.validate_rmse,
                 low: f64::NAN,
                 high: f64::NAN,
-                decoy: false,
                 accepted: diagnosis.missing.contains(&r.effect),
                 note: if r.significant { "" } else { "not significant" },
             })

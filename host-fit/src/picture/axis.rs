@@ -6,13 +6,11 @@ use super::format::{fixed, power_of_ten};
 /// their differences overflow.
 const LARGEST: f64 = 1e150;
 
-/// A range of values and how it maps to [0, 1]. Always `lo < hi`, both finite; on a
-/// logarithmic axis both are positive.
+/// A range of values and how it maps to [0, 1]. Always `lo < hi`, both finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Axis {
     lo: f64,
     hi: f64,
-    log: bool,
 }
 
 /// One tick: where it is and what it says.
@@ -53,29 +51,14 @@ impl Axis {
             };
             (lo - half, hi + half)
         };
-        Self { lo, hi, log: false }
+        Self { lo, hi }
     }
 
     /// Linear axis with a margin of `share` of the range at both ends.
     pub(super) fn padded(range: Option<(f64, f64)>, share: f64) -> Self {
-        let Self { lo, hi, .. } = Self::linear(range);
+        let Self { lo, hi } = Self::linear(range);
         let margin = (hi - lo) * share;
         Self::linear(Some((lo - margin, hi + margin)))
-    }
-
-    /// Logarithmic axis over the positive part of `range`; linear when that is empty.
-    pub(super) fn logarithmic(range: Option<(f64, f64)>) -> Self {
-        match range {
-            Some((lo, hi)) if lo > 1.0 / LARGEST && hi > lo * 1.001 && hi <= LARGEST => {
-                Self { lo, hi, log: true }
-            }
-            Some((lo, _)) if lo > 1.0 / LARGEST && lo < LARGEST / 10.0 => Self {
-                lo: lo / 3.0,
-                hi: lo * 3.0,
-                log: true,
-            },
-            _ => Self::linear(range),
-        }
     }
 
     /// Lower and upper end.
@@ -90,24 +73,12 @@ impl Axis {
             return None;
         }
         let value = value.clamp(self.lo, self.hi);
-        let place = if self.log {
-            (value / self.lo).ln() / (self.hi / self.lo).ln()
-        } else {
-            (value - self.lo) / (self.hi - self.lo)
-        };
+        let place = (value - self.lo) / (self.hi - self.lo);
         Some(place.clamp(0.0, 1.0))
     }
 
     /// About `count` ticks at round values.
     pub(super) fn ticks(&self, count: usize) -> Vec<Tick> {
-        if self.log {
-            self.log_ticks(count)
-        } else {
-            self.linear_ticks(count)
-        }
-    }
-
-    fn linear_ticks(&self, count: usize) -> Vec<Tick> {
         let rough = (self.hi - self.lo) / count.clamp(1, 50) as f64;
         let decade = 10f64.powi(rough.log10().floor() as i32);
         let step = [1.0, 2.0, 5.0, 10.0]
@@ -142,39 +113,6 @@ impl Axis {
             })
             .collect()
     }
-
-    fn log_ticks(&self, count: usize) -> Vec<Tick> {
-        let (from, to) = (
-            self.lo.log10().floor() as i32,
-            self.hi.log10().ceil() as i32,
-        );
-        let decades = (self.hi / self.lo).log10();
-        let multiples: &[f64] = if decades < 2.5 {
-            &[1.0, 2.0, 5.0]
-        } else {
-            &[1.0]
-        };
-        let stride = ((decades / count.max(1) as f64).ceil() as usize).max(1);
-        let inside = |value: &f64| (self.lo * 0.999..=self.hi * 1.001).contains(value);
-        let ticks: Vec<Tick> = (from..=to)
-            .step_by(stride)
-            .flat_map(|decade| multiples.iter().map(move |m| m * 10f64.powi(decade)))
-            .filter(inside)
-            .map(|value| Tick {
-                value,
-                label: super::significant(value, 2),
-            })
-            .collect();
-        // Less than a factor of two may hold no such value at all.
-        if ticks.len() < 2 {
-            return Self {
-                log: false,
-                ..*self
-            }
-            .linear_ticks(count);
-        }
-        ticks
-    }
 }
 
 #[cfg(test)]
@@ -200,14 +138,6 @@ mod tests {
             labels(Axis::linear(Some((0.0, 4e-5))), 4),
             ["0", "10⁻⁵", "2×10⁻⁵", "3×10⁻⁵", "4×10⁻⁵"]
         );
-        assert_eq!(
-            labels(Axis::logarithmic(Some((1.0, 5000.0))), 6),
-            ["1", "10", "100", "1000"]
-        );
-        assert_eq!(
-            labels(Axis::logarithmic(Some((0.9, 30.0))), 6),
-            ["1", "2", "5", "10", "20"]
-        );
     }
 
     #[test]
@@ -223,21 +153,20 @@ mod tests {
     proptest! {
         #[test]
         fn any_range_gives_few_ordered_ticks_inside(a: f64, b: f64, count in 0usize..20) {
-            for axis in [Axis::linear(Some((a, b))), Axis::logarithmic(Some((a, b)))] {
-                let (lo, hi) = axis.ends();
-                prop_assert!(lo < hi && lo.is_finite() && hi.is_finite());
-                let ticks = axis.ticks(count);
-                prop_assert!(ticks.len() <= 61);
-                let slack = (hi - lo) * 0.01;
-                for pair in ticks.windows(2) {
-                    prop_assert!(pair[0].value < pair[1].value);
-                }
-                for tick in &ticks {
-                    prop_assert!(tick.value >= lo - slack && tick.value <= hi + slack);
-                }
-                let place = axis.place(a);
-                prop_assert!(a.is_nan() || place.is_some_and(|p| (0.0..=1.0).contains(&p)));
+            let axis = Axis::linear(Some((a, b)));
+            let (lo, hi) = axis.ends();
+            prop_assert!(lo < hi && lo.is_finite() && hi.is_finite());
+            let ticks = axis.ticks(count);
+            prop_assert!(ticks.len() <= 61);
+            let slack = (hi - lo) * 0.01;
+            for pair in ticks.windows(2) {
+                prop_assert!(pair[0].value < pair[1].value);
             }
+            for tick in &ticks {
+                prop_assert!(tick.value >= lo - slack && tick.value <= hi + slack);
+            }
+            let place = axis.place(a);
+            prop_assert!(a.is_nan() || place.is_some_and(|p| (0.0..=1.0).contains(&p)));
         }
     }
 }

@@ -1,25 +1,14 @@
-//! One SVG document: lines, areas and words in pixels, placed to a quarter pixel.
+//! One SVG document: lines, areas and words in pixels, placed to a tenth of one.
 
 use std::fmt::Write as _;
 
-use plotters::backend::{DrawingBackend, SVGBackend};
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{
-    Color, FontDesc, FontFamily, FontStyle, FontTransform, RGBColor, ShapeStyle, TextStyle,
-};
-
-use super::palette::{PAPER, hex};
+use super::palette::{Colour, PAPER};
 
 /// Width of every picture, pixels.
 pub(super) const WIDTH: f64 = 900.0;
 /// Free border around a picture, pixels.
 pub(super) const MARGIN: f64 = 14.0;
 
-/// The backend knows whole units only; this many of them make a pixel.
-const UNITS: f64 = 4.0;
-/// The backend divides a font's size by this.
-const FONT_SCALE: f64 = 1.24;
-const FAMILY: FontFamily<'static> = FontFamily::Name("Helvetica, Arial, sans-serif");
 /// Width of an average character over the font's size, for a wide sans-serif.
 const CHARACTER: f64 = 0.59;
 
@@ -36,12 +25,12 @@ pub(super) enum Anchor {
 pub(super) struct Words {
     pub(super) size: f64,
     pub(super) bold: bool,
-    pub(super) colour: RGBColor,
+    pub(super) colour: Colour,
     pub(super) anchor: Anchor,
 }
 
 impl Words {
-    pub(super) fn new(size: f64, colour: RGBColor) -> Self {
+    pub(super) fn new(size: f64, colour: Colour) -> Self {
         Self {
             size,
             bold: false,
@@ -62,13 +51,13 @@ impl Words {
 /// Colour, opacity and width of a stroke; width is ignored where an area is filled.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ink {
-    pub(super) colour: RGBColor,
+    pub(super) colour: Colour,
     pub(super) opacity: f64,
     pub(super) width: f64,
 }
 
 impl Ink {
-    pub(super) fn new(colour: RGBColor, width: f64) -> Self {
+    pub(super) fn new(colour: Colour, width: f64) -> Self {
         Self {
             colour,
             opacity: 1.0,
@@ -80,66 +69,67 @@ impl Ink {
         Self { opacity, ..self }
     }
 
-    fn style(self, filled: bool) -> ShapeStyle {
-        ShapeStyle {
-            color: self.colour.mix(self.opacity.clamp(0.0, 1.0)),
-            filled,
-            stroke_width: (self.width * UNITS).round().clamp(1.0, 1e3) as u32,
+    fn stroke(self) -> String {
+        format!(
+            "stroke=\"{}\" stroke-width=\"{}\"{}",
+            self.colour,
+            pixel(self.width.max(0.25) * 10.0) / 10.0,
+            self.transparency()
+        )
+    }
+
+    fn fill(self) -> String {
+        format!("fill=\"{}\"{}", self.colour, self.transparency())
+    }
+
+    fn transparency(self) -> String {
+        if self.opacity < 1.0 {
+            format!(" opacity=\"{}\"", self.opacity.max(0.0))
+        } else {
+            String::new()
         }
     }
 }
 
 /// The drawing surface; what it writes to is a string, so nothing can fail.
-pub(super) struct Canvas<'a> {
-    backend: SVGBackend<'a>,
+pub(super) struct Canvas {
+    elements: String,
 }
 
 /// Draws a picture of [`WIDTH`]; `paint` returns the height it came to.
 /// `description` is what a screen reader says.
-pub(super) fn draw(description: &str, paint: impl FnOnce(&mut Canvas<'_>) -> f64) -> String {
-    let mut drawn = String::new();
-    let height = {
-        let mut canvas = Canvas {
-            backend: SVGBackend::with_string(&mut drawn, (1, 1)),
-        };
-        paint(&mut canvas).clamp(1.0, 1e5)
-        // Dropping the backend closes the document.
+pub(super) fn draw(description: &str, paint: impl FnOnce(&mut Canvas) -> f64) -> String {
+    let mut canvas = Canvas {
+        elements: String::new(),
     };
-    // The backend's own first tag fixes one unit to one pixel and knows no height
-    // found while drawing.
-    let elements = drawn.split_once('>').map_or("", |(_, rest)| rest);
-    let mut svg = String::with_capacity(elements.len() + 500);
-    let _ = write!(
-        svg,
+    let height = paint(&mut canvas).clamp(1.0, 1e5);
+    format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height:.0}\" \
-         viewBox=\"0 0 {:.0} {:.0}\" role=\"img\" stroke-linejoin=\"round\">\n<title>{}</title>\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"{}\"/>",
-        WIDTH * UNITS,
-        height * UNITS,
+         viewBox=\"0 0 {WIDTH} {height:.0}\" role=\"img\" stroke-linejoin=\"round\" \
+         font-family=\"Helvetica, Arial, sans-serif\">\n<title>{}</title>\n\
+         <rect width=\"100%\" height=\"100%\" fill=\"{PAPER}\"/>\n{}</svg>\n",
         super::report::escape(description),
-        hex(PAPER),
-    );
-    svg.push_str(elements);
-    svg
+        canvas.elements,
+    )
 }
 
-impl Canvas<'_> {
-    /// A line through `points`.
+impl Canvas {
+    fn write(&mut self, element: std::fmt::Arguments<'_>) {
+        // Writing to a string cannot fail.
+        let _ = self.elements.write_fmt(element);
+        self.elements.push('\n');
+    }
+
+    /// A line through `points`; a dot where there is one only.
     pub(super) fn line(&mut self, points: &[(f64, f64)], ink: Ink) {
-        let path: Vec<(i32, i32)> = points.iter().map(|p| unit(*p)).collect();
-        match path.as_slice() {
+        match points {
             [] => {}
-            [only] => {
-                let _ = self.backend.draw_circle(
-                    *only,
-                    (ink.width * UNITS / 2.0) as u32,
-                    &ink.style(true),
-                    true,
-                );
-            }
-            _ => {
-                let _ = self.backend.draw_path(path, &ink.style(false));
-            }
+            [only] => self.dot(*only, ink.width / 2.0, ink, true),
+            _ => self.write(format_args!(
+                "<polyline fill=\"none\" {} points=\"{}\"/>",
+                ink.stroke(),
+                list(points)
+            )),
         }
     }
 
@@ -191,76 +181,78 @@ impl Canvas<'_> {
     /// A filled area bounded by `points`.
     pub(super) fn area(&mut self, points: &[(f64, f64)], ink: Ink) {
         if points.len() > 2 {
-            let path: Vec<(i32, i32)> = points.iter().map(|p| unit(*p)).collect();
-            let _ = self.backend.fill_polygon(path, &ink.style(true));
+            self.write(format_args!(
+                "<polygon {} points=\"{}\"/>",
+                ink.fill(),
+                list(points)
+            ));
         }
     }
 
     /// A filled rectangle between two opposite corners.
     pub(super) fn rectangle(&mut self, (x0, y0): (f64, f64), (x1, y1): (f64, f64), ink: Ink) {
-        let from = unit((x0.min(x1), y0.min(y1)));
-        let to = unit((x0.max(x1), y0.max(y1)));
-        let _ = self.backend.draw_rect(from, to, &ink.style(true), true);
+        let (left, top) = (pixel(x0.min(x1)), pixel(y0.min(y1)));
+        let (right, bottom) = (pixel(x0.max(x1)), pixel(y0.max(y1)));
+        let (width, height) = (pixel(right - left), pixel(bottom - top));
+        self.write(format_args!(
+            "<rect x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{height}\" {}/>",
+            ink.fill()
+        ));
     }
 
     /// A disc, or a ring on the paper's colour.
-    pub(super) fn dot(&mut self, centre: (f64, f64), radius: f64, ink: Ink, filled: bool) {
-        let at = unit(centre);
-        let radius = (radius * UNITS).round().clamp(1.0, 1e4) as u32;
-        if !filled {
-            let paper = Ink::new(PAPER, 1.0);
-            let _ = self
-                .backend
-                .draw_circle(at, radius, &paper.style(true), true);
-        }
-        let _ = self
-            .backend
-            .draw_circle(at, radius, &ink.style(filled), filled);
+    pub(super) fn dot(&mut self, (x, y): (f64, f64), radius: f64, ink: Ink, filled: bool) {
+        let style = if filled {
+            ink.fill()
+        } else {
+            format!("fill=\"{PAPER}\" {}", ink.stroke())
+        };
+        self.write(format_args!(
+            "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" {style}/>",
+            pixel(x),
+            pixel(y),
+            pixel(radius).max(0.1)
+        ));
     }
 
     /// Words at a point, centred on it vertically.
     pub(super) fn text(&mut self, words: Words, at: (f64, f64), text: &str) {
-        self.write(words, at, text, FontTransform::None);
+        self.words(words, at, text, false);
     }
 
     /// Words running upwards, centred on a point.
     pub(super) fn upright(&mut self, words: Words, at: (f64, f64), text: &str) {
-        self.write(words.at(Anchor::Middle), at, text, FontTransform::Rotate270);
+        self.words(words.at(Anchor::Middle), at, text, true);
     }
 
-    fn write(&mut self, words: Words, at: (f64, f64), text: &str, turn: FontTransform) {
+    fn words(&mut self, words: Words, (x, y): (f64, f64), text: &str, upright: bool) {
         if text.is_empty() {
             return;
         }
+        let (x, y) = (pixel(x), pixel(y));
         let weight = if words.bold {
-            FontStyle::Bold
+            " font-weight=\"bold\""
         } else {
-            FontStyle::Normal
+            ""
         };
-        let font = FontDesc::new(FAMILY, words.size * UNITS * FONT_SCALE, weight).transform(turn);
-        let across = match words.anchor {
-            Anchor::Start => HPos::Left,
-            Anchor::Middle => HPos::Center,
-            Anchor::End => HPos::Right,
+        let anchor = match words.anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
         };
-        let style = TextStyle::from(font)
-            .color(&words.colour)
-            .pos(Pos::new(across, VPos::Center));
-        let _ = self.backend.draw_text(&clean(text), &style, unit(at));
+        let turn = if upright {
+            format!(" transform=\"rotate(270 {x} {y})\"")
+        } else {
+            String::new()
+        };
+        self.write(format_args!(
+            "<text x=\"{x}\" y=\"{y}\" dy=\"0.5ex\" text-anchor=\"{anchor}\" font-size=\"{}\"{weight} \
+             fill=\"{}\"{turn}>{}</text>",
+            words.size,
+            words.colour,
+            super::report::escape(text)
+        ));
     }
-}
-
-/// Control characters are not allowed in XML, not even escaped.
-fn clean(text: &str) -> String {
-    text.chars()
-        .map(|c| {
-            if super::report::allowed(c) {
-                c
-            } else {
-                '\u{fffd}'
-            }
-        })
-        .collect()
 }
 
 fn distance(pair: &[(f64, f64)]) -> f64 {
@@ -270,10 +262,19 @@ fn distance(pair: &[(f64, f64)]) -> f64 {
     }
 }
 
-fn unit((x, y): (f64, f64)) -> (i32, i32) {
-    // `as` saturates and sends NaN to 0, so any input gives a point.
-    let round = |v: f64| (v * UNITS).round().clamp(-1e6, 1e6) as i32;
-    (round(x), round(y))
+/// Any number as a coordinate: tenths of a pixel, nonsense at the edge of a huge sheet.
+fn pixel(v: f64) -> f64 {
+    let v = if v.is_nan() { 0.0 } else { v };
+    (v.clamp(-1e5, 1e5) * 10.0).round() / 10.0
+}
+
+fn list(points: &[(f64, f64)]) -> String {
+    let mut list = String::with_capacity(12 * points.len());
+    for (x, y) in points {
+        let _ = write!(list, "{},{} ", pixel(*x), pixel(*y));
+    }
+    list.pop();
+    list
 }
 
 /// Estimated width of `text`, pixels; on the wide side.

@@ -3,7 +3,7 @@
 use super::axis::{Axis, extent};
 use super::canvas::{Anchor, Canvas, Ink, MARGIN, WIDTH, Words, draw, text_width, wrap};
 use super::legend::{Swatch, heading, nothing};
-use super::palette::{BLUE, FLOOR, INK, MUTED, PAPER, VERMILLION, series};
+use super::palette::{BLUE, Colour, FLOOR, INK, MUTED, PAPER, VERMILLION, series};
 use super::panel::{LABEL_SIZE, Panel, TICK_SIZE, left_edge};
 
 /// One rung: the model after an effect was added.
@@ -101,14 +101,14 @@ pub fn ladder(plot: &Ladder<'_>) -> String {
     })
 }
 
-fn record_colour(index: usize) -> plotters::style::RGBColor {
+fn record_colour(index: usize) -> Colour {
     // The first colour belongs to the columns.
     series(index % 5 + 1)
 }
 
 /// One column per rung; what lies above the floor is what the model leaves unexplained.
 fn columns(
-    canvas: &mut Canvas<'_>,
+    canvas: &mut Canvas,
     panel: &Panel,
     rungs: &[(f64, &LadderStep<'_>)],
     half: f64,
@@ -131,7 +131,7 @@ fn columns(
     }
 }
 
-fn floor(canvas: &mut Canvas<'_>, panel: &Panel, noise: f64) {
+fn floor(canvas: &mut Canvas, panel: &Panel, noise: f64) {
     if let Some((_, at)) = panel.point(0.0, noise) {
         canvas.rectangle(
             (panel.left, at),
@@ -144,7 +144,7 @@ fn floor(canvas: &mut Canvas<'_>, panel: &Panel, noise: f64) {
 
 /// The error of every record, side by side within the column of its rung.
 fn dots(
-    canvas: &mut Canvas<'_>,
+    canvas: &mut Canvas,
     panel: &Panel,
     rungs: &[(f64, &LadderStep<'_>)],
     half: f64,
@@ -169,7 +169,7 @@ fn dots(
 
 /// The error of every rung above all that is drawn there, and its fall from the rung before.
 fn numbers(
-    canvas: &mut Canvas<'_>,
+    canvas: &mut Canvas,
     panel: &Panel,
     rungs: &[(f64, &LadderStep<'_>)],
     half: f64,
@@ -206,12 +206,7 @@ fn numbers(
 }
 
 /// Names below the columns; returns the height of the picture.
-fn labels(
-    canvas: &mut Canvas<'_>,
-    panel: &Panel,
-    rungs: &[(f64, &LadderStep<'_>)],
-    slot: f64,
-) -> f64 {
+fn labels(canvas: &mut Canvas, panel: &Panel, rungs: &[(f64, &LadderStep<'_>)], slot: f64) -> f64 {
     let widest = rungs
         .iter()
         .flat_map(|(_, step)| step.label.split_inclusive([' ', '-']))

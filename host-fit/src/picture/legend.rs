@@ -1,9 +1,7 @@
 //! Titles and legends. They stand above the data, never over it.
 
-use plotters::style::RGBColor;
-
 use super::canvas::{Canvas, Ink, MARGIN, WIDTH, Words, fit, text_width};
-use super::palette::{INK, MUTED};
+use super::palette::{Colour, INK, MUTED};
 
 /// Size of legend text, pixels.
 const SIZE: f64 = 14.5;
@@ -14,16 +12,16 @@ const GAP: f64 = 20.0;
 /// The sample of a series that stands before its name.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Swatch {
-    Line(RGBColor),
-    Dashes(RGBColor),
-    Band(RGBColor),
-    Bar(RGBColor),
-    Dot(RGBColor),
-    Ring(RGBColor),
+    Line(Colour),
+    Dashes(Colour),
+    Band(Colour),
+    Bar(Colour),
+    Dot(Colour),
+    Ring(Colour),
 }
 
 /// Writes the title, then the legend in as many rows as it takes; returns the height used.
-pub(super) fn heading(canvas: &mut Canvas<'_>, title: &str, entries: &[(Swatch, String)]) -> f64 {
+pub(super) fn heading(canvas: &mut Canvas, title: &str, entries: &[(Swatch, String)]) -> f64 {
     let mut top = MARGIN;
     if !title.is_empty() {
         let words = Words::new(18.0, INK).bold();
@@ -49,7 +47,7 @@ pub(super) fn heading(canvas: &mut Canvas<'_>, title: &str, entries: &[(Swatch, 
     if drawn { top + ROW + 10.0 } else { top + 6.0 }
 }
 
-fn sample(canvas: &mut Canvas<'_>, swatch: Swatch, left: f64, middle: f64) {
+fn sample(canvas: &mut Canvas, swatch: Swatch, left: f64, middle: f64) {
     let ends = [(left, middle), (left + SWATCH, middle)];
     let centre = (left + SWATCH / 2.0, middle);
     match swatch {
@@ -69,7 +67,7 @@ fn sample(canvas: &mut Canvas<'_>, swatch: Swatch, left: f64, middle: f64) {
 }
 
 /// Says that there is nothing to draw, in the middle of an empty picture; returns its height.
-pub(super) fn nothing(canvas: &mut Canvas<'_>, title: &str, reason: &str) -> f64 {
+pub(super) fn nothing(canvas: &mut Canvas, title: &str, reason: &str) -> f64 {
     let top = heading(canvas, title, &[]);
     canvas.text(Words::new(SIZE, MUTED), (MARGIN, top + 16.0), reason);
     top + 46.0

@@ -5,12 +5,11 @@
 //! caller's business. Nothing here fails: missing, non-finite or absurd numbers
 //! leave gaps in a picture, they never stop it.
 //!
-//! `plotters` writes the SVG elements; the layout is ours, because panels that
-//! share a time axis, legends that never cover data and lines placed finer than a
-//! pixel are what its charts do not offer.
+//! The layout is ours, because panels that share a time axis and legends that never
+//! cover data are what chart libraries do not offer; what is left is to write a few
+//! SVG elements ([`canvas`](self)).
 
 mod axis;
-mod bars;
 mod canvas;
 mod closed_loop;
 mod decimate;
@@ -23,11 +22,9 @@ mod palette;
 mod panel;
 mod ranking;
 mod report;
-mod search_progress;
 mod strip;
 mod where_it_fails;
 
-pub use bars::{BarRow, Bars, bars};
 pub use closed_loop::{ClosedLoop, LoopRun, closed_loop};
 pub use delay_law::{DelayEdge, DelayLawPlot, LawPoint, MeasuredDelay, delay_law};
 pub use format::significant;
@@ -35,10 +32,7 @@ pub use ladder::{Ladder, LadderRecord, LadderStep, ladder};
 pub use overlay::{Overlay, Run, overlay};
 pub use ranking::{Candidate, Ranking, ranking};
 pub use report::{Column, KeyNumber, Report, Tone};
-pub use search_progress::{ProgressRun, SearchProgress, search_progress};
 pub use where_it_fails::{FailureBin, FailureView, WhereItFails, where_it_fails};
 
-#[cfg(test)]
-mod gallery;
 #[cfg(test)]
 mod testing;

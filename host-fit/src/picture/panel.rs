@@ -84,11 +84,11 @@ impl Panel {
     }
 
     /// Grid, lower and left axis and the ticks of y with its label.
-    pub(super) fn frame(&self, canvas: &mut Canvas<'_>, y_label: &str) {
+    pub(super) fn frame(&self, canvas: &mut Canvas, y_label: &str) {
         self.grid(canvas, y_label, (self.height / 44.0).max(2.0) as usize);
     }
 
-    fn grid(&self, canvas: &mut Canvas<'_>, y_label: &str, count: usize) {
+    fn grid(&self, canvas: &mut Canvas, y_label: &str, count: usize) {
         for Tick { value, label } in self.y.ticks(count) {
             let Some((_, at)) = self.point(self.x.ends().0, value) else {
                 continue;
@@ -118,14 +118,14 @@ impl Panel {
     }
 
     /// Vertical grid lines at the ticks of x.
-    pub(super) fn uprights(&self, canvas: &mut Canvas<'_>) {
+    pub(super) fn uprights(&self, canvas: &mut Canvas) {
         for (at, _) in self.x_ticks() {
             canvas.line(&[(at, self.top), (at, self.bottom())], Ink::new(GRID, 1.0));
         }
     }
 
     /// Ticks, tick labels and label of x, [`FOOT`] high.
-    pub(super) fn foot(&self, canvas: &mut Canvas<'_>, x_label: &str) {
+    pub(super) fn foot(&self, canvas: &mut Canvas, x_label: &str) {
         for (at, label) in self.x_ticks() {
             canvas.line(
                 &[(at, self.bottom()), (at, self.bottom() + 4.0)],
@@ -166,7 +166,7 @@ impl Panel {
     /// A record, thinned to `columns` columns.
     pub(super) fn trace(
         &self,
-        canvas: &mut Canvas<'_>,
+        canvas: &mut Canvas,
         clock: Clock,
         values: &[f64],
         range: Range<usize>,
@@ -185,7 +185,7 @@ impl Panel {
     /// The area between two records; a column keeps the lowest of `low` and the highest of `high`.
     pub(super) fn band(
         &self,
-        canvas: &mut Canvas<'_>,
+        canvas: &mut Canvas,
         clock: Clock,
         (low, high): (&[f64], &[f64]),
         range: Range<usize>,
@@ -226,7 +226,7 @@ impl Panel {
     /// A line through points in the units of the axes; non-finite ones break it.
     pub(super) fn curve(
         &self,
-        canvas: &mut Canvas<'_>,
+        canvas: &mut Canvas,
         points: impl IntoIterator<Item = (f64, f64)>,
         ink: Ink,
     ) {
@@ -244,14 +244,14 @@ impl Panel {
     }
 
     /// A dashed horizontal line across the panel.
-    pub(super) fn level(&self, canvas: &mut Canvas<'_>, y: f64, ink: Ink) {
+    pub(super) fn level(&self, canvas: &mut Canvas, y: f64, ink: Ink) {
         if let Some((_, at)) = self.point(self.x.ends().0, y) {
             canvas.dashes(&[(self.left, at), (self.left + self.width, at)], ink, 7.0);
         }
     }
 
     /// A dashed vertical line across the panel.
-    pub(super) fn upright(&self, canvas: &mut Canvas<'_>, x: f64, ink: Ink) {
+    pub(super) fn upright(&self, canvas: &mut Canvas, x: f64, ink: Ink) {
         if let Some((at, _)) = self.point(x, self.y.ends().0) {
             canvas.dashes(&[(at, self.top), (at, self.bottom())], ink, 7.0);
         }

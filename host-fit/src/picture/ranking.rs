@@ -4,7 +4,7 @@ use super::axis::{Axis, extent};
 use super::canvas::{Anchor, Ink, MARGIN, WIDTH, Words, draw, fit, text_width};
 use super::legend::{Swatch, heading, nothing};
 use super::overlay::union;
-use super::palette::{BLUE, FLOOR, GRID, INK, MUTED, VERMILLION};
+use super::palette::{BLUE, GRID, INK, MUTED, VERMILLION};
 use super::panel::{FOOT, Panel};
 
 /// One candidate.
@@ -18,8 +18,6 @@ pub struct Candidate<'a> {
     pub low: f64,
     /// Upper end of the interval.
     pub high: f64,
-    /// A decoy: time-shifted or taken from another record, so that it can win by chance only.
-    pub decoy: bool,
     /// Accepted as missing effect.
     pub accepted: bool,
     /// A few words at the right, for example `"p < 0.001"`; empty for none.
@@ -66,11 +64,8 @@ pub fn ranking(plot: &Ranking<'_>) -> String {
         if order.iter().any(|c| c.accepted) {
             entries.push((Swatch::Dot(VERMILLION), "accepted".to_owned()));
         }
-        if order.iter().any(|c| !c.decoy && !c.accepted) {
+        if order.iter().any(|c| !c.accepted) {
             entries.push((Swatch::Dot(BLUE), "candidate".to_owned()));
-        }
-        if order.iter().any(|c| c.decoy) {
-            entries.push((Swatch::Ring(FLOOR), "decoy".to_owned()));
         }
         if noise.is_some() {
             entries.push((Swatch::Dashes(INK), "noise floor".to_owned()));
@@ -130,11 +125,7 @@ pub fn ranking(plot: &Ranking<'_>) -> String {
         }
         for (row, candidate) in rows() {
             let middle = middle(row);
-            let colour = match (candidate.accepted, candidate.decoy) {
-                (true, _) => VERMILLION,
-                (false, true) => FLOOR,
-                (false, false) => BLUE,
-            };
+            let colour = if candidate.accepted { VERMILLION } else { BLUE };
             let place = |value: f64| Some(panel.point(value, 0.0)?.0);
             let beyond = candidate.rmse > panel.x.ends().1;
             let interval = place(candidate.low).zip(place(candidate.high));
@@ -149,11 +140,9 @@ pub fn ranking(plot: &Ranking<'_>) -> String {
                 let text = format!("{} →", super::significant(candidate.rmse, 2));
                 canvas.text(words, (at, middle), &text);
             } else if let Some(at) = place(candidate.rmse) {
-                let filled = !candidate.decoy;
-                let radius = if filled { 5.0 } else { 4.25 };
-                canvas.dot((at, middle), radius, Ink::new(colour, 1.75), filled);
+                canvas.dot((at, middle), 5.0, Ink::new(colour, 1.75), true);
             }
-            let name = Words::new(SIZE, if candidate.decoy { MUTED } else { INK });
+            let name = Words::new(SIZE, INK);
             let name = if candidate.accepted {
                 name.bold()
             } else {
@@ -213,7 +202,6 @@ mod tests {
                     rmse: *v,
                     low: v * 2.0,
                     high: f64::NAN,
-                    decoy: *v > 0.0,
                     accepted: *v < 0.0,
                     note: "p < 0.05 & <more>",
                 })

@@ -13,7 +13,7 @@ pub(super) const HEIGHT: f64 = 18.0;
 /// Draws `u` below `above`, at `top`: bars while on, or a line where the command
 /// has more than two levels.
 pub(super) fn strip(
-    canvas: &mut Canvas<'_>,
+    canvas: &mut Canvas,
     above: &Panel,
     top: f64,
     (clock, u, range): (Clock, &[f64], Range<usize>),

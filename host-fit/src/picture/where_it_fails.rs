@@ -104,7 +104,7 @@ pub fn where_it_fails(plot: &WhereItFails<'_>) -> String {
     })
 }
 
-fn small(canvas: &mut Canvas<'_>, panel: &Panel, view: &FailureView<'_>, y_label: &str) {
+fn small(canvas: &mut Canvas, panel: &Panel, view: &FailureView<'_>, y_label: &str) {
     panel.frame(canvas, y_label);
     title(canvas, panel, view);
     // The largest bin of a coordinate that explains nothing is chance, not a place.
@@ -141,7 +141,7 @@ fn small(canvas: &mut Canvas<'_>, panel: &Panel, view: &FailureView<'_>, y_label
 }
 
 /// Name, unit and explained share above a panel.
-fn title(canvas: &mut Canvas<'_>, panel: &Panel, view: &FailureView<'_>) {
+fn title(canvas: &mut Canvas, panel: &Panel, view: &FailureView<'_>) {
     let at = panel.top - 14.0;
     let mut room = panel.width;
     if let Some(share) = view.explained_fraction.filter(|s| s.is_finite()) {
@@ -165,7 +165,7 @@ fn title(canvas: &mut Canvas<'_>, panel: &Panel, view: &FailureView<'_>) {
 }
 
 /// Bin limits below a panel, as many as fit; a bin of one value has its label in the middle.
-fn edges(canvas: &mut Canvas<'_>, panel: &Panel, bins: &[FailureBin], slot: f64) {
+fn edges(canvas: &mut Canvas, panel: &Panel, bins: &[FailureBin], slot: f64) {
     const SIZE: f64 = 12.5;
     let single = bins.iter().all(|b| b.from == b.to);
     let offset = if single { 0.5 } else { 0.0 };
@@ -225,7 +225,6 @@ fn worst(bins: &[FailureBin]) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::picture::palette::hex;
     use crate::picture::testing::{absurd_series, check, words};
 
     fn bin(from: f64, rmse: f64) -> FailureBin {
@@ -254,7 +253,7 @@ mod tests {
         assert!(words(&svg).contains("explains 74 %"));
         assert_eq!(worst(&bins), Some(1));
         // One bar and the legend.
-        let fill = format!("fill=\"{}\" stroke=\"none\"", hex(VERMILLION));
+        let fill = format!("fill=\"{VERMILLION}\" opacity");
         assert_eq!(svg.matches(&fill).count(), 2);
     }
 

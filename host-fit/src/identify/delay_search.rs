@@ -6,13 +6,13 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::free_run::FreeRun;
-use super::free_run_steps::{FreeKickStep, InputStep, PredictedStep};
+use super::free_run_steps::{FreeKickStep, exchange_predicted, move_inputs};
 use super::free_runner::FreeRunner;
-use super::one_step::{ExchangeStep, KickStep, OneStep, PairStep};
+use super::one_step::{KickStep, OneStep, exchange_pairs, exchange_singles};
 use super::options::{IdentifyOptions, Objective};
 use super::regression::Regression;
 use crate::search::{
-    Evaluation, Point, Progress, Report, SearchStep, Speculative, Success, minimise,
+    Evaluation, Point, Progress, Report, SearchStep, Settle, Speculative, Success, minimise,
 };
 
 /// Fruitless kicks of a free-run search per unit of patience, and kicks in all.
@@ -42,9 +42,9 @@ pub(crate) fn search(
         Objective::FreeRun => options.patience,
     };
     let mut steps: Vec<Box<dyn SearchStep<OneStep>>> = vec![
-        Box::new(ExchangeStep::default()),
+        Box::new(Settle::new(exchange_singles)),
         Box::new(Speculative::default()),
-        Box::new(PairStep::default()),
+        Box::new(Settle::new(exchange_pairs)),
         Box::new(KickStep::new(kicks)),
     ];
     let report = minimise(
@@ -68,8 +68,8 @@ pub(crate) fn search(
     let runner = FreeRunner::new(&regression.signals, &options.structure);
     let mut free_run = FreeRun { regression, runner };
     let mut steps: Vec<Box<dyn SearchStep<FreeRun>>> = vec![
-        Box::new(PredictedStep::default()),
-        Box::new(InputStep::default()),
+        Box::new(Settle::new(exchange_predicted)),
+        Box::new(Settle::new(move_inputs)),
         Box::new(Speculative::default()),
         Box::new(FreeKickStep::new(
             FREE_KICKS.0 * options.patience,

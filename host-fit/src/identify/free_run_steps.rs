@@ -19,10 +19,34 @@ const PROMISING: f64 = 1.01;
 const AROUND: [i32; 6] = [-1, 1, -2, 2, -4, 4];
 
 /// Search step: exchanges lags where the linearised free run predicts the best.
-#[derive(Default)]
-pub(crate) struct PredictedStep {
-    settled_at: Option<Point>,
-    screened: usize,
+pub(crate) fn exchange_predicted(
+    evaluator: &mut Evaluator<'_, FreeRun>,
+    around: &Around<'_>,
+    screened: &mut usize,
+) -> Result<(Point, Option<Success>), StopReason> {
+    let best = descend(evaluator, incumbent(around), screened, |_, _| false)?;
+    Ok(settled(best, around))
+}
+
+/// Search step: walks the input delays.
+pub(crate) fn move_inputs(
+    evaluator: &mut Evaluator<'_, FreeRun>,
+    around: &Around<'_>,
+    _: &mut usize,
+) -> Result<(Point, Option<Success>), StopReason> {
+    Ok(settled(walk_inputs(evaluator, incumbent(around))?, around))
+}
+
+fn incumbent(around: &Around<'_>) -> Success {
+    Success {
+        point: around.point.to_vec(),
+        value: around.value,
+    }
+}
+
+fn settled(best: Success, around: &Around<'_>) -> (Point, Option<Success>) {
+    let better = best.value < around.value;
+    (best.point.clone(), better.then_some(best))
 }
 
 /// Sweeps over all slots from a candidate until a sweep gains little, or until
@@ -165,29 +189,6 @@ fn predicted_minima(
         .collect()
 }
 
-impl SearchStep<FreeRun> for PredictedStep {
-    fn search(
-        &mut self,
-        evaluator: &mut Evaluator<'_, FreeRun>,
-        around: &mut Around<'_>,
-    ) -> Result<Option<Success>, StopReason> {
-        if self.settled_at.as_deref() == Some(around.point) {
-            return Ok(None);
-        }
-        let start = Success {
-            point: around.point.to_vec(),
-            value: around.value,
-        };
-        let best = descend(evaluator, start, &mut self.screened, |_, _| false)?;
-        self.settled_at = Some(best.point.clone());
-        Ok((best.value < around.value).then_some(best))
-    }
-
-    fn screened(&self) -> usize {
-        self.screened
-    }
-}
-
 /// How far an input delay is moved in one step, samples.
 const INPUT_MOVES: [f64; 9] = [0.02, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0, 6.0, 12.0];
 
@@ -214,31 +215,6 @@ fn walk_inputs(
         moved = best_of(evaluator, &trials, &mut best)?.is_some();
     }
     Ok(best)
-}
-
-/// Search step: walks the input delays.
-#[derive(Default)]
-pub(crate) struct InputStep {
-    settled_at: Option<Point>,
-}
-
-impl SearchStep<FreeRun> for InputStep {
-    fn search(
-        &mut self,
-        evaluator: &mut Evaluator<'_, FreeRun>,
-        around: &mut Around<'_>,
-    ) -> Result<Option<Success>, StopReason> {
-        if self.settled_at.as_deref() == Some(around.point) {
-            return Ok(None);
-        }
-        let start = Success {
-            point: around.point.to_vec(),
-            value: around.value,
-        };
-        let best = walk_inputs(evaluator, start)?;
-        self.settled_at = Some(best.point.clone());
-        Ok((best.value < around.value).then_some(best))
-    }
 }
 
 /// Lags that a kick replaces.

@@ -86,65 +86,35 @@ pub(crate) fn settle(
 }
 
 /// Search step: exchanges single lags and input delays until none helps.
-#[derive(Default)]
-pub(crate) struct ExchangeStep {
-    settled_at: Option<Point>,
-    screened: usize,
-}
-
-impl SearchStep<OneStep> for ExchangeStep {
-    fn search(
-        &mut self,
-        evaluator: &mut Evaluator<'_, OneStep>,
-        around: &mut Around<'_>,
-    ) -> Result<Option<Success>, StopReason> {
-        if self.settled_at.as_deref() == Some(around.point) {
-            return Ok(None);
-        }
-        let regression = &mut evaluator.problem_mut().regression;
-        let mut delays = regression.layout.delays(around.point);
-        settle(regression, &mut delays, None, &mut self.screened);
-        let point = regression.layout.point(&delays);
-        self.settled_at = Some(point.clone());
-        evaluator.first_better(&[point], around.value)
-    }
-
-    fn screened(&self) -> usize {
-        self.screened
-    }
+pub(crate) fn exchange_singles(
+    evaluator: &mut Evaluator<'_, OneStep>,
+    around: &Around<'_>,
+    screened: &mut usize,
+) -> Result<(Point, Option<Success>), StopReason> {
+    let regression = &mut evaluator.problem_mut().regression;
+    let mut delays = regression.layout.delays(around.point);
+    settle(regression, &mut delays, None, screened);
+    let point = regression.layout.point(&delays);
+    let success = evaluator.first_better(std::slice::from_ref(&point), around.value)?;
+    Ok((point, success))
 }
 
 /// Search step: exchanges pairs of lags, once single exchanges no longer help.
-#[derive(Default)]
-pub(crate) struct PairStep {
-    settled_at: Option<Point>,
-    screened: usize,
-}
-
-impl SearchStep<OneStep> for PairStep {
-    fn search(
-        &mut self,
-        evaluator: &mut Evaluator<'_, OneStep>,
-        around: &mut Around<'_>,
-    ) -> Result<Option<Success>, StopReason> {
-        if self.settled_at.as_deref() == Some(around.point) {
-            return Ok(None);
-        }
-        let interrupt = evaluator.interrupt();
-        let regression = &mut evaluator.problem_mut().regression;
-        let mut delays = regression.layout.delays(around.point);
-        regression.tabulate(&delays.ticks);
-        let mut exchange = Exchange::new(regression, &delays.ticks);
-        exchange.descend_in_pairs(&mut delays, || !interrupt.load(Ordering::Relaxed));
-        self.screened += exchange.screened();
-        let point = regression.layout.point(&delays);
-        self.settled_at = Some(point.clone());
-        evaluator.first_better(&[point], around.value)
-    }
-
-    fn screened(&self) -> usize {
-        self.screened
-    }
+pub(crate) fn exchange_pairs(
+    evaluator: &mut Evaluator<'_, OneStep>,
+    around: &Around<'_>,
+    screened: &mut usize,
+) -> Result<(Point, Option<Success>), StopReason> {
+    let interrupt = evaluator.interrupt();
+    let regression = &mut evaluator.problem_mut().regression;
+    let mut delays = regression.layout.delays(around.point);
+    regression.tabulate(&delays.ticks);
+    let mut exchange = Exchange::new(regression, &delays.ticks);
+    exchange.descend_in_pairs(&mut delays, || !interrupt.load(Ordering::Relaxed));
+    *screened += exchange.screened();
+    let point = regression.layout.point(&delays);
+    let success = evaluator.first_better(std::slice::from_ref(&point), around.value)?;
+    Ok((point, success))
 }
 
 /// How far input delays are searched after a kick, samples.

@@ -44,6 +44,6 @@ pub use mesh::Mesh;
 pub use problem::{Evaluation, Problem};
 pub use settings::{PollKind, SETTINGS, SettingHelp, Settings};
 pub use shake::Shake;
-pub use step::{Around, SearchStep, Speculative};
+pub use step::{Around, Improve, SearchStep, Settle, Speculative};
 pub use stop::StopReason;
 pub use variable::{Point, Variable};

@@ -6,6 +6,7 @@ use super::evaluator::{Evaluator, Success};
 use super::mesh::{Mesh, moved};
 use super::problem::Problem;
 use super::stop::StopReason;
+use super::variable::Point;
 
 /// Where the search stands when a step is asked for a better point.
 pub struct Around<'a> {
@@ -83,5 +84,51 @@ impl<P: Problem> SearchStep<P> for Speculative {
             &around.mesh.round(&far),
         );
         evaluator.first_better(&[point], around.value)
+    }
+}
+
+/// From the incumbent, the point that a [`Settle`] ends at and, where that is better, the success; adds
+/// to the number of points screened.
+pub type Improve<P> = fn(
+    &mut Evaluator<'_, P>,
+    &Around<'_>,
+    &mut usize,
+) -> Result<(Point, Option<Success>), StopReason>;
+
+/// An improvement that depends on nothing but the incumbent: made once from each, and not
+/// from where it ended itself.
+pub struct Settle<P: Problem> {
+    improve: Improve<P>,
+    settled_at: Option<Point>,
+    screened: usize,
+}
+
+impl<P: Problem> Settle<P> {
+    /// A step that makes `improve`.
+    pub fn new(improve: Improve<P>) -> Self {
+        Self {
+            improve,
+            settled_at: None,
+            screened: 0,
+        }
+    }
+}
+
+impl<P: Problem> SearchStep<P> for Settle<P> {
+    fn search(
+        &mut self,
+        evaluator: &mut Evaluator<'_, P>,
+        around: &mut Around<'_>,
+    ) -> Result<Option<Success>, StopReason> {
+        if self.settled_at.as_deref() == Some(around.point) {
+            return Ok(None);
+        }
+        let (point, success) = (self.improve)(evaluator, around, &mut self.screened)?;
+        self.settled_at = Some(point);
+        Ok(success)
+    }
+
+    fn screened(&self) -> usize {
+        self.screened
     }
 }

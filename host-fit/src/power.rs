@@ -3,7 +3,7 @@
 //!
 //! X = (1.96 + 0.84)·s/‖z_p‖ with z_p the change of the free run per amplitude
 //! after projecting out what the base model's own parameters can imitate, and s
-//! the error's size with its correlation in time (theory D.3).
+//! the error's size with its correlation in time (theory 4.2).
 
 use crate::data::{Record, Use};
 use crate::dual::Dual;

@@ -476,7 +476,7 @@ mod tests {
     }
 
     /// Step responses of the printed coefficients, computed independently
-    /// (theory 0.3): .11 .23 .54 .79 .99 literal, .15 .27 .62 .84 1.02 one-step.
+    /// (theory 2.2): .11 .23 .54 .79 .99 literal, .15 .27 .62 .84 1.02 one-step.
     #[test]
     fn the_papers_model_rises_as_printed() {
         let literal = [

@@ -277,7 +277,7 @@ mod tests {
         }
     }
 
-    /// Theory 0.5, the first five seconds: steady blowing is the best of the full
+    /// Theory 2.4, the first five seconds: steady blowing is the best of the full
     /// model (1.00 from 0.5 s on); the averaged fixed-delay one, played raw
     /// on/off commands, gives 1.10 (found there by adjoint gradients) against 0.89.
     #[test]

@@ -1,7 +1,7 @@
 //! The periodic on/off command that gives the most friction for the air.
 //!
 //! Since the mean friction is affine in every single command, best commands are
-//! on/off by themselves (theory A.4); over a horizon shorter than the longest
+//! on/off by themselves (theory 3.4); over a horizon shorter than the longest
 //! lags the benefit of pulsing is invisible, so the search is over periodic
 //! commands: period, lengths and phases of the pulses. A search of free commands
 //! over a finite horizon ([`super::horizon`]) can propose further ones.
@@ -636,7 +636,7 @@ mod tests {
         }
     }
 
-    /// Theory 0.5: about 1.25 at a period of 0.55 s and a duty of 0.4, against
+    /// Theory 2.4: about 1.25 at a period of 0.55 s and a duty of 0.4, against
     /// 1.026 under steady blowing: the size of the paper's claim, from a model
     /// that is an exact integrator with the valve closed.
     #[test]
@@ -649,7 +649,7 @@ mod tests {
         assert!((optimum.moduli[0] - 1.0).abs() < 1e-5);
     }
 
-    /// Theory 0.5: the full model offers nothing beyond steady blowing but motions
+    /// Theory 2.4: the full model offers nothing beyond steady blowing but motions
     /// that grow.
     #[test]
     fn the_full_model_gives_no_more_than_steady_blowing() {
@@ -659,7 +659,7 @@ mod tests {
         assert!(optimum.duty > 0.9, "{optimum:?}");
     }
 
-    /// Under steady blowing the model grows as e^(k/943) (theory 0.2).
+    /// Under steady blowing the model grows as e^(k/943) (theory 2.1).
     #[test]
     fn steady_blowing_of_an_unstable_model_is_refused() {
         let model = paper_fixed(LagConvention::OneStep);
@@ -672,7 +672,7 @@ mod tests {
         assert!((optimum.mean_after_minutes / optimum.mean - 1.0).abs() < 0.05);
     }
 
-    /// Theory 0.6 has .93 at 250 ms with 40 % of the air, the best on its grid of
+    /// Theory 2.5 has .93 at 250 ms with 40 % of the air, the best on its grid of
     /// periods, and a finer search finds sharper resonances still. What counts is
     /// what 2 % of detuning leaves of them.
     #[test]
@@ -694,7 +694,7 @@ mod tests {
         assert!(optimum.mean_detuned > 0.95 * optimum.mean, "{optimum:?}");
     }
 
-    /// Theory 0.2 (i): this reading grows under steady blowing; whatever the
+    /// Theory 2.1: this reading grows under steady blowing; whatever the
     /// horizon promises, what is designed must last four minutes.
     #[test]
     fn a_finite_horizon_proposes_and_the_long_run_disposes() {

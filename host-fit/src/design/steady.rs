@@ -105,7 +105,7 @@ mod tests {
     use super::*;
     use model_core::recursion::LagConvention;
 
-    /// Theory 0.2 and 0.3.
+    /// Theory 2.1 and 2.2.
     #[test]
     fn poles_and_levels_of_the_papers_models() {
         let literal = paper_state_dependent(LagConvention::Literal);

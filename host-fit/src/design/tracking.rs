@@ -56,7 +56,7 @@ fn reachable<S: Serializer>(law: &Track, to: S) -> Result<S::Ok, S::Error> {
 }
 
 /// Samples by which a pulse can be cut at its arrival when the delay changes
-/// with the flow (theory A.3: k − h advances by 0 to 2 a sample).
+/// with the flow (theory 3.2: k − h advances by 0 to 2 a sample).
 const SHORTEST_SURE_PULSE: u32 = 3;
 
 /// Designs the law that holds `request.target` on `model`.
@@ -210,7 +210,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     })
 }
 
-/// u_eq = (α·y* − d)/(Σb + y*·Σc), theory A.2; effects are not in it.
+/// u_eq = (α·y* − d)/(Σb + y*·Σc), theory 3.1; effects are not in it.
 fn equivalent_duty(model: &Model, reference: f64) -> f64 {
     let alpha = 1.0 - model.a.iter().sum::<f64>();
     let gain = model.b.iter().sum::<f64>() + reference * model.c.iter().sum::<f64>();
@@ -348,7 +348,7 @@ pub(super) mod tests {
         }
     }
 
-    /// Table IV, averaged model, fixed delays, columns read as theory 0.2 (ii).
+    /// Table IV, averaged model, fixed delays, columns read as theory 2.1.
     pub(in super::super) fn paper_averaged() -> Model {
         Model {
             averaging: Averaging {

@@ -2,7 +2,7 @@
 //!
 //! Every candidate is judged by refitting everything with it and running free
 //! on held-out records. A candidate regressed on the residual alone misleads:
-//! the base model has absorbed part of it (theory D).
+//! the base model has absorbed part of it (theory 4.2).
 
 mod bench;
 mod climb;

@@ -1,6 +1,6 @@
 //! The leanest bilinear model: one lag each, one input.
 //!
-//! A model with many free lags imitates slow effects (theory D.3: what is left
+//! A model with many free lags imitates slow effects (theory 4.2: what is left
 //! of a plenum's droop behind 18 free coefficients is a twentieth). The leanest
 //! model has nothing to imitate with, so what it lacks stays visible.
 

@@ -11,12 +11,10 @@ pub mod golden;
 pub mod hold;
 pub mod pulses;
 pub mod reference;
-pub mod sliding;
 pub mod tracking;
 
 pub use budget::{Air, Switches};
 pub use hold::{Hold, HoldTimes};
 pub use pulses::PulseTrain;
 pub use reference::{Reachable, Unreachable};
-pub use sliding::Sliding;
 pub use tracking::{Decision, Measurement, Tracking, TrackingState};

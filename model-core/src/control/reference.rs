@@ -36,7 +36,7 @@ impl fmt::Display for Unreachable {
 impl core::error::Error for Unreachable {}
 
 impl<T: Real> Reachable<T> {
-    /// From the coefficients, theory: y_ss(u = 1) = (d + Σb)/(1 − Σa − Σc) and
+    /// From the coefficients, theory 2.2: y_ss(u = 1) = (d + Σb)/(1 − Σa − Σc) and
     /// d/(1 − Σa) without jets. `None` where a steady value does not exist (an
     /// integrating or growing model).
     ///

@@ -495,7 +495,7 @@ mod tests {
         }
     }
 
-    /// Theory A.3, hold times of 10 samples: a predicting relay gives rms .012 and
+    /// Theory 3.2, hold times of 10 samples: a predicting relay gives rms .012 and
     /// .025 at 0.5, .016 and .028 at 0.8, .016 and .035 at 0.95 (literal and
     /// one-step lags). Centring the swing on the reference does better.
     #[test]
@@ -524,7 +524,7 @@ mod tests {
         }
     }
 
-    /// Theory A.3, no hold times: rms .002, .003 and .003 with one-step lags.
+    /// Theory 3.2, no hold times: rms .002, .003 and .003 with one-step lags.
     #[test]
     fn without_hold_times_the_error_is_that_of_single_samples() {
         for reference in [0.5, 0.8, 0.95] {
@@ -534,7 +534,7 @@ mod tests {
         }
     }
 
-    /// Theory A.2 and A.4: the duty is u_eq = α·y*/(b + y*·Σc), and at 0.8 the
+    /// Theory 3.1 and 3.3: the duty is u_eq = α·y*/(b + y*·Σc), and at 0.8 the
     /// closing time binds: 2·(1 − u_eq)/m0 switches per sample, swing m0·α·y*.
     #[test]
     fn the_limit_cycle_is_that_of_the_formulae() {

@@ -8,7 +8,7 @@ use crate::real::Real;
 
 /// h = p0 + p1·exp(−p2·ỹ), samples, eq. (2).
 ///
-/// A negative ỹ counts as 0: the exponential would run away (theory: at
+/// A negative ỹ counts as 0: the exponential would run away (theory 1.1: at
 /// ỹ = −0.1 it would be 2.4 times the delay of the natural flow).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StateDependentDelay<T> {

@@ -58,6 +58,9 @@ pub(crate) fn proof() -> Result<()> {
         "host-fit",
         "--bin",
         PROGRAM,
+        // It runs for seconds only.
+        "--config",
+        "profile.release.package.host-fit.opt-level = 1",
     ])
     .in_copy(&copy))?;
     let tool = |arguments: &[&str]| -> Result<Value> {

@@ -209,7 +209,7 @@ pub fn extend(
         (Err(error), Err(_)) => return Err(error),
     };
     let parameters = specs.iter().map(|spec| {
-        let own = crate::diagnose::estimates(&fitted, spec);
+        let own = crate::diagnose::estimates(&fitted, spec, &crate::terms::Units::NONE);
         (spec.name.to_owned(), own)
     });
     Ok(Extended {

@@ -22,6 +22,8 @@ pub mod steps;
 pub mod target;
 pub mod user_effect;
 
+pub mod terms;
+
 mod linalg;
 
 pub use recordings as data;

@@ -96,6 +96,8 @@ pub fn books() -> Vec<Rulebook> {
         crate::excitation::RULES.book(),
         crate::fit::RULES.book(),
         crate::residual::RULES.book(),
+        crate::terms::RULES.book(),
+        crate::diagnose::RULES.book(),
     ]
 }
 

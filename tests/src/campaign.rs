@@ -163,6 +163,7 @@ pub fn run(case: &Case) -> Result<Outcome, String> {
         &set.data.records,
         &options,
         &AtomicBool::new(false),
+        &|_| (),
     )
     .map_err(|e| e.to_string())?;
     Ok(outcome(
@@ -336,6 +337,7 @@ pub fn said(outcome: &Outcome) -> String {
     let verdict = match outcome.verdict {
         Verdict::NothingMissing => "nothing",
         Verdict::EffectMissing => "",
+        Verdict::PartlyExplained => "partly ",
         Verdict::Unexplained => "unexplained ",
     };
     format!("{verdict}{}", outcome.missing.join(" + "))

@@ -98,7 +98,14 @@ fn diagnosed(model: &Model, train: Record, test: Record, most_effects: usize) ->
         most_effects,
         ..Options::default()
     };
-    diagnose(model, &[train, test], &options, &AtomicBool::new(false)).expect("a diagnosis")
+    diagnose(
+        model,
+        &[train, test],
+        &options,
+        &AtomicBool::new(false),
+        &|_| (),
+    )
+    .expect("a diagnosis")
 }
 
 /// EMPS, a ball screw under position control. A known grey-box fit has 20.39 N of

@@ -115,7 +115,13 @@ fn diagnosis(rig: &Rig, guess: &str, definitions: &[&str]) -> Diagnosis {
         most_effects: 1,
         ..Options::default()
     };
-    let found = diagnose(&model, &rig.records(), &options, &AtomicBool::new(false));
+    let found = diagnose(
+        &model,
+        &rig.records(),
+        &options,
+        &AtomicBool::new(false),
+        &|_| (),
+    );
     let found = found.expect("a diagnosis");
     for rung in &found.ladder {
         println!("{:<40} {:.5}", rung.step, rung.validate_rmse);

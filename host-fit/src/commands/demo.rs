@@ -68,7 +68,7 @@ const TIMES: HoldTimes = HoldTimes { on: 10, off: 10 };
 /// A few lags are enough to show the way, and quick.
 fn request(delay: DelayKind) -> IdentifyRequest {
     IdentifyRequest {
-        delay,
+        delay: Some(delay),
         n1: Some(2),
         n2: Some(2),
         max_lag: Some(150),

@@ -11,7 +11,9 @@ use model_core::recursion::LagConvention;
 use super::Console;
 use super::effect_files::EffectFiles;
 
-/// Identify a model: the delays by search (MADS), the coefficients by least squares inside it.
+/// Identify a model: as many lags as earn their place on held-out records, or as many as are asked for.
+///
+/// With counts of lags, the delays are found by search (MADS) and the coefficients by least squares inside it.
 ///
 /// With the objective `free-run` the coefficients are refined on the free run afterwards, and kept if the held-out
 /// error falls.
@@ -30,9 +32,13 @@ pub(crate) struct Args {
 /// What to identify and how: the options of the command.
 #[derive(Debug, Clone, clap::Args)]
 struct Request {
-    /// Input delays: constant, eq. (3), or falling with the averaged output, eq. (4).
-    #[arg(long, value_enum, default_value_t = Delay::Fixed)]
-    delay: Delay,
+    /// Input delays: constant, eq. (3), or falling with the averaged output, eq. (4) [default: what does better on
+    /// held-out records; fixed where counts of lags are given].
+    #[arg(long, value_enum)]
+    delay: Option<Delay>,
+    /// Keep delays between samples even where that pays little; with a structure that is chosen.
+    #[arg(long)]
+    interpolated: bool,
     /// Law h = P0 + P1·exp(−P2·ỹ), in samples, in place of a measured one; implies `--delay state-dependent`.
     #[arg(long, value_name = "P0,P1,P2", allow_hyphen_values = true)]
     delay_law: Option<LawArgument>,
@@ -42,9 +48,10 @@ struct Request {
     /// Identify the model of the moving averages, eqs. (14) and (15).
     #[arg(long)]
     averaged: bool,
-    /// Number of state lags N1 [default: 5; averaged: 2].
-    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u16).range(1..=100))]
-    n1: Option<u16>,
+    /// Number of state lags N1, or `auto`: the structure is chosen by held-out error [default: auto where no count is
+    /// given; 5 beside other counts; averaged: 2].
+    #[arg(long, value_name = "COUNT|auto")]
+    n1: Option<Count>,
     /// Number of product lags N2 [default: 10; averaged: 2].
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u16).range(0..=100))]
     n2: Option<u16>,
@@ -74,6 +81,25 @@ struct Request {
     effect: Vec<String>,
     #[command(flatten)]
     effect_files: EffectFiles,
+}
+
+/// `--n1`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Count {
+    Automatic,
+    Lags(u16),
+}
+
+impl FromStr for Count {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.parse::<u16>() {
+            _ if text == "auto" => Ok(Self::Automatic),
+            Ok(count @ 1..=100) => Ok(Self::Lags(count)),
+            _ => Err("a number from 1 to 100 is needed, or auto".to_owned()),
+        }
+    }
 }
 
 /// `--delay`.
@@ -126,13 +152,18 @@ impl Request {
     fn library(&self) -> anyhow::Result<IdentifyRequest> {
         Ok(IdentifyRequest {
             delay: match (self.delay_law, self.delay) {
-                (Some(LawArgument(law)), _) => DelayKind::Prescribed(law),
-                (None, Delay::Fixed) => DelayKind::Fixed,
-                (None, Delay::StateDependent) => DelayKind::StateDependent,
+                (Some(LawArgument(law)), _) => Some(DelayKind::Prescribed(law)),
+                (None, Some(Delay::Fixed)) => Some(DelayKind::Fixed),
+                (None, Some(Delay::StateDependent)) => Some(DelayKind::StateDependent),
+                (None, None) => None,
             },
+            interpolated: self.interpolated,
             factors: self.factors.clone(),
             averaged: self.averaged,
-            n1: self.n1,
+            n1: self.n1.and_then(|count| match count {
+                Count::Automatic => None,
+                Count::Lags(count) => Some(count),
+            }),
             n2: self.n2,
             n3: self.n3,
             max_lag: self.max_lag,

@@ -119,6 +119,10 @@ impl Onlooker for Watch {
         self.bar.reset_elapsed();
     }
 
+    fn now(&self, what: &str) {
+        self.bar.set_message(what.to_owned());
+    }
+
     fn sees(&self, snapshot: &Snapshot) {
         self.bar.set_message(format!(
             "{} evaluations, best {:.5}",

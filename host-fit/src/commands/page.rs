@@ -112,7 +112,7 @@ pub(crate) fn report_finding(report: &mut Report, set: &DataSet, found: &Finding
     let tone = match diagnosis.verdict {
         Verdict::NothingMissing => Tone::Good,
         Verdict::EffectMissing => Tone::Finding,
-        Verdict::Unexplained => Tone::Warning,
+        Verdict::PartlyExplained | Verdict::Unexplained => Tone::Warning,
     };
     report.verdict(tone, &found.headline, &found.meaning);
     report.section("Held-out error, step by step");

@@ -337,6 +337,48 @@ pub fn fit(model: &Model, records: &[&Record], options: &FitOptions) -> Result<F
     })
 }
 
+/// The free run of `model` over `record`, and its derivatives by the coordinates with
+/// these `indices` (see [`Model::coordinates`]), in their own units; `None` if it
+/// diverges or a channel is missing. Delays are taken as they are, without rounding.
+#[must_use]
+pub fn sensitivities(
+    model: &Model,
+    record: &Record,
+    indices: &[usize],
+) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+    let signals = Signals::of(model, record).ok()?;
+    let values = model.values();
+    let mut run = Vec::with_capacity(record.len());
+    let mut columns = Vec::with_capacity(indices.len());
+    // An empty chunk where nothing is wanted but the run.
+    let none: [&[usize]; 1] = [&[]];
+    let chunks: Vec<&[usize]> = match indices {
+        [] => none.to_vec(),
+        indices => indices.chunks(FEW).collect(),
+    };
+    for chunk in chunks {
+        let mut duals: Vec<Dual<FEW>> = values.iter().map(|v| Dual::constant(*v)).collect();
+        for (slot, index) in chunk.iter().enumerate() {
+            duals[*index] = Dual::parameter(values[*index], slot);
+        }
+        let mut own = vec![Vec::with_capacity(record.len()); chunk.len()];
+        run.clear();
+        let simulator = Simulator::with_values(model, &duals, Rounding::None);
+        let left = simulator.run(&signals, |_, output: &Output<Dual<FEW>>| {
+            run.push(output.measured.value);
+            for (column, slope) in own.iter_mut().zip(output.measured.partials) {
+                column.push(slope);
+            }
+            ControlFlow::Continue(())
+        });
+        if left.is_some() {
+            return None;
+        }
+        columns.append(&mut own);
+    }
+    Some((run, columns))
+}
+
 fn descend(
     model: &Model,
     records: &[&Record],

@@ -11,7 +11,7 @@ mod starts;
 pub use candidate::{CandidateError, fit_with_effect};
 pub(crate) use drift::pieces;
 pub use drift::restart_after;
-pub use free_run::{Fit, FitOptions, fit};
+pub use free_run::{Fit, FitOptions, fit, sensitivities};
 pub use lean::{lean_base, settle_fixed_delay};
 pub use levenberg::StopReason;
 pub use rules::{RULES, Rules};

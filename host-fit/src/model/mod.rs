@@ -21,7 +21,7 @@ pub use prepared::{AnyDelay, Prepared, Rounding};
 
 use crate::user_effect::Definition;
 use model_core::effect::{Place, Spec};
-use model_core::effects::SPECS;
+use model_core::effects::{ConstantDelay, SPECS, ZERO_OFFSET};
 use model_core::model::Averaging;
 use model_core::recursion::{Grading, LagConvention};
 use serde::{Deserialize, Serialize};
@@ -137,6 +137,9 @@ pub struct Training {
     pub objective_value: f64,
     /// FIT of the free run over the identify records, %.
     pub identify_fit_percent: f64,
+    /// Effects of the model that describe part of a misfit without being proven.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stand_ins: Vec<String>,
     /// FIT of the free run over the validate records, %; NaN is written as absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub validate_fit_percent: Option<f64>,
@@ -200,10 +203,15 @@ impl Model {
         SPECS.iter().chain(own)
     }
 
-    /// The effect called `name`: of the catalogue, or the user's own.
+    /// Everything that the model could have: the candidates, and the sensor's zero.
+    fn known(&self) -> impl Iterator<Item = &'static Spec> {
+        self.candidates().chain([ZERO_OFFSET])
+    }
+
+    /// The effect called `name`: of the catalogue, the user's own, or the sensor's zero.
     #[must_use]
     pub fn spec(&self, name: &str) -> Option<&'static Spec> {
-        self.candidates().find(|spec| spec.name == name)
+        self.known().find(|spec| spec.name == name)
     }
 
     /// The definition of the user's own effect called `name`.
@@ -260,6 +268,34 @@ impl Model {
         longest.clamp(0.0, 1_048_576.0).round() as usize
     }
 
+    /// Takes delays between samples, so that a fit can move them: y moves by several
+    /// times the noise from sample to sample after an edge.
+    pub(crate) fn delay_between_samples(&mut self) {
+        match &mut self.delay {
+            Delay::Law(law) => law.interpolated = true,
+            Delay::Fixed { delays } => {
+                let first = f64::from(delays.first().copied().unwrap_or(0));
+                let factors = self.delay.factors();
+                self.delay = Delay::of::<ConstantDelay<f64>>(&[first], factors, true);
+            }
+        }
+    }
+
+    /// Rounds delays to samples, as eqs. (3) and (4) have them.
+    pub(crate) fn delay_on_samples(&mut self) {
+        let Delay::Law(law) = &mut self.delay else {
+            return;
+        };
+        law.interpolated = false;
+        if law.spec.law.is_some_and(|card| card.base) {
+            let [constant, _] = law.range(self.sample_period_s);
+            let rounded = |f: &f64| (f * constant).round().clamp(0.0, f64::from(u16::MAX)) as u16;
+            self.delay = Delay::Fixed {
+                delays: law.factors.iter().map(rounded).collect(),
+            };
+        }
+    }
+
     /// Channels that the effects need, in the order in which they are passed.
     #[must_use]
     pub fn channels(&self) -> Vec<String> {
@@ -296,10 +332,7 @@ impl Model {
             reference,
         });
         // By place, within a place as the catalogue has them, the user's last.
-        let order: Vec<(Place, &str)> = self
-            .candidates()
-            .map(|spec| (spec.place, spec.name))
-            .collect();
+        let order: Vec<(Place, &str)> = self.known().map(|spec| (spec.place, spec.name)).collect();
         let rank = |added: &Added| {
             let index = order.iter().position(|(_, name)| *name == added.name);
             (index.map(|index| order[index].0), index)

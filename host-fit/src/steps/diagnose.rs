@@ -6,10 +6,10 @@ use super::onlooker::watched;
 use super::{Onlooker, StepError, check_period, trained_in_free_run, verdict};
 use crate::data::DataSet;
 use crate::diagnose::{
-    Diagnosis, HeldOutBy, NotTried, Options, Ranked, Rung, Verdict, diagnose as search,
+    Diagnosis, HeldOutBy, Memory, NotTried, Options, Ranked, Rung, Verdict, diagnose as search,
 };
 use crate::indicators::{Scores, score, score_new};
-use crate::model::Model;
+use crate::model::{Model, Training};
 use crate::power::{Detectable, detectable};
 use crate::residual::{Failures, NoiseSource, Where, where_it_fails};
 use crate::simulate::SimulateError;
@@ -45,6 +45,9 @@ impl Serialize for Finding {
         struct Document<'a> {
             verdict: Verdict,
             missing: &'a [String],
+            stand_ins: &'a [String],
+            sets: &'a [Vec<String>],
+            memory: &'a [Memory],
             ladder: &'a [Rung],
             ranking: &'a [Ranked],
             not_tried: &'a [NotTried],
@@ -68,6 +71,9 @@ impl Serialize for Finding {
         let document = Document {
             verdict: found.verdict,
             missing: &found.missing,
+            stand_ins: &found.stand_ins,
+            sets: &found.sets,
+            memory: &found.memory,
             ladder: &found.ladder,
             ranking: &found.ranking,
             not_tried: &found.not_tried,
@@ -101,12 +107,15 @@ pub fn diagnose(
 ) -> Result<Finding, StepError> {
     check_period(model, set)?;
     let records = model.targets(&set.records);
-    let (diagnosis, failures, detectable) = watched(onlooker, "trying every effect", || {
-        let diagnosis = search(model, &records, options, onlooker.interrupt())?;
+    let (diagnosis, failures, detectable) = watched(onlooker, "diagnosis", || {
+        let progress = |what: &str| onlooker.now(what);
+        let diagnosis = search(model, &records, options, onlooker.interrupt(), &progress)?;
         let failures = where_it_fails(&diagnosis.model, &records);
         let detectable = match diagnosis.verdict {
             Verdict::NothingMissing => detectable(&diagnosis.model, &records),
-            Verdict::EffectMissing | Verdict::Unexplained => Ok(Vec::new()),
+            Verdict::EffectMissing | Verdict::PartlyExplained | Verdict::Unexplained => {
+                Ok(Vec::new())
+            }
         };
         Ok::<_, StepError>((diagnosis, failures, detectable))
     })?;
@@ -128,7 +137,10 @@ pub fn diagnose(
     let (headline, meaning) = verdict::words(&diagnosis);
     Ok(Finding {
         model: Model {
-            training: trained_in_free_run(set, &scores, options.seed),
+            training: Training {
+                stand_ins: diagnosis.stand_ins.clone(),
+                ..trained_in_free_run(set, &scores, options.seed)
+            },
             ..diagnosis.model.clone()
         },
         headline,

@@ -4,7 +4,7 @@ use serde::{Serialize, Serializer};
 
 use super::measured_law::measured_law;
 use super::onlooker::{Searching, watched};
-use super::{Onlooker, StepError, finite_fit, training};
+use super::{Onlooker, StepError, finite_fit, trained_in_free_run, training};
 use crate::data::{DataSet, Record};
 use crate::excitation::{Demand, ExcitationError, check_excitation};
 use crate::extend::{effects_for, extend};
@@ -16,19 +16,25 @@ use crate::identify::{
 use crate::indicators::{Scores, one_step_norm, score_new};
 use crate::model::{Delay, Model, Start};
 use crate::search::{Settings, StopReason};
+use crate::terms::base_model;
 use crate::user_effect::Definition;
+use model_core::effects::StateDependentDelay;
 use model_core::recursion::LagConvention;
+use std::time::Instant;
 
 /// What to identify and how.
 #[derive(Debug, Clone)]
 pub struct IdentifyRequest {
-    /// Where the input delays come from.
-    pub delay: DelayKind,
+    /// Where the input delays come from; none for what does better on held-out records.
+    pub delay: Option<DelayKind>,
+    /// Keep delays between samples even where they do not pay.
+    pub interpolated: bool,
     /// Factors f of the delay law, one per input, in place of searching them; empty to search.
     pub factors: Vec<f64>,
     /// Identify the model of the moving averages, eqs. (14) and (15).
     pub averaged: bool,
-    /// Number of state lags N1; by default 5, for the averaged model 2.
+    /// Number of state lags N1. Where no count is given and the objective is the free run, the structure is chosen by
+    /// held-out error; otherwise 5, for the averaged model 2.
     pub n1: Option<u16>,
     /// Number of product lags N2; by default 10, for the averaged model 2.
     pub n2: Option<u16>,
@@ -67,7 +73,8 @@ impl Default for IdentifyRequest {
     fn default() -> Self {
         let search = Settings::default();
         Self {
-            delay: DelayKind::Fixed,
+            delay: None,
+            interpolated: false,
             factors: Vec::new(),
             averaged: false,
             n1: None,
@@ -197,6 +204,33 @@ impl IdentifyRequest {
         })
     }
 
+    /// Whether the structure is chosen by held-out error.
+    fn is_automatic(&self) -> bool {
+        let counted = self.n1.or(self.n2).or(self.n3).or(self.max_lag).is_some();
+        let of_the_paper = self.averaged || self.lags == LagConvention::Literal;
+        let prescribed = !self.factors.is_empty();
+        !counted && !of_the_paper && !prescribed && self.objective == Objective::FreeRun
+    }
+
+    /// The delay laws that an automatic structure may have.
+    fn laws(&self) -> Vec<Delay> {
+        let constant = Delay::Fixed { delays: vec![0] };
+        let exponential = |law: DelayLaw| {
+            Delay::of::<StateDependentDelay<f64>>(&[law.floor, law.rise, law.rate], vec![1.0], true)
+        };
+        let usual = DelayLaw {
+            floor: 40.0,
+            rise: 10.0,
+            rate: 8.0,
+        };
+        match self.delay {
+            None => vec![constant, exponential(usual)],
+            Some(DelayKind::Fixed) => vec![constant],
+            Some(DelayKind::StateDependent) => vec![exponential(usual)],
+            Some(DelayKind::Prescribed(law)) => vec![exponential(law)],
+        }
+    }
+
     /// The input delay, and what is to be said about it.
     fn input_delay(
         &self,
@@ -207,7 +241,7 @@ impl IdentifyRequest {
             return Err(StepError::BadFactors);
         }
         let learning: Vec<&Record> = set.identify().collect();
-        let law = match self.delay {
+        let law = match self.delay.unwrap_or(DelayKind::Fixed) {
             DelayKind::Fixed if self.factors.is_empty() => {
                 return Ok(InputDelay::Fixed { delays: None });
             }
@@ -285,6 +319,10 @@ pub fn identify(
                 .to_owned(),
         );
     }
+    if request.is_automatic() {
+        remarks.clear();
+        return automatic(set, request, onlooker, excitation);
+    }
     structure.delay = request.input_delay(set, &mut remarks)?;
     let options = IdentifyOptions {
         structure,
@@ -335,6 +373,64 @@ pub fn identify(
         stop: identified.stop,
         refinement: identified.refinement,
         poles: [identified.pole_off, identified.pole_on],
+        remarks,
+        excitation,
+        model,
+    })
+}
+
+/// Identifies a model whose structure is chosen by held-out error.
+fn automatic(
+    set: &DataSet,
+    request: &IdentifyRequest,
+    onlooker: &dyn Onlooker,
+    excitation: Vec<String>,
+) -> Result<Identification, StepError> {
+    let started = Instant::now();
+    let found = watched(onlooker, "choosing the structure", || {
+        let progress = |what: &str| onlooker.now(what);
+        let laws = request.laws();
+        let interrupt = onlooker.interrupt();
+        base_model(
+            &set.records,
+            &laws,
+            request.interpolated,
+            interrupt,
+            &progress,
+        )
+    });
+    let found = found.ok_or(ExcitationError::NoIdentifyRecord)??;
+    let mut model = found.model;
+    for definition in &request.definitions {
+        model.define(definition)?;
+    }
+    let records = model.targets(&set.records);
+    if !request.effects.is_empty() {
+        effects_for(&model, &request.effects)?;
+        model = watched(onlooker, "refitting with the effects", || {
+            extend(&model, &records, &request.effects)
+        })?
+        .model;
+    }
+    let (scores, diverged) = score_new(&model, &records)?;
+    let mut remarks: Vec<String> = diverged.iter().map(ToString::to_string).collect();
+    remarks.extend(overfitted(&scores));
+    model.training = trained_in_free_run(set, &scores, request.seed);
+    let objective_value = model.training.objective_value;
+    let objective = Objective::FreeRun;
+    let pole = |on| model.largest_pole(on).map_err(IdentifyError::from);
+    Ok(Identification {
+        objective,
+        objective_value,
+        one_step_norm: one_step_norm(&model, &records)?,
+        evaluations: found.tried,
+        wall_time_s: started.elapsed().as_secs_f64(),
+        scores,
+        delays: Delays::of(&model),
+        screened: 0,
+        stop: StopReason::LocallyOptimal,
+        refinement: None,
+        poles: [pole(false)?, pole(true)?],
         remarks,
         excitation,
         model,

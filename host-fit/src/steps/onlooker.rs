@@ -8,6 +8,8 @@ use crate::search::{Progress, Snapshot};
 pub trait Onlooker: Sync {
     /// A piece of work begins: what it is, in words.
     fn begins(&self, _what: &str) {}
+    /// What the piece of work is at now, in words.
+    fn now(&self, _what: &str) {}
     /// How far a search has come.
     fn sees(&self, _snapshot: &Snapshot) {}
     /// The piece of work is over.

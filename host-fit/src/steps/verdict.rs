@@ -22,6 +22,14 @@ pub(super) fn words(diagnosis: &Diagnosis) -> (String, String) {
             significant(seconds, 3)
         ));
     }
+    for memory in &diagnosis.memory {
+        meaning.push_str(&format!(
+            " The flow feels its own past of {} s, with {} without jets and {} under them.",
+            significant(memory.lag_s, 3),
+            significant(memory.weight, 2),
+            significant(memory.weight_blown, 2)
+        ));
+    }
     if let Some(separation) = &diagnosis.separation {
         meaning.push_str(&format!(
             " To tell {} apart, play this: {} (`--experiment command.csv` writes it).",
@@ -57,7 +65,7 @@ fn finding(diagnosis: &Diagnosis) -> (String, String) {
         Verdict::NothingMissing => (
             "nothing is missing".to_owned(),
             format!(
-                "Refitted, the model's held-out error is {}: {floor}. No effect of the catalogue lowers it significantly.",
+                "The model's held-out error is {}: {floor}. No effect of the catalogue lowers it by more than chance or than the flow's own memory does.",
                 significant(last, 3)
             ),
         ),
@@ -89,6 +97,16 @@ fn finding(diagnosis: &Diagnosis) -> (String, String) {
             }
             (headline, meaning)
         }
+        Verdict::PartlyExplained => (
+            "something is missing, and the catalogue describes part of it".to_owned(),
+            format!(
+                "With {} the held-out error falls from {} to {}; {floor}. They stand in for what is missing: too much is \
+                 left to take them for its names. The model is handed over with them, marked as stand-ins.",
+                diagnosis.stand_ins.join(" and "),
+                significant(first, 3),
+                significant(last, 3)
+            ),
+        ),
         Verdict::Unexplained => (
             "something is missing that the catalogue does not have".to_owned(),
             match diagnosis

@@ -28,6 +28,7 @@ pub mod stopping_vortex;
 pub mod thermal_drift;
 pub mod valve_lag;
 pub mod vortex_shedding;
+pub mod zero_offset;
 
 use crate::delay::Transport;
 use crate::effect::{Effect, Flow, Instant, Physics, Place, Setting, Spec};
@@ -196,11 +197,20 @@ catalogue! {
     thermal_drift::ThermalDrift: ThermalDrift<T>,
     electrical_pickup::ElectricalPickup: ElectricalPickup<T>,
     sensor_saturation::SensorSaturation: SensorSaturation<T>,
+    // The last that happens to a reading, and a nuisance: see `ZERO_OFFSET`.
+    zero_offset::ZeroOffset: ZeroOffset<T>,
 }
+
+/// The effects and the sensor's zero, which is the last.
+const ALL: &[Spec] = &in_order::<{ EFFECTS.len() + lacking() }>();
 
 /// The effects that a model can lack, in the order of the physics: jet, delay,
 /// flow, sensor.
-pub const SPECS: &[Spec] = &in_order::<{ EFFECTS.len() + lacking() }>();
+pub const SPECS: &[Spec] = ALL.split_at(ALL.len() - 1).0;
+
+/// The card of the sensor's zero: a nuisance that belongs to a base model, never a
+/// missing effect.
+pub const ZERO_OFFSET: &Spec = &<ZeroOffset<f64> as Physics<f64>>::SPEC;
 
 /// Whether a model can lack the law of this card.
 const fn can_be_missing(spec: &Spec) -> bool {
@@ -242,10 +252,10 @@ const fn in_order<const N: usize>() -> [Spec; N] {
     ordered
 }
 
-/// The catalogue's entry for the effect `name`.
+/// The card of the effect `name`: an entry of the catalogue, or the sensor's zero.
 #[must_use]
 pub fn spec(name: &str) -> Option<&'static Spec> {
-    SPECS.iter().find(|spec| spec.name == name)
+    ALL.iter().find(|spec| spec.name == name)
 }
 
 /// The card of the delay law `name`, of base models or an effect.
@@ -295,7 +305,8 @@ mod tests {
             }
         }
         assert!(SPECS.is_sorted_by_key(|spec| spec.place));
-        assert_eq!(SPECS.len() + 1, names.len());
+        // The constant delay and the sensor's zero belong to base models.
+        assert_eq!(SPECS.len() + 2, names.len());
         assert!(spec("constant-delay").is_none() && law("constant-delay").is_some());
     }
 }

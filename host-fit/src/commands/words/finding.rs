@@ -70,8 +70,11 @@ pub(in super::super) fn ranking_rows(ranked: &[Ranked]) -> Vec<Vec<String>> {
             r.effect.clone(),
             if r.significant { "yes" } else { "no" }.to_owned(),
             format!("{:.1} %", r.error_reduction_percent),
-            format!("{:.1} %", r.best_decoy_percent),
-            if r.p_value < 0.001 {
+            r.best_decoy_percent
+                .map_or_else(|| "–".to_owned(), |percent| format!("{percent:.1} %")),
+            if !r.refitted {
+                "–".to_owned()
+            } else if r.p_value < 0.001 {
                 "< 0.001".to_owned()
             } else {
                 format!("{:.3}", r.p_value)

@@ -11,23 +11,23 @@ const LEARNED_SHARE: f64 = 0.6;
 
 /// One split into learning and judging.
 #[derive(Clone, Debug)]
-pub(super) struct Fold {
+pub(crate) struct Fold {
     /// Records to fit.
-    pub(super) learning: Vec<Record>,
+    pub(crate) learning: Vec<Record>,
     /// Records to judge, each from a sample on.
-    pub(super) judging: Vec<Judging>,
+    pub(crate) judging: Vec<Judging>,
 }
 
 /// A record that is judged from a sample on; the run before leads up to it.
 #[derive(Clone, Debug)]
-pub(super) struct Judging {
-    pub(super) record: Record,
-    pub(super) from: usize,
+pub(crate) struct Judging {
+    pub(crate) record: Record,
+    pub(crate) from: usize,
 }
 
 impl Fold {
     /// The same split with free runs that start anew every `samples`.
-    pub(super) fn restarted(&self, samples: usize) -> Self {
+    pub(crate) fn restarted(&self, samples: usize) -> Self {
         let judging = self.judging.iter().flat_map(|judging| {
             let judged = judging.record.part(judging.from, judging.record.len());
             pieces(&judged, samples)
@@ -57,7 +57,7 @@ pub enum HeldOutBy {
 }
 
 /// The folds of a data set; none if there is nothing to learn from.
-pub(super) fn folds(records: &[Record]) -> (Vec<Fold>, HeldOutBy) {
+pub(crate) fn folds(records: &[Record]) -> (Vec<Fold>, HeldOutBy) {
     let of = |role: Use| -> Vec<&Record> { records.iter().filter(|r| r.role == role).collect() };
     let (identify, validate) = (of(Use::Identify), of(Use::Validate));
     let owned = |records: &[&Record]| -> Vec<Record> {

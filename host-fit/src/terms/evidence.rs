@@ -19,17 +19,17 @@ const NORMAL: f64 = 1.4826;
 
 /// The held-out error of a model: y − y_sim per record, warm-up left out.
 #[derive(Clone, Debug)]
-pub(super) struct HeldOut {
-    pub(super) errors: Vec<Vec<f64>>,
+pub(crate) struct HeldOut {
+    pub(crate) errors: Vec<Vec<f64>>,
     /// Σ e² and the number of samples.
-    pub(super) sum_of_squares: f64,
-    pub(super) samples: usize,
+    pub(crate) sum_of_squares: f64,
+    pub(crate) samples: usize,
     /// Samples of a block that counts as independent of the next.
     block: usize,
 }
 
 impl HeldOut {
-    pub(super) fn new(errors: Vec<Vec<f64>>) -> Self {
+    pub(crate) fn new(errors: Vec<Vec<f64>>) -> Self {
         let sum_of_squares = errors.iter().map(|e| dot(e, e)).sum();
         let samples = errors.iter().map(Vec::len).sum();
         Self {
@@ -41,7 +41,7 @@ impl HeldOut {
     }
 
     /// Infinite if nothing was judged.
-    pub(super) fn rmse(&self) -> f64 {
+    pub(crate) fn rmse(&self) -> f64 {
         if self.samples == 0 {
             return f64::INFINITY;
         }
@@ -80,7 +80,7 @@ fn block(errors: &[Vec<f64>]) -> usize {
 /// (cluster-robust), as many degrees of freedom as there are blocks in which the
 /// models differ. A paired test on the blocks' gains would take it for scatter
 /// that a gain lies in few places.
-pub(super) fn p_value(worse: &HeldOut, better: &HeldOut) -> f64 {
+pub(crate) fn p_value(worse: &HeldOut, better: &HeldOut) -> f64 {
     let block = better.block;
     // m·d and d·d of the blocks.
     let mut blocks = Vec::new();
@@ -106,7 +106,7 @@ pub(super) fn p_value(worse: &HeldOut, better: &HeldOut) -> f64 {
 }
 
 /// What two series have in common at their ends: warm-ups differ.
-pub(super) fn last_of_both<'a>(a: &'a [f64], b: &'a [f64]) -> (&'a [f64], &'a [f64]) {
+pub(crate) fn last_of_both<'a>(a: &'a [f64], b: &'a [f64]) -> (&'a [f64], &'a [f64]) {
     let n = a.len().min(b.len());
     (&a[a.len() - n..], &b[b.len() - n..])
 }
@@ -129,7 +129,7 @@ fn median(mut numbers: Vec<f64>) -> f64 {
 /// times Σ σ²" by blocks; σ² per sample in the same shape as the errors. How much
 /// blocks scatter is taken from their median deviation: an excess that lies in few
 /// of them must not hide behind itself.
-pub(super) fn p_above_noise(held_out: &HeldOut, variance: &[Vec<f64>], margin: f64) -> f64 {
+pub(crate) fn p_above_noise(held_out: &HeldOut, variance: &[Vec<f64>], margin: f64) -> f64 {
     let block = held_out.block;
     let mut excess = Vec::new();
     for (errors, variance) in held_out.errors.iter().zip(variance) {
@@ -151,7 +151,7 @@ pub(super) fn p_above_noise(held_out: &HeldOut, variance: &[Vec<f64>], margin: f
 /// Fractions of the error energy that chance would have removed: what the
 /// candidate changes in the free run, shifted in time or taken from another
 /// record, scaled to fit the learning records and judged on the held-out ones.
-pub(super) fn decoys(
+pub(crate) fn decoys(
     learning: (&HeldOut, &[Vec<f64>]),
     judging: (&HeldOut, &[Vec<f64>]),
     shifts: &[f64],

@@ -1,0 +1,39 @@
+//! The rules of the verdict.
+
+use crate::rules::rules;
+
+rules! {
+    /// When a misfit counts, when an effect is named, and when it only stands in for something else.
+    pub struct Rules in "diagnose";
+
+    /// A misfit below this factor is within what `y_sd` itself is known to.
+    floor_margin: f64 = 1.10, "times the noise floor", "a standard deviation from 20 repeats is known to 16 % a sample; nulls of six families stay below 1.03";
+    /// Level of the tests.
+    level: f64 = 0.05, "p-value", "convention";
+    /// Alternatives that a search looks at: effects, points of their grids and responses to part jets. The p-value of a
+    /// gain is multiplied by it (Bonferroni).
+    alternatives: f64 = 300.0, "", "counted: the grids of 21 cards";
+    /// An effect must lower the held-out error of the best base without it by this fraction, unless it does as well with
+    /// fewer parameters.
+    worthwhile: f64 = 0.015, "share of the rms error", "nulls of six families: chance manages 0.01";
+    /// Held-out errors that differ by less than this are the same for any purpose.
+    alike: f64 = 0.005, "share of the rms error", "judgement: a tenth of what two seeds of noise differ by";
+    /// Effects that leave the model above the noise are named if they take at least this share of the excess …
+    explained: f64 = 0.95, "share of the excess", "altered laws leave 1 to 4 % of an excess";
+    /// … and leave no more than this factor; otherwise they stand in for something else.
+    nearly: f64 = 1.25, "times the noise floor", "the same";
+    /// Where the noise is not known, this share of the excess is enough to be named.
+    explained_in_unknown_noise: f64 = 0.75, "share of the excess", "the public sets";
+    /// Effects that take less than this share of the excess do not even stand in.
+    stands_in: f64 = 0.5, "share of the excess", "judgement: half";
+    /// Where slow noise is not known, a misfit counts if this share of it depends on something …
+    depends: f64 = 0.1, "share of the excess", "the public sets";
+    /// … or if it is more than noise can be in a recording worth fitting.
+    too_much: f64 = 0.06, "share of the variance of y", "the public sets";
+    /// Where neither the noise is known nor anything shows that the base errs, an effect must lower the error by this.
+    worthwhile_in_the_dark: f64 = 0.1, "share of the rms error", "the hair dryer and the gas furnace, where nothing is missing";
+    /// A given model at the noise floor is not searched further unless a single effect promises this.
+    promising: f64 = 0.02, "share of the rms error", "screening of nulls promises up to 0.008";
+    /// Candidates that are refitted for the ranking beside the named ones.
+    ranked_in_full: usize = 4, "", "judgement: further ones never matched the leader";
+}

@@ -1,0 +1,268 @@
+//! The bench on which models are judged: fitted in free run to some records, judged
+//! in free run on others.
+
+use super::evidence::{HeldOut, p_above_noise};
+use super::folds::{Fold, HeldOutBy, Judging, folds};
+use crate::data::{Record, Use};
+use crate::fit::{Fit, FitOptions, fit, pieces};
+use crate::model::Model;
+use crate::residual::{NoiseSource, noise_floor};
+use crate::simulate::SimulateError;
+use rayon::prelude::*;
+
+/// A run that diverges counts as this many times the largest |y| off.
+const DIVERGED: f64 = 10.0;
+
+/// A model with its fits, one per fold, and its held-out error.
+#[derive(Clone, Debug)]
+pub struct Judged {
+    /// The fits.
+    pub fits: Vec<Fit>,
+    /// y − y_sim on what was held out.
+    pub(crate) held_out: HeldOut,
+    /// Root mean square error of free runs that are not started anew, y: the same
+    /// for rigs that do not drift.
+    pub(crate) drifted: f64,
+}
+
+impl Judged {
+    /// The model of the first fold.
+    #[must_use]
+    pub fn model(&self) -> &Model {
+        &self.fits[0].model
+    }
+
+    /// Root mean square error on what was held out, y.
+    #[must_use]
+    pub fn rmse(&self) -> f64 {
+        self.held_out.rmse()
+    }
+}
+
+/// What is learned from, what is judged on, and the noise there.
+pub struct Judge {
+    pub(crate) folds: Vec<Fold>,
+    /// The folds with free runs over whole records, where `folds` start them anew.
+    whole: Option<Vec<Fold>>,
+    /// How the errors are held out.
+    pub held_out_by: HeldOutBy,
+    /// Everything that may be learned from, for the model that is handed over.
+    identify: Vec<Record>,
+    /// Whether the command is on/off.
+    pub on_off: bool,
+    /// σ² of the noise per judged sample.
+    floor: Vec<Vec<f64>>,
+    /// Where the noise floor comes from.
+    pub noise_source: NoiseSource,
+    /// How models are fitted.
+    pub options: FitOptions,
+}
+
+impl Judge {
+    /// A bench over `records`; with `restarted`, free runs start anew after so many
+    /// samples. `None` if there is nothing to learn from.
+    #[must_use]
+    pub fn new(records: &[Record], restarted: Option<usize>, options: FitOptions) -> Option<Self> {
+        let (mut folds, held_out_by) = folds(records);
+        let mut identify: Vec<Record> = records
+            .iter()
+            .filter(|r| r.role == Use::Identify)
+            .cloned()
+            .collect();
+        let mut whole_runs = None;
+        if let Some(samples) = restarted {
+            whole_runs = Some(folds.clone());
+            folds = folds.iter().map(|fold| fold.restarted(samples)).collect();
+            identify = identify
+                .iter()
+                .flat_map(|record| pieces(record, samples))
+                .collect();
+        }
+        if folds.is_empty() {
+            return None;
+        }
+        let judging = || folds.iter().flat_map(|fold| &fold.judging);
+        let whole: Vec<&Record> = judging().map(|judging| &judging.record).collect();
+        let measured: Vec<Vec<f64>> = whole.iter().map(|record| record.y.clone()).collect();
+        let (mut floor, noise_source) = noise_floor(&whole, &measured);
+        for (variance, judging) in floor.iter_mut().zip(judging()) {
+            variance.drain(..judging.from.min(variance.len()));
+        }
+        Some(Self {
+            identify,
+            on_off: records.iter().all(Record::is_on_off),
+            folds,
+            whole: whole_runs,
+            held_out_by,
+            floor,
+            noise_source,
+            options,
+        })
+    }
+
+    /// Root mean square of the noise on what is judged, y: measured or estimated.
+    #[must_use]
+    pub fn noise_rmse(&self) -> f64 {
+        let all = self.floor.iter().flatten();
+        let (sum, count) = all.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+        f64::sqrt(sum / f64::max(count, 1.0))
+    }
+
+    /// The error over the noise floor; 1 is all that can be reached. Where slow noise
+    /// is not known, the floor is not either, and nothing is near it.
+    #[must_use]
+    pub fn over_noise(&self, rmse: f64) -> f64 {
+        match self.noise_source {
+            NoiseSource::Scatter => f64::INFINITY,
+            NoiseSource::Measured | NoiseSource::Repeats => rmse / self.noise_rmse(),
+        }
+    }
+
+    /// Records to fit in a fold.
+    #[must_use]
+    pub fn learning(&self, fold: usize) -> Vec<&Record> {
+        self.folds[fold].learning.iter().collect()
+    }
+
+    /// How `model` is fitted: with the constant where it has one.
+    #[must_use]
+    pub fn options_for(&self, model: &Model) -> FitOptions {
+        FitOptions {
+            constant: self.options.constant || model.constant != 0.0,
+            ..self.options
+        }
+    }
+
+    /// y − y_sim from a sample on; a run that diverges is far off everywhere.
+    fn error(model: &Model, record: &Record, from: usize) -> Result<Vec<f64>, SimulateError> {
+        let from = from.max(model.warm_up());
+        let measured = record.y.iter().skip(from);
+        match model.free_run(record) {
+            Ok(run) => Ok(measured
+                .zip(run.iter().skip(from))
+                .map(|(y, sim)| y - sim)
+                .collect()),
+            Err(SimulateError::Diverged { .. }) => {
+                let largest = record.y.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
+                Ok(measured.map(|_| DIVERGED * largest).collect())
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Errors of one model per fold on what was held out from it.
+    pub(crate) fn held_out<'m>(
+        &self,
+        models: impl Fn(usize) -> &'m Model + Sync,
+    ) -> Result<HeldOut, SimulateError> {
+        Self::held_out_of(&self.folds, models)
+    }
+
+    fn held_out_of<'m>(
+        folds: &[Fold],
+        models: impl Fn(usize) -> &'m Model + Sync,
+    ) -> Result<HeldOut, SimulateError> {
+        let judged: Vec<(usize, &Judging)> = folds
+            .iter()
+            .enumerate()
+            .flat_map(|(fold, split)| split.judging.iter().map(move |judging| (fold, judging)))
+            .collect();
+        let each = judged
+            .par_iter()
+            .map(|(fold, judging)| Self::error(models(*fold), &judging.record, judging.from));
+        let errors: Vec<Result<Vec<f64>, SimulateError>> = each.collect();
+        Ok(HeldOut::new(errors.into_iter().collect::<Result<_, _>>()?))
+    }
+
+    /// Errors on what was learned from.
+    pub(crate) fn learned(&self, judged: &Judged) -> Result<HeldOut, SimulateError> {
+        let errors = judged.fits.iter().zip(&self.folds).flat_map(|(fit, fold)| {
+            let records = &fold.learning;
+            records.iter().map(|r| Self::error(&fit.model, r, 0))
+        });
+        Ok(HeldOut::new(errors.collect::<Result<_, _>>()?))
+    }
+
+    /// The first fold's fit judged, with the other folds' from there.
+    ///
+    /// # Errors
+    /// A missing channel, or a free run that diverges in another fold.
+    pub fn judged_from(&self, first: Fit) -> Result<Judged, SimulateError> {
+        let options = self.options_for(&first.model);
+        let others: Vec<Result<Fit, SimulateError>> = (1..self.folds.len())
+            .into_par_iter()
+            .map(|fold| fit(&first.model, &self.learning(fold), &options))
+            .collect();
+        let mut fits = vec![first];
+        for other in others {
+            fits.push(other?);
+        }
+        let held_out = self.held_out(|fold| &fits[fold].model)?;
+        let drifted = match &self.whole {
+            Some(whole) => Self::held_out_of(whole, |fold| &fits[fold].model)?.rmse(),
+            None => held_out.rmse(),
+        };
+        Ok(Judged {
+            held_out,
+            drifted,
+            fits,
+        })
+    }
+
+    /// A model refitted in free run in every fold, its structure kept.
+    ///
+    /// # Errors
+    /// A missing channel, or a free run that diverges.
+    pub fn refitted(&self, model: &Model) -> Result<Judged, SimulateError> {
+        let options = self.options_for(model);
+        self.judged_from(fit(model, &self.learning(0), &options)?)
+    }
+
+    /// The model that is handed over: fitted to everything that may be learned from.
+    #[must_use]
+    pub fn final_fit(&self, judged: &Judged) -> Fit {
+        let own = judged.fits[0].clone();
+        if self.held_out_by == HeldOutBy::Records {
+            return own;
+        }
+        let all: Vec<&Record> = self.identify.iter().collect();
+        fit(&own.model, &all, &self.options_for(&own.model)).unwrap_or(own)
+    }
+
+    /// Σ e² over Σ (y − ȳ)² on what is judged.
+    pub(crate) fn unexplained_share(&self, held_out: &HeldOut) -> f64 {
+        let judging = self.folds.iter().flat_map(|fold| &fold.judging);
+        let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        for (judging, errors) in judging.zip(&held_out.errors) {
+            let y = &judging.record.y;
+            for y in &y[y.len() - errors.len()..] {
+                n += 1.0;
+                sum += y;
+                squares += y * y;
+            }
+        }
+        let spread = squares - sum * sum / f64::max(n, 1.0);
+        if spread > 0.0 {
+            held_out.sum_of_squares / spread
+        } else {
+            1.0
+        }
+    }
+
+    /// e² above the noise, per sample.
+    pub(crate) fn excess(&self, held_out: &HeldOut) -> f64 {
+        (held_out.rmse().powi(2) - self.noise_rmse().powi(2)).max(0.0)
+    }
+
+    /// p-value of "the error is not above `margin` times the noise floor".
+    pub(crate) fn p_above_noise(&self, held_out: &HeldOut, margin: f64) -> f64 {
+        p_above_noise(held_out, &self.floor, margin * margin)
+    }
+
+    /// Whether one model leaves the measurement further than the other where free
+    /// runs are not started anew: what is better in pieces must not drift more.
+    #[must_use]
+    pub fn drifts_more(&self, one: &Judged, other: &Judged) -> bool {
+        self.whole.is_some() && one.drifted > other.drifted
+    }
+}

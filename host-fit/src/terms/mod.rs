@@ -1,0 +1,30 @@
+//! Which terms a model needs: lags of the flow, the sensor's zero, physical effects.
+//!
+//! A hypothesis is a model with a list of [`Term`]s that were added to the leanest
+//! one. [`Screen`] says what hundreds of further terms would take of its free-run
+//! error, for the price of one run each; [`Search`] refits the few that promise most,
+//! judges them on held-out records and goes on from the best. Lags and effects are
+//! moves of the same search: both have to earn their place, and an effect has to beat
+//! what a base without it can do.
+
+mod automatic;
+mod evidence;
+mod folds;
+mod grid;
+mod judge;
+mod rules;
+mod screen;
+mod search;
+mod term;
+mod units;
+
+pub use automatic::{Automatic, base_model};
+pub(crate) use evidence::{HeldOut, decoys, last_of_both, p_value};
+pub use folds::HeldOutBy;
+pub use grid::Known;
+pub use judge::{Judge, Judged};
+pub use rules::{RULES, Rules};
+pub use screen::{Candidate, Proposal, Screen, Table};
+pub use search::{Found, Hypothesis, Search};
+pub use term::Term;
+pub use units::{Units, begins_in_mid_run};

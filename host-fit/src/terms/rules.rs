@@ -1,0 +1,45 @@
+//! The rules of the search over terms.
+
+use crate::rules::rules;
+
+rules! {
+    /// Which terms a model needs: what a term must earn to stay, and when the search ends.
+    pub struct Rules in "terms";
+
+    /// What each parameter of a term must take off the held-out rms error, as a share of it.
+    price: f64 = 0.004, "share of the rms error", "nulls of six families of flows: coloured noise of 20 repeats makes 0.001 to 0.003 of a needless parameter";
+    /// A model within this factor of the noise floor has nothing left to find.
+    at_the_floor: f64 = 1.005, "times the noise floor", "two standard deviations of what three records of 10 s say";
+    /// Where the best model is further from the floor than this, a second one is followed as well.
+    near_the_floor: f64 = 1.05, "times the noise floor", "judgement: half of the margin to which `y_sd` is known";
+    /// The second one is followed if its error is within this factor of the best one's.
+    rival: f64 = 2.0, "times the best error", "rigs with memory: the right first step was never further behind";
+    /// Delays between samples are rounded where that costs no more than this.
+    rounding: f64 = 0.015, "share of the rms error", "what an effect must take to be named";
+    /// Rounds of screening and refitting.
+    rounds: usize = 6, "", "two effects and two memories take three";
+    /// Rounds without a gain that end the search.
+    patience: usize = 3, "rounds", "judgement";
+    /// Proposals with effects that are refitted per model …
+    with_effects: usize = 5, "", "the truth was within the first three on 80 rigs of six families";
+    /// … and proposals without.
+    without_effects: usize = 2, "", "the same rigs";
+    /// Of what was refitted for a few steps, how many are followed to the end.
+    finished: usize = 4, "", "the same rigs";
+    /// Steps that every proposal is followed for.
+    brief: usize = 6, "iterations", "fewer leave thresholds where they were";
+    /// Level of the tests.
+    level: f64 = 0.05, "p-value", "convention";
+    /// The base that effects have to beat must have been given this many more parameters than they have.
+    head_start: usize = 2, "parameters", "a memory costs three, an effect one to four";
+    /// A record begins at rest if the mean of so many first samples …
+    beginning: usize = 20, "samples", "judgement: as long as a fast flow takes";
+    /// … is no further from the level of rest than this, or twice this where the command is off.
+    at_rest: f64 = 0.05, "size of y", "the noise of 20 samples is 0.01 at most in any set at hand";
+    /// Longest lag that is tried …
+    longest_lag_s: f64 = 0.5, "s at 1 kHz", "the paper's lags";
+    /// … and no more than this share of the shortest record.
+    longest_lag_share: f64 = 0.25, "share of a record", "judgement";
+    /// Steps between the lags that are screened.
+    lag_step: usize = 8, "samples", "a wrong lag of half a step leaves a tenth of what the right one takes";
+}

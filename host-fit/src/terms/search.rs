@@ -1,0 +1,473 @@
+//! One search over lags, the sensor's zero and effects.
+
+use super::RULES;
+use super::evidence::p_value;
+use super::grid::Known;
+use super::judge::{Judge, Judged};
+use super::screen::{GRADINGS, Proposal, Screen};
+use super::term::Term;
+use crate::fit::{Fit, FitOptions, fit, lean_base, settle_fixed_delay};
+use crate::model::{Model, Start};
+use crate::simulate::SimulateError;
+use rayon::prelude::*;
+use std::cmp::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering as Memory};
+
+/// Rounds of moving all lags of a model, and steps of a fit after each move.
+const LAG_ROUNDS: usize = 4;
+const LAG_STEPS: usize = 5;
+/// What a move of a lag must gain, as a share of the mean square error.
+const LAG_GAIN: f64 = 1e-4;
+
+/// The longest lag that is tried in records of at least `shortest` samples.
+pub(super) fn longest_lag(period_s: f64, shortest: usize) -> u16 {
+    let longest = (RULES.longest_lag_s / period_s).round();
+    let share = RULES.longest_lag_share * shortest as f64;
+    longest.min(share).clamp(2.0, 4096.0) as u16
+}
+
+/// A model with the terms that were added to the leanest one.
+#[derive(Clone, Debug)]
+pub struct Hypothesis {
+    /// The terms.
+    pub terms: Vec<Term>,
+    /// Its fits and its held-out error.
+    pub judged: Judged,
+    /// Whether further terms were screened for it.
+    expanded: bool,
+}
+
+impl Hypothesis {
+    /// A model as it is, without further terms.
+    #[must_use]
+    pub fn new(judged: Judged) -> Self {
+        Self {
+            terms: Vec::new(),
+            judged,
+            expanded: false,
+        }
+    }
+
+    /// Whether no effect is among its terms.
+    #[must_use]
+    pub fn is_bare(&self) -> bool {
+        self.terms.iter().all(|term| term.effect().is_none())
+    }
+
+    /// What its terms cost.
+    #[must_use]
+    pub fn cost(&self) -> usize {
+        self.terms.iter().map(Term::cost).sum()
+    }
+
+    /// ln of the held-out error, and the price of the terms: the lower the better.
+    #[must_use]
+    pub fn score(&self) -> f64 {
+        score(self.judged.rmse(), self.cost())
+    }
+
+    /// Its terms in words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let names: Vec<String> = self.terms.iter().map(Term::name).collect();
+        if names.is_empty() {
+            "no terms".to_owned()
+        } else {
+            names.join(" + ")
+        }
+    }
+}
+
+fn score(rmse: f64, cost: usize) -> f64 {
+    rmse.ln() + RULES.price * cost as f64
+}
+
+/// What a search found.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// The leanest model.
+    pub root: Hypothesis,
+    /// The best hypothesis, all its terms needed.
+    pub best: Hypothesis,
+    /// The best without effects, its lags searched as hard.
+    pub bare: Hypothesis,
+    /// Everything that was fitted to the end.
+    pub all: Vec<Hypothesis>,
+    /// Alternatives that were looked at in full refits.
+    pub tried: usize,
+}
+
+/// The search and what it works on.
+pub struct Search<'a> {
+    /// The bench.
+    pub judge: &'a Judge,
+    /// What the records say.
+    pub known: Known,
+    /// Whether effects may be added.
+    pub effects: bool,
+    /// Most effects.
+    pub most_effects: usize,
+    /// Set to end with the best so far.
+    pub interrupt: &'a AtomicBool,
+    /// Told what is being tried.
+    pub progress: &'a (dyn Fn(&str) + Sync),
+}
+
+impl Search<'_> {
+    fn interrupted(&self) -> bool {
+        self.interrupt.load(Memory::Relaxed)
+    }
+
+    fn over(&self, hypothesis: &Hypothesis) -> f64 {
+        self.judge.over_noise(hypothesis.judged.rmse())
+    }
+
+    /// The leanest model with the kind of delay law and the effects that `given` has;
+    /// in `mid_run`, its free runs begin from the measurement.
+    ///
+    /// # Errors
+    /// When no starting point gives a stable free run.
+    pub fn root(&self, given: &Model, mid_run: bool) -> Result<Hypothesis, SimulateError> {
+        let learning = self.judge.learning(0);
+        let mut bare = given.clone();
+        // What was added before stays: the question is what is missing still.
+        let kept = std::mem::take(&mut bare.effects);
+        let mut model = lean_base(&bare, &learning)?.model;
+        model.delay_between_samples();
+        model.effects = kept;
+        if mid_run {
+            model.start = Start::Measured;
+        }
+        let mut judged = self.judge.refitted(&model)?;
+        if !self.judge.on_off {
+            // Graded commands show how the flow takes jets of part strength.
+            let others: Vec<Judged> = GRADINGS
+                .into_par_iter()
+                .filter(|grading| *grading != judged.model().grading)
+                .filter_map(|grading| {
+                    let other = Model {
+                        grading,
+                        ..judged.model().clone()
+                    };
+                    self.judge.refitted(&other).ok()
+                })
+                .collect();
+            let better = others
+                .into_iter()
+                .min_by(|a, b| a.rmse().total_cmp(&b.rmse()));
+            if let Some(better) = better.filter(|better| better.rmse() < judged.rmse()) {
+                judged = better;
+            }
+        }
+        Ok(Hypothesis::new(judged))
+    }
+
+    /// From `root`, round by round, until nothing that is left is worth its price.
+    #[must_use]
+    pub fn run(&self, root: Hypothesis) -> Found {
+        let mut all = vec![root];
+        let mut tried = Vec::new();
+        let mut stalled = 0;
+        for round in 1..=RULES.rounds {
+            let chosen = self.chosen(&all);
+            if chosen.is_empty() || self.interrupted() {
+                break;
+            }
+            let before = all[best(&all, |_| true)].score();
+            let mut pool: Vec<(usize, Proposal)> = Vec::new();
+            for (index, effects) in chosen {
+                all[index].expanded = true;
+                (self.progress)(&format!(
+                    "round {round}: screening [{}]",
+                    all[index].words()
+                ));
+                pool.extend(
+                    self.proposals(&all[index], effects, &tried)
+                        .into_iter()
+                        .map(|proposal| (index, proposal)),
+                );
+            }
+            if pool.is_empty() {
+                break;
+            }
+            (self.progress)(&format!("round {round}: refitting {} models", pool.len()));
+            for (index, proposal) in &pool {
+                tried.push(signature(&all[*index].terms, &proposal.terms));
+            }
+            let finished = self.refitted(&all, &pool);
+            all.extend(finished);
+            let after = all[best(&all, |_| true)].score();
+            if after > before - RULES.price {
+                stalled += 1;
+                if stalled >= RULES.patience {
+                    break;
+                }
+            } else {
+                stalled = 0;
+            }
+        }
+        (self.progress)("leaving out what is not needed");
+        let root = all[0].clone();
+        let end = best(&all, |_| true);
+        let bare_end = best(&all, Hypothesis::is_bare);
+        let found = self.pruned(all[end].clone(), &root);
+        let bare = if bare_end == end {
+            found.clone()
+        } else {
+            self.pruned(all[bare_end].clone(), &root)
+        };
+        Found {
+            root,
+            best: found,
+            bare,
+            tried: tried.len(),
+            all,
+        }
+    }
+
+    /// Whom to screen further terms for, and whether effects may be among them.
+    fn chosen(&self, all: &[Hypothesis]) -> Vec<(usize, bool)> {
+        let (end, bare) = (best(all, |_| true), best(all, Hypothesis::is_bare));
+        let settled = all[end].expanded;
+        // Once the best has nothing to gain, only a base that was searched less hard
+        // can still say something.
+        let bare_is_done = bare == end
+            || all[bare].expanded
+            || all[bare].cost() >= all[end].cost() + RULES.head_start;
+        if self.over(&all[end]) <= RULES.at_the_floor && bare_is_done {
+            return Vec::new();
+        }
+        let mut chosen = Vec::new();
+        if !settled {
+            chosen.push((end, self.effects));
+            let rival = (0..all.len())
+                .filter(|i| !all[*i].expanded && *i != end)
+                .min_by(|a, b| all[*a].score().total_cmp(&all[*b].score()));
+            if let Some(rival) = rival
+                && self.over(&all[end]) > RULES.near_the_floor
+                && all[rival].score() < all[end].score() + RULES.rival.ln()
+            {
+                chosen.push((rival, self.effects));
+            }
+        }
+        if !bare_is_done && !chosen.iter().any(|(index, _)| *index == bare) {
+            chosen.push((bare, false));
+        }
+        chosen
+    }
+
+    /// What to refit for a hypothesis: some with effects, some without.
+    fn proposals(
+        &self,
+        hypothesis: &Hypothesis,
+        effects: bool,
+        tried: &[Vec<TermKey>],
+    ) -> Vec<Proposal> {
+        let Some(screen) = Screen::new(self.judge, hypothesis.judged.model()) else {
+            return Vec::new();
+        };
+        let present = count_effects(&hypothesis.terms);
+        let effects = effects && present < self.most_effects;
+        let table = screen.table(&self.known, effects);
+        let (mut with, mut without) = (0, 0);
+        let mut met = Vec::new();
+        let mut kept = Vec::new();
+        for proposal in screen.proposals(&table) {
+            let added = count_effects(&proposal.terms);
+            let (count, most) = if added > 0 {
+                (&mut with, RULES.with_effects)
+            } else {
+                (&mut without, RULES.without_effects)
+            };
+            let key = signature(&hypothesis.terms, &proposal.terms);
+            let too_many = present + added > self.most_effects;
+            if *count >= most || too_many || tried.contains(&key) || met.contains(&key) {
+                continue;
+            }
+            met.push(key);
+            *count += 1;
+            kept.push(proposal);
+        }
+        kept
+    }
+
+    /// Every proposal for a few steps, the best of them to the end.
+    fn refitted(&self, all: &[Hypothesis], pool: &[(usize, Proposal)]) -> Vec<Hypothesis> {
+        let brief: Vec<Option<(f64, usize, Fit)>> = pool
+            .par_iter()
+            .enumerate()
+            .map(|(at, (index, proposal))| {
+                if self.interrupted() {
+                    return None;
+                }
+                let parent = &all[*index];
+                let fit = self.set_out(parent.judged.model(), proposal, RULES.brief)?;
+                let rmse = self.judge.held_out(|_| &fit.model).ok()?.rmse();
+                let cost: usize = proposal.terms.iter().map(Term::cost).sum();
+                Some((score(rmse, parent.cost() + cost), at, fit))
+            })
+            .collect();
+        let mut brief: Vec<(f64, usize, Fit)> = brief.into_iter().flatten().collect();
+        brief.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // One without effects is among those that are followed to the end.
+        let mut leading: Vec<(usize, Fit)> = Vec::new();
+        let mut has_bare = false;
+        for (_, at, fit) in brief {
+            let (index, proposal) = &pool[at];
+            let bare = all[*index].is_bare() && count_effects(&proposal.terms) == 0;
+            if leading.len() < RULES.finished || (bare && !has_bare) {
+                has_bare |= bare;
+                leading.push((at, fit));
+            }
+        }
+        let finished: Vec<Option<Hypothesis>> = leading
+            .into_par_iter()
+            .map(|(at, fit)| {
+                let (index, proposal) = &pool[at];
+                let terms = [all[*index].terms.clone(), proposal.terms.clone()].concat();
+                self.finish(terms, fit)
+            })
+            .collect();
+        finished.into_iter().flatten().collect()
+    }
+
+    /// The fit of a proposal from where the screening puts it.
+    pub(crate) fn set_out(
+        &self,
+        model: &Model,
+        proposal: &Proposal,
+        iterations: usize,
+    ) -> Option<Fit> {
+        let learning = self.judge.learning(0);
+        let with = |bold: bool| {
+            let pairs = proposal.terms.iter().zip(&proposal.coefficients);
+            let all = pairs.fold(model.clone(), |model, (term, coefficients)| {
+                term.added_to(&model, if bold { coefficients } else { &[] })
+            });
+            let options = FitOptions {
+                iterations,
+                ..self.judge.options_for(&all)
+            };
+            fit(&all, &learning, &options)
+        };
+        // First-order coefficients may be too bold for a free run: then from 0.
+        with(true).or_else(|_| with(false)).ok()
+    }
+
+    /// A fit followed to the end: lags and fixed delays where they leave least, all
+    /// folds fitted and judged.
+    pub(crate) fn finish(&self, mut terms: Vec<Term>, brief: Fit) -> Option<Hypothesis> {
+        let learning = self.judge.learning(0);
+        let options = self.judge.options_for(&brief.model);
+        let fitted = fit(&brief.model, &learning, &options).ok()?;
+        let fitted = self.settle_lags(fitted, &mut terms);
+        let fitted = settle_fixed_delay(fitted, &learning, &options).ok()?;
+        let judged = self.judge.judged_from(fitted).ok()?;
+        Some(Hypothesis {
+            terms,
+            judged,
+            expanded: false,
+        })
+    }
+
+    /// Moves lags to where they leave least, by steps of Gauss and Newton.
+    fn settle_lags(&self, mut current: Fit, terms: &mut [Term]) -> Fit {
+        let learning = self.judge.learning(0);
+        let shortest = learning.iter().map(|r| r.len()).min().unwrap_or(0);
+        let longest = longest_lag(current.model.sample_period_s, shortest);
+        for _ in 0..LAG_ROUNDS {
+            let mut moved = false;
+            for term in terms.iter_mut() {
+                let Some(old) = term.lag() else { continue };
+                let step = match Screen::new(self.judge, &current.model) {
+                    Some(screen) => screen.move_of(term),
+                    None => return current,
+                };
+                let lag = (i32::from(old) + step).clamp(3, longest.into()) as u16;
+                let Some(model) = term.moved_in(&current.model, lag) else {
+                    continue;
+                };
+                let options = FitOptions {
+                    iterations: LAG_STEPS,
+                    ..self.judge.options_for(&model)
+                };
+                let fitted = fit(&model, &learning, &options);
+                let better = fitted.ok().filter(|fitted| {
+                    fitted.mean_square() < current.mean_square() * (1.0 - LAG_GAIN)
+                });
+                if let Some(fitted) = better {
+                    current = fitted;
+                    *term = term.with_lag(lag);
+                    moved = true;
+                }
+            }
+            if !moved || self.interrupted() {
+                break;
+            }
+        }
+        current
+    }
+
+    /// A hypothesis refitted without one of its terms.
+    #[must_use]
+    pub fn without(
+        &self,
+        hypothesis: &Hypothesis,
+        index: usize,
+        root: &Hypothesis,
+    ) -> Option<Hypothesis> {
+        let mut terms = hypothesis.terms.clone();
+        let term = terms.remove(index);
+        let model = term.taken_from(hypothesis.judged.model(), root.judged.model());
+        Some(Hypothesis {
+            terms,
+            judged: self.judge.refitted(&model).ok()?,
+            expanded: true,
+        })
+    }
+
+    /// Drops what the other terms make needless.
+    fn pruned(&self, mut hypothesis: Hypothesis, root: &Hypothesis) -> Hypothesis {
+        loop {
+            let without: Vec<Option<Hypothesis>> = (0..hypothesis.terms.len())
+                .into_par_iter()
+                .map(|index| self.without(&hypothesis, index, root))
+                .collect();
+            let needless = without.into_iter().flatten().filter(|lesser| {
+                let loss = (lesser.judged.rmse() / hypothesis.judged.rmse()).ln();
+                let cost = (hypothesis.cost() - lesser.cost()).max(RULES.head_start) as f64;
+                let p = p_value(&lesser.judged.held_out, &hypothesis.judged.held_out);
+                loss < RULES.price * cost || p > RULES.level
+            });
+            let by_score = |a: &Hypothesis, b: &Hypothesis| a.score().total_cmp(&b.score());
+            match needless.min_by(by_score) {
+                Some(lesser) if !self.interrupted() => hypothesis = lesser,
+                _ => return hypothesis,
+            }
+        }
+    }
+}
+
+/// What the key of a term looks like.
+type TermKey = (String, Option<model_core::recursion::Grading>);
+
+fn signature(before: &[Term], added: &[Term]) -> Vec<TermKey> {
+    let mut keys: Vec<TermKey> = before.iter().chain(added).map(Term::key).collect();
+    keys.sort_by(|a, b| match a.0.cmp(&b.0) {
+        Ordering::Equal => format!("{:?}", a.1).cmp(&format!("{:?}", b.1)),
+        other => other,
+    });
+    keys
+}
+
+fn count_effects(terms: &[Term]) -> usize {
+    terms.iter().filter(|term| term.effect().is_some()).count()
+}
+
+/// The index of the best hypothesis that is `wanted`; the root is always wanted.
+fn best(all: &[Hypothesis], wanted: impl Fn(&Hypothesis) -> bool) -> usize {
+    (0..all.len())
+        .filter(|i| wanted(&all[*i]))
+        .min_by(|a, b| all[*a].score().total_cmp(&all[*b].score()))
+        .unwrap_or(0)
+}

@@ -1,0 +1,279 @@
+//! Units do not matter: the search works in the data's own.
+//!
+//! Cards are written for y of order 1, u up to 1 and a sample of 1 ms. Records are
+//! brought there before anything is judged, and the model that is found is brought
+//! back: names stay, parameters change with their units.
+
+use super::RULES;
+use crate::data::Record;
+use crate::model::{Delay, Model, Start};
+use model_core::effect::Spec;
+use model_core::effects::ZERO_OFFSET;
+
+/// The sample period that cards are written for, s.
+const PERIOD_S: f64 = 0.001;
+/// The share of all samples that lies between the level of rest and a y of 1.
+const FULL: f64 = 0.995;
+/// Where the records do not rest, 0 is taken as the level of rest unless it is
+/// further from all of y than this many times their range.
+const NEAR: f64 = 1.0;
+
+/// What an inner unit is in outer ones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Units {
+    /// y where the sensor shows nothing.
+    pub zero: f64,
+    /// Size of y.
+    pub y: f64,
+    /// Size of u.
+    pub u: f64,
+    /// Size of times.
+    pub time: f64,
+}
+
+impl Units {
+    /// No change.
+    pub const NONE: Self = Self {
+        zero: 0.0,
+        y: 1.0,
+        u: 1.0,
+        time: 1.0,
+    };
+
+    /// The units of `records` for a search that starts from `model`. A user's own
+    /// effects are written for the data as they are.
+    #[must_use]
+    pub fn of(model: &Model, records: &[Record]) -> Self {
+        if !model.definitions.is_empty() {
+            return Self::NONE;
+        }
+        let zero = level_of_rest(records).unwrap_or_else(|| far_level(records));
+        let mut sizes: Vec<f64> = records
+            .iter()
+            .flat_map(|r| r.y.iter().map(|y| (y - zero).abs()))
+            .filter(|size| size.is_finite())
+            .collect();
+        sizes.sort_by(f64::total_cmp);
+        let full = sizes.get((FULL * sizes.len() as f64) as usize).copied();
+        let largest = |series: &[f64]| series.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let u = records.iter().map(|r| largest(&r.u)).fold(0.0, f64::max);
+        let or_one = |x: f64| if x > 0.0 && x.is_finite() { x } else { 1.0 };
+        Self {
+            zero,
+            y: or_one(full.unwrap_or(1.0)),
+            u: or_one(u),
+            time: or_one(model.sample_period_s / PERIOD_S),
+        }
+    }
+
+    /// A record in inner units.
+    #[must_use]
+    pub fn record_in(&self, record: &Record) -> Record {
+        let y = |series: &[f64]| series.iter().map(|y| (y - self.zero) / self.y).collect();
+        Record {
+            sample_period_s: record.sample_period_s / self.time,
+            t0: record.t0 / self.time,
+            u: record.u.iter().map(|u| u / self.u).collect(),
+            y: y(&record.y),
+            y_sd: record
+                .y_sd
+                .as_ref()
+                .map(|sd| sd.iter().map(|sd| sd / self.y).collect()),
+            y_min: record.y_min.as_deref().map(y),
+            y_max: record.y_max.as_deref().map(y),
+            ..record.clone()
+        }
+    }
+
+    fn scaled(&self, spec: &Spec, values: &[f64], inward: bool) -> Vec<f64> {
+        let pairs = spec.parameters.iter().zip(values);
+        pairs
+            .map(|(parameter, value)| {
+                let scale = parameter.unit.scale(self.y, self.time, self.u);
+                if inward { value / scale } else { value * scale }
+            })
+            .collect()
+    }
+
+    /// A model with all that has units scaled, but for the zero.
+    fn scale(&self, model: &Model, inward: bool) -> Model {
+        let by = |x: f64| if inward { 1.0 / x } else { x };
+        let (y, u, time) = (by(self.y), by(self.u), by(self.time));
+        let mut model = model.clone();
+        model.sample_period_s *= time;
+        model.constant *= y;
+        model.b.iter_mut().for_each(|b| *b *= y / u);
+        model.c.iter_mut().for_each(|c| *c /= u);
+        if let Delay::Law(law) = &mut model.delay {
+            law.parameters = self.scaled(law.spec, &law.parameters, inward);
+        }
+        for i in 0..model.effects.len() {
+            if let Some(spec) = model.spec(&model.effects[i].name) {
+                model.effects[i].parameters =
+                    self.scaled(spec, &model.effects[i].parameters, inward);
+            }
+        }
+        model
+    }
+
+    /// A model in inner units, its sensor's zero where the records' is.
+    #[must_use]
+    pub fn model_in(&self, model: &Model) -> Model {
+        let mut model = self.scale(model, true);
+        self.move_zero(&mut model, -self.zero / self.y);
+        model
+    }
+
+    /// A model in the user's units.
+    #[must_use]
+    pub fn model_out(&self, model: &Model) -> Model {
+        let mut model = self.scale(model, false);
+        self.move_zero(&mut model, self.zero);
+        model
+    }
+
+    /// A parameter's value in the user's units.
+    #[must_use]
+    pub fn value_out(&self, unit: model_core::effect::Unit, value: f64) -> f64 {
+        value * unit.scale(self.y, self.time, self.u)
+    }
+
+    /// Shifts what the model reads by `by`.
+    fn move_zero(&self, model: &mut Model, by: f64) {
+        if by == 0.0 {
+            return;
+        }
+        if model.start == Start::Measured && model.effects.is_empty() {
+            // The recursion reads the sensor: its own constants take the shift.
+            let kept: f64 = 1.0 - model.a.iter().sum::<f64>();
+            model.constant += by * kept;
+            let count = model.product_lags.len();
+            for (l, b) in model.b.iter_mut().enumerate() {
+                let column = model.c.iter().skip(l * count).take(count);
+                *b -= by * column.sum::<f64>();
+            }
+            return;
+        }
+        let own = model.effects.iter_mut();
+        match own.into_iter().find(|e| e.name == ZERO_OFFSET.name) {
+            Some(offset) => offset.parameters.iter_mut().for_each(|level| *level += by),
+            None => model.add(ZERO_OFFSET, &[by], None),
+        }
+    }
+}
+
+/// Whether a record, in inner units, begins while something is going on already: the
+/// command is on, or y is not where it rests.
+#[must_use]
+pub fn begins_in_mid_run(record: &Record) -> bool {
+    let first = record.y.len().min(RULES.beginning);
+    let mean = record.y[..first].iter().sum::<f64>() / first.max(1) as f64;
+    record.u.first().is_some_and(|u| *u != 0.0) && mean.abs() > RULES.at_rest
+        || mean.abs() > 2.0 * RULES.at_rest
+}
+
+/// Mean y of the records before the first command, 0 where it is that but for chance;
+/// none where they do not rest before it.
+fn level_of_rest(records: &[Record]) -> Option<f64> {
+    let mut pieces: Vec<f64> = Vec::new();
+    for record in records {
+        let blown = record.u.iter().position(|u| *u != 0.0);
+        let quiet = &record.y[..blown.unwrap_or(record.len())];
+        // Pieces long enough to be independent of each other.
+        for piece in quiet.chunks_exact(50) {
+            pieces.push(piece.iter().sum::<f64>() / piece.len() as f64);
+        }
+    }
+    let n = pieces.len() as f64;
+    if n < 5.0 {
+        return None;
+    }
+    let mean = pieces.iter().sum::<f64>() / n;
+    let variance = pieces.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    let is_off = mean.abs() > 5.0 * (variance / n).sqrt() && mean.abs() > 1e-12;
+    Some(if is_off { mean } else { 0.0 })
+}
+
+/// 0, or the mean of y where 0 is far from all of them.
+fn far_level(records: &[Record]) -> f64 {
+    let all = || records.iter().flat_map(|r| r.y.iter().copied());
+    let low = all().fold(f64::INFINITY, f64::min);
+    let high = all().fold(f64::NEG_INFINITY, f64::max);
+    let range = high - low;
+    if low - NEAR * range > 0.0 || high + NEAR * range < 0.0 {
+        all().sum::<f64>() / all().count().max(1) as f64
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Use;
+    use model_core::effects::{StateDependentDelay, spec};
+
+    fn record(a: f64, b: f64, c: f64) -> Record {
+        let u: Vec<f64> = (0..4000)
+            .map(|k| f64::from(u8::from(k > 600 && k / 300 % 2 == 1)))
+            .collect();
+        let mut s = 0.0;
+        let y = u
+            .iter()
+            .map(|u| {
+                s += 0.02 * (u - s);
+                a * s + b
+            })
+            .collect();
+        Record::new("r", Use::Identify, c * 0.001, u, y)
+    }
+
+    /// Whatever the units are, the search sees the same records.
+    #[test]
+    fn records_look_alike_from_within() {
+        let seen = |a: f64, b: f64, c: f64| {
+            let record = record(a, b, c);
+            let model = Model {
+                sample_period_s: record.sample_period_s,
+                ..Model::default()
+            };
+            let units = Units::of(&model, std::slice::from_ref(&record));
+            units.record_in(&record)
+        };
+        let plain = seen(1.0, 0.0, 1.0);
+        for (a, b, c) in [(50.0, 0.0, 1.0), (0.02, 3.0, 1.0), (1.0, -7.0, 20.0)] {
+            let other = seen(a, b, c);
+            assert!((other.sample_period_s - plain.sample_period_s).abs() < 1e-12);
+            let apart = other.y.iter().zip(&plain.y).map(|(x, y)| (x - y).abs());
+            assert!(apart.fold(0.0, f64::max) < 1e-9, "{a} {b} {c}");
+        }
+    }
+
+    /// A model that is brought in and out again runs as it did.
+    #[test]
+    fn models_survive_the_way_in_and_out() {
+        let record = record(40.0, 12.0, 20.0);
+        let mut model = Model {
+            sample_period_s: record.sample_period_s,
+            a: vec![0.98],
+            b: vec![0.9],
+            c: vec![-0.002],
+            delay: Delay::of::<StateDependentDelay<f64>>(&[20.0, 8.0, 0.1], vec![1.0], true),
+            ..Model::default()
+        };
+        model.add(spec("hot-film-lag").unwrap(), &[0.3], None);
+        model.add(spec("amplitude-saturation").unwrap(), &[1e-5], None);
+        model.add(ZERO_OFFSET, &[12.0], None);
+        let units = Units::of(&model, std::slice::from_ref(&record));
+        let inner = units.model_in(&model);
+        let run = model.free_run(&record).unwrap();
+        let inside = inner.free_run(&units.record_in(&record)).unwrap();
+        for (outer, inner) in run.iter().zip(&inside) {
+            assert!((outer - (units.zero + units.y * inner)).abs() < 1e-6);
+        }
+        let back = units.model_out(&inner).free_run(&record).unwrap();
+        for (one, other) in run.iter().zip(&back) {
+            assert!((one - other).abs() < 1e-9);
+        }
+    }
+}

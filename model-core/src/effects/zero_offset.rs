@@ -1,0 +1,79 @@
+//! The sensor's zero is not where it should be.
+//!
+//! Not a missing effect but a nuisance that every rig may have: it belongs to the
+//! base model, so that nothing else is bent to imitate it.
+
+use crate::effect::{
+    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
+    Unit, take,
+};
+use crate::real::Real;
+
+/// y = s + o.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ZeroOffset<T> {
+    level: T,
+}
+
+impl<T: Real> Effect<T> for ZeroOffset<T> {
+    type State = ();
+    fn start(&self) {}
+    #[inline]
+    fn sense(&self, _state: &mut (), signal: T, _at: &Instant<'_, T>) -> T {
+        signal + self.level
+    }
+}
+
+impl<T: Real> Physics<T> for ZeroOffset<T> {
+    const SPEC: Spec = Spec {
+        name: "zero-offset",
+        rust: "zero_offset::ZeroOffset",
+        rust_type: RustType::Numbers,
+        place: Place::Sensor,
+        summary: "the sensor does not read 0 where there is no friction gain",
+        equation: "y = s + o",
+        parameters: &[Parameter::new("level", Unit::Y, [-1e6, 1e6], &[0.0])],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new("level", "an offset of the sensor").linear()),
+        channel: None,
+        needs: Needs::Nothing,
+        law: None,
+        source: "calibration: the zero of normalised friction is the natural, separated flow",
+    };
+
+    fn new(parameters: &[T], _setting: &Setting<T>) -> Self {
+        let [level] = take(parameters);
+        Self { level }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_reading_is_off_by_the_level_and_by_nothing_else() {
+        let setting = Setting {
+            period: 0.001_f64,
+            channel: 0,
+            reference: 1.0,
+        };
+        let effect = ZeroOffset::new(&[0.05], &setting);
+        let at = Instant {
+            command: 1.0,
+            flow: 0.3,
+            arrived: 1.0,
+            present: 1.0,
+            channels: &[],
+        };
+        assert_eq!(effect.sense(&mut (), 0.25, &at), 0.3);
+        assert_eq!(effect.sense(&mut (), -1.0, &at), -0.95);
+    }
+
+    #[test]
+    fn it_is_no_entry_of_the_catalogue_of_missing_effects() {
+        let name = ZeroOffset::<f64>::SPEC.name;
+        assert!(crate::effects::SPECS.iter().all(|spec| spec.name != name));
+        assert_eq!(crate::effects::spec(name).map(|spec| spec.name), Some(name));
+    }
+}

@@ -47,6 +47,8 @@ const STEPS: &[Step] = &[
         run(cargo(&["doc", "--release", "--workspace", "--no-deps"])
             .env("RUSTDOCFLAGS", "-Dwarnings"))
     }),
+    // An effect and a delay law are one file and one line each.
+    ("new effect", crate::new_effect::proof),
     ("set-up", || crate::setup::setup(&[])),
     ("no_std", || {
         TARGETS

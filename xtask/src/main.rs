@@ -10,6 +10,7 @@ mod faults;
 mod firmware;
 mod hidden_effects;
 mod identified;
+mod new_effect;
 mod pil;
 mod setup;
 mod shell;
@@ -33,6 +34,7 @@ const TASKS: &[Task] = &[
     firmware::TASK,
     hidden_effects::TASK,
     identified::TASK,
+    new_effect::TASK,
     pil::TASK,
     setup::TASK,
     size::TASK,

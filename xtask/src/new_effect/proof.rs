@@ -1,0 +1,183 @@
+//! Proves that an effect and a delay law are each added with one file and one line:
+//! in a copy of the tree, which is built, lists them, tries them in a diagnosis,
+//! fits the law and generates constants from it.
+
+use super::{MODEL, write};
+use crate::shell::{cargo, output, root, run, target};
+use anyhow::{Context, Result, bail};
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+const EFFECT: &str = "scratch-effect";
+const LAW: &str = "clamped-linear-delay";
+/// Named apart from the product's, whose folder of artefacts it shares.
+const PROGRAM: &str = "host-fit-scratch";
+
+pub(crate) fn proof() -> Result<()> {
+    let copy = target().join("scratch-copy");
+    if copy.exists() {
+        fs::remove_dir_all(&copy)?;
+    }
+    copy_tree(&root(), &copy)?;
+    write(&copy, EFFECT, "jet")?;
+    write(&copy, LAW, "delay")?;
+    let law = copy.join(MODEL).join("clamped_linear_delay.rs");
+    fs::write(&law, include_str!("clamped_linear_delay.txt"))?;
+
+    run(cargo(&[
+        "test",
+        "--release",
+        "--package",
+        "model-core",
+        "--lib",
+        "effects",
+    ])
+    .in_copy(&copy))?;
+    run(cargo(&[
+        "test",
+        "--release",
+        "--package",
+        "firmware-sim",
+        "--lib",
+        "effects",
+    ])
+    .in_copy(&copy))?;
+    let manifest = copy.join("host-fit/Cargo.toml");
+    let mut text = fs::read_to_string(&manifest)?;
+    write!(
+        text,
+        "\n[[bin]]\nname = \"{PROGRAM}\"\npath = \"src/main.rs\"\n"
+    )?;
+    fs::write(&manifest, text)?;
+    run(cargo(&[
+        "build",
+        "--release",
+        "--package",
+        "host-fit",
+        "--bin",
+        PROGRAM,
+        // It runs for seconds only.
+        "--config",
+        "profile.release.package.host-fit.opt-level = 1",
+    ])
+    .in_copy(&copy))?;
+    let tool = |arguments: &[&str]| -> Result<Value> {
+        let program = target().join("release").join(PROGRAM);
+        let mut command = std::process::Command::new(program);
+        let text = output(command.args(arguments).arg("--json").current_dir(&copy))?;
+        serde_json::from_str(&text).with_context(|| format!("no JSON from {arguments:?}"))
+    };
+
+    let listed = tool(&["effects"])?;
+    for name in [EFFECT, LAW] {
+        if !has(&listed, "name", name) {
+            bail!("`host-fit effects` does not list {name}");
+        }
+    }
+    let data = copy.join("scratch-data");
+    let model = recordings(&data)?;
+    let (data, model) = (data.display().to_string(), model.display().to_string());
+    let diagnosis = tool(&["diagnose", &model, &data, "--most-effects", "1"])?;
+    for name in [EFFECT, LAW] {
+        if !has(&diagnosis["ranking"], "effect", name) {
+            bail!("`host-fit diagnose` has not tried {name}: {diagnosis}");
+        }
+    }
+    let with_law = copy.join("scratch-model.toml").display().to_string();
+    tool(&["extend", &model, &data, "--effect", LAW, "-o", &with_law])?;
+    let constants = copy
+        .join("firmware/identified/src/full.rs")
+        .display()
+        .to_string();
+    tool(&["codegen", &with_law, "-o", &constants])?;
+    run(cargo(&["check", "--release", "--package", "identified"]).in_copy(&copy))
+}
+
+trait InCopy {
+    fn in_copy(&mut self, copy: &Path) -> &mut Self;
+}
+
+impl InCopy for std::process::Command {
+    /// With the artefacts of the product, so that the libraries are not built again.
+    fn in_copy(&mut self, copy: &Path) -> &mut Self {
+        self.current_dir(copy).env("CARGO_TARGET_DIR", target())
+    }
+}
+
+/// Whether a list has an entry whose `key` is `value`.
+fn has(list: &Value, key: &str, value: &str) -> bool {
+    let entries = list.as_array().map_or(&[][..], Vec::as_slice);
+    entries.iter().any(|entry| entry[key] == value)
+}
+
+/// Everything but what is built and what is hidden.
+fn copy_tree(from: &Path, to: &Path) -> Result<()> {
+    fs::create_dir_all(to)?;
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        let (name, kind) = (entry.file_name(), entry.file_type()?);
+        let skipped = name.to_string_lossy().starts_with('.') && name != ".cargo";
+        if skipped || entry.path() == target() || name == "target" {
+            continue;
+        }
+        let path = to.join(&name);
+        if kind.is_dir() {
+            copy_tree(&entry.path(), &path)?;
+        } else if kind.is_file() {
+            fs::copy(entry.path(), &path)
+                .with_context(|| format!("could not copy {}", entry.path().display()))?;
+        }
+    }
+    Ok(())
+}
+
+/// Two short records of a flow with a cubic term, and a lean model that lacks it.
+fn recordings(folder: &Path) -> Result<std::path::PathBuf> {
+    const PERIODS: [(&str, usize); 2] = [("identify", 170), ("validate", 230)];
+    fs::create_dir_all(folder)?;
+    let mut set = String::from("sample_period_s = 0.001\n");
+    let mut noise = 1_u32;
+    for (role, half_period) in PERIODS {
+        let mut table = String::from("t,u,y\n");
+        let (mut y, mut commands) = (0.0_f64, Vec::new());
+        for k in 0..2000_usize {
+            let u = u8::from(k / half_period % 2 == 1 && k % 11 != 0);
+            commands.push(u);
+            // A linear congruence serves as noise.
+            noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let measured = y + (f64::from(noise) / f64::from(u32::MAX) - 0.5) * 0.01;
+            writeln!(table, "{},{u},{measured}", k as f64 * 0.001)?;
+            let arrived = k.checked_sub(40).map_or(0, |past| commands[past]);
+            y += 0.02 * (f64::from(arrived) - y - 0.8 * y.powi(3));
+        }
+        fs::write(folder.join(role).with_extension("csv"), table)?;
+        write!(
+            set,
+            "[[record]]\nname = \"{role}\"\nfile = \"{role}.csv\"\nuse = \"{role}\"\n"
+        )?;
+    }
+    fs::write(folder.join("dataset.toml"), set)?;
+    let model = folder.join("lean.toml");
+    fs::write(
+        &model,
+        "format_version = 1
+sample_period_s = 0.001
+lag_convention = \"one-step\"
+[structure]
+averaged = false
+window = 250
+state_lags = [1]
+product_lags = [1]
+[coefficients]
+a = [0.98]
+b = [0.02]
+c = [[0.0]]
+[delay]
+law = \"fixed\"
+delays = [40]
+",
+    )?;
+    Ok(model)
+}

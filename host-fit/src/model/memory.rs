@@ -151,8 +151,10 @@ mod tests {
             channel: Some("u_inf".to_owned()),
             reference,
         };
-        let mut model = Model::default();
-        model.effects = vec![added(Some(10.0)), added(Some(10.0))];
+        let mut model = Model {
+            effects: vec![added(Some(10.0)), added(Some(10.0))],
+            ..Model::default()
+        };
         let channels = model.memory().channels;
         assert_eq!(channels.len(), 1);
         assert_eq!(

@@ -220,6 +220,10 @@ impl Needs {
     }
 }
 
+/// From all parameters of an effect to a number and its unit, as a person would
+/// say them.
+pub type Said = fn(&[f64]) -> (f64, &'static str);
+
 /// The parameter with which an effect vanishes as it goes to 0, and how it is said.
 #[derive(Clone, Copy, Debug)]
 pub struct Amplitude {
@@ -231,10 +235,9 @@ pub struct Amplitude {
     pub linear: bool,
     /// Whether all other parameters vanish with it.
     pub together: bool,
-    /// What people imagine more easily than the parameter, computed from all of
-    /// them: a number and its unit. None: the parameter [as it is
-    /// spoken](Unit::spoken).
-    pub said: Option<fn(&[f64]) -> (f64, &'static str)>,
+    /// What people imagine more easily than the parameter; none: the parameter
+    /// [as it is spoken](Unit::spoken).
+    pub said: Option<Said>,
 }
 
 impl Amplitude {
@@ -270,7 +273,7 @@ impl Amplitude {
 
     /// The same, said otherwise.
     #[must_use]
-    pub const fn said(self, said: fn(&[f64]) -> (f64, &'static str)) -> Self {
+    pub const fn said(self, said: Said) -> Self {
         Self {
             said: Some(said),
             ..self

@@ -9,8 +9,8 @@ mod card;
 mod unit;
 
 pub use card::{
-    Amplitude, Facts, Influence, LawCard, Needs, Parameter, Place, RustType, Sign, Spec, Start,
-    Starts,
+    Amplitude, Facts, Influence, LawCard, Needs, Parameter, Place, RustType, Said, Sign, Spec,
+    Start, Starts,
 };
 pub use unit::Unit;
 

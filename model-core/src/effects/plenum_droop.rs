@@ -92,7 +92,10 @@ mod tests {
     #[test]
     fn the_pressure_comes_back_and_stays_positive() {
         let plenum: PlenumDroop<f64> = prepared(&[0.1, 500.0]);
-        let j = jets(&plenum, |k| if k < 100 || k > 900 { 1.0 } else { 0.0 });
+        let j = jets(
+            &plenum,
+            |k| if (100..=900).contains(&k) { 0.0 } else { 1.0 },
+        );
         assert!(j.iter().all(|j| *j >= 0.0));
         assert!(j[99] < 0.05 && (j[901] - 1.0).abs() < 1e-3);
     }

@@ -252,10 +252,10 @@ fn entered(text: &str, module: &str, list: &str, line: &str) -> Option<String> {
     let keyword = &module[..=module.rfind(' ')?];
     let is_module = |line: &&str| line.starts_with(keyword) && line.ends_with(';');
     let mut lines: Vec<&str> = text.lines().collect();
-    let last = lines.iter().rposition(|line| is_module(&line))?;
+    let last = lines.iter().rposition(is_module)?;
     let place = lines
         .iter()
-        .position(|line| is_module(&line) && *line > module);
+        .position(|line| is_module(line) && *line > module);
     lines.insert(place.unwrap_or(last + 1), module);
     let begin = format!("{list}! {{");
     let begin = lines.iter().position(|line| *line == begin)?;

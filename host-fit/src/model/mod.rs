@@ -287,7 +287,7 @@ impl Model {
             return;
         };
         law.interpolated = false;
-        if law.spec.law.is_some_and(|card| card.base) {
+        if law.spec.base {
             let [constant, _] = law.range(self.sample_period_s);
             let rounded = |f: &f64| (f * constant).round().clamp(0.0, f64::from(u16::MAX)) as u16;
             self.delay = Delay::Fixed {

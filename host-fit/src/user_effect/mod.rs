@@ -400,6 +400,7 @@ impl Source {
             amplitude: None,
             channel: self.channel.as_deref().map(keep),
             needs: Needs::Nothing,
+            base: false,
             law: None,
             source: keep(self.reference.as_deref().unwrap_or("the user's own effect")),
         }

@@ -302,25 +302,17 @@ pub struct LawCard {
     /// Whether it holds edges of the command back, so that jets are not on/off
     /// any more. Its delays are then not meant to be rounded.
     pub shapes_command: bool,
-    /// Whether base models have it, so that none lacks it.
-    pub base: bool,
     /// The public fields of its type, if they are the parameters as they are, in
     /// their order: generated code can then have it as a constant.
     pub fields: Option<&'static [&'static str]>,
 }
 
 impl LawCard {
-    /// A law that a model can lack, its words yet to be said.
-    pub const EFFECT: Self = Self {
+    /// A law that leaves the command alone, its words yet to be said.
+    pub const PLAIN: Self = Self {
         words: "",
         shapes_command: false,
-        base: false,
         fields: None,
-    };
-    /// A law that base models have.
-    pub const BASE: Self = Self {
-        base: true,
-        ..Self::EFFECT
     };
 }
 
@@ -349,6 +341,9 @@ pub struct Spec {
     pub channel: Option<&'static str>,
     /// What else it needs to show.
     pub needs: Needs,
+    /// Whether it belongs to base models, so that it is never what one lacks: a
+    /// constant delay, the sensor's zero.
+    pub base: bool,
     /// Delay laws: what else is known of them.
     pub law: Option<LawCard>,
     /// Where to read more.

@@ -43,6 +43,7 @@ impl<T: Real> Physics<T> for AmplitudeSaturation<T> {
         amplitude: Some(Amplitude::new("cubic", "an amplitude saturation").linear()),
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "Landau's amplitude equation; Stuart, J. Fluid Mech. 9 (1960)",
     };

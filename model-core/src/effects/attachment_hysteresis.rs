@@ -57,6 +57,7 @@ impl<T: Real> Physics<T> for AttachmentHysteresis<T> {
         amplitude: Some(Amplitude::new("gain", "an attachment hysteresis").linear()),
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "Greenblatt & Wygnanski, Prog. Aerosp. Sci. 36 (2000)",
     };

@@ -66,6 +66,7 @@ impl<T: Real> Physics<T> for BoucWenHysteresis<T> {
         ),
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "Wen, J. Eng. Mech. Div. 102 (1976)",
     };

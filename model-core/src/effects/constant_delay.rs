@@ -45,10 +45,11 @@ impl<T: Real> Physics<T> for ConstantDelay<T> {
         amplitude: None,
         channel: None,
         needs: Needs::Nothing,
+        base: true,
         law: Some(LawCard {
             words: "{} samples",
             fields: Some(&["delay"]),
-            ..LawCard::BASE
+            ..LawCard::PLAIN
         }),
         source: "Feingesicht et al., ECC 2016, eq. (3)",
     };

@@ -45,6 +45,7 @@ impl<T: Real> Physics<T> for DryFriction<T> {
         amplitude: Some(Amplitude::new("level", "dry friction")),
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "Coulomb friction; Armstrong-Hélouvry et al., Automatica 30 (1994)",
     };

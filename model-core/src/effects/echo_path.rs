@@ -48,6 +48,7 @@ impl<T: Real, const LEN: usize> Physics<T> for EchoPath<T, LEN> {
         amplitude: Some(Amplitude::new("gain", "an echo of the jet").linear()),
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "a second path of convection or an acoustic reflection",
     };

@@ -96,10 +96,11 @@ impl<T: Real> Physics<T> for EdgeDependentDelay<T> {
         amplitude: None,
         channel: None,
         needs: Needs::OnOffInput,
+        base: false,
         law: Some(LawCard {
             words: "{} after rising, {} after falling edges",
             shapes_command: true,
-            ..LawCard::EFFECT
+            ..LawCard::PLAIN
         }),
         source: "Darabi & Wygnanski, J. Fluid Mech. 510 (2004): attachment and separation are different processes",
     };

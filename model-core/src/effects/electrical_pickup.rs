@@ -34,6 +34,7 @@ impl<T: Real> Physics<T> for ElectricalPickup<T> {
         amplitude: Some(Amplitude::new("gain", "an electrical pickup").linear()),
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "common-impedance coupling",
     };

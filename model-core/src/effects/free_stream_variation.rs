@@ -47,6 +47,7 @@ impl<T: Real> Physics<T> for FreeStreamVariation<T> {
         amplitude: Some(Amplitude::new("gain", "a gain of the free stream").linear()),
         channel: Some("u_inf"),
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "momentum coefficient c_mu = ρ_j U_j² A_j/(½ ρ U∞² S)",
     };

@@ -56,6 +56,7 @@ impl<T: Real> Physics<T> for HotFilmLag<T> {
         amplitude: Some(Amplitude::new("time_constant", "a lag of the hot film")),
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "Bruun, Hot-wire Anemometry (1995)",
     };

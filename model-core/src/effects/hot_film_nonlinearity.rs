@@ -49,6 +49,7 @@ impl<T: Real> Physics<T> for HotFilmNonlinearity<T> {
         amplitude: None,
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "King, Phil. Trans. A 214 (1914); Bellhouse & Schultz, J. Fluid Mech. 24 (1966)",
     };

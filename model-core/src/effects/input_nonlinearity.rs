@@ -37,6 +37,7 @@ impl<T: Real> Physics<T> for InputNonlinearity<T> {
         amplitude: None,
         channel: None,
         needs: Needs::GradedInput,
+        base: false,
         law: None,
         source: "Hammerstein model",
     };

@@ -197,31 +197,22 @@ catalogue! {
     thermal_drift::ThermalDrift: ThermalDrift<T>,
     electrical_pickup::ElectricalPickup: ElectricalPickup<T>,
     sensor_saturation::SensorSaturation: SensorSaturation<T>,
-    // The last that happens to a reading, and a nuisance: see `ZERO_OFFSET`.
     zero_offset::ZeroOffset: ZeroOffset<T>,
 }
 
-/// The effects and the sensor's zero, which is the last.
-const ALL: &[Spec] = &in_order::<{ EFFECTS.len() + lacking() }>();
-
 /// The effects that a model can lack, in the order of the physics: jet, delay,
 /// flow, sensor.
-pub const SPECS: &[Spec] = ALL.split_at(ALL.len() - 1).0;
+pub const SPECS: &[Spec] = &in_order::<{ lacking(LAWS) + lacking(EFFECTS) }>();
 
 /// The card of the sensor's zero: a nuisance that belongs to a base model, never a
 /// missing effect.
 pub const ZERO_OFFSET: &Spec = &<ZeroOffset<f64> as Physics<f64>>::SPEC;
 
-/// Whether a model can lack the law of this card.
-const fn can_be_missing(spec: &Spec) -> bool {
-    matches!(spec.law, Some(law) if !law.base)
-}
-
-/// How many delay laws a model can lack.
-const fn lacking() -> usize {
+/// How many of `specs` a model can lack.
+const fn lacking(specs: &[Spec]) -> usize {
     let (mut count, mut i) = (0, 0);
-    while i < LAWS.len() {
-        count += can_be_missing(&LAWS[i]) as usize;
+    while i < specs.len() {
+        count += !specs[i].base as usize;
         i += 1;
     }
     count
@@ -232,17 +223,14 @@ const fn in_order<const N: usize>() -> [Spec; N] {
     let (mut next, mut place) = (0, 0);
     while place <= Place::Sensor as usize {
         let mut i = 0;
-        while i < LAWS.len() {
-            if can_be_missing(&LAWS[i]) && LAWS[i].place as usize == place {
-                ordered[next] = LAWS[i];
-                next += 1;
-            }
-            i += 1;
-        }
-        let mut i = 0;
-        while i < EFFECTS.len() {
-            if EFFECTS[i].place as usize == place {
-                ordered[next] = EFFECTS[i];
+        while i < LAWS.len() + EFFECTS.len() {
+            let spec = if i < LAWS.len() {
+                LAWS[i]
+            } else {
+                EFFECTS[i - LAWS.len()]
+            };
+            if !spec.base && spec.place as usize == place {
+                ordered[next] = spec;
                 next += 1;
             }
             i += 1;
@@ -255,7 +243,10 @@ const fn in_order<const N: usize>() -> [Spec; N] {
 /// The card of the effect `name`: an entry of the catalogue, or the sensor's zero.
 #[must_use]
 pub fn spec(name: &str) -> Option<&'static Spec> {
-    ALL.iter().find(|spec| spec.name == name)
+    SPECS
+        .iter()
+        .chain([ZERO_OFFSET])
+        .find(|spec| spec.name == name)
 }
 
 /// The card of the delay law `name`, of base models or an effect.
@@ -305,8 +296,9 @@ mod tests {
             }
         }
         assert!(SPECS.is_sorted_by_key(|spec| spec.place));
-        // The constant delay and the sensor's zero belong to base models.
-        assert_eq!(SPECS.len() + 2, names.len());
+        let lacking: std::vec::Vec<&str> = SPECS.iter().map(|spec| spec.name).collect();
+        names.retain(|name| !lacking.contains(name));
+        assert_eq!(names, ["zero-offset", "constant-delay"], "of base models");
         assert!(spec("constant-delay").is_none() && law("constant-delay").is_some());
     }
 }

@@ -60,6 +60,7 @@ impl<T: Real> Physics<T> for PlenumDroop<T> {
         amplitude: Some(Amplitude::new("depletion_rate", "a plenum droop").said(loss)),
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "mass balance of an isothermal plenum",
     };

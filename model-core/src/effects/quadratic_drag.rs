@@ -45,6 +45,7 @@ impl<T: Real> Physics<T> for QuadraticDrag<T> {
         amplitude: Some(Amplitude::new("coefficient", "quadratic drag")),
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "Morison et al. (1950)",
     };

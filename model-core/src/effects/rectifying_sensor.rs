@@ -29,6 +29,7 @@ impl<T: Real> Physics<T> for RectifyingSensor {
         amplitude: None,
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "Bruun, Hot-wire Anemometry (1995)",
     };

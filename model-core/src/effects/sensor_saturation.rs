@@ -43,6 +43,7 @@ impl<T: Real> Physics<T> for SensorSaturation<T> {
         amplitude: None,
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "amplifier limits",
     };

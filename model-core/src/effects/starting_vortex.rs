@@ -65,6 +65,7 @@ impl<T: Real> Physics<T> for StartingVortex<T> {
         amplitude: Some(Amplitude::new("gain", "a starting vortex").linear()),
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "Glezer, AIAA J. 26 (1988): starting vortex of a jet",
     };

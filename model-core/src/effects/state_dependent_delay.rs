@@ -63,10 +63,11 @@ impl<T: Real> Physics<T> for StateDependentDelay<T> {
         amplitude: None,
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: Some(LawCard {
             words: "{} + {}·exp(−{}·ỹ) samples",
             fields: Some(&["floor", "rise", "rate"]),
-            ..LawCard::EFFECT
+            ..LawCard::PLAIN
         }),
         source: "Feingesicht et al., ECC 2016, eq. (2)",
     };

@@ -65,6 +65,7 @@ impl<T: Real> Physics<T> for StoppingVortex<T> {
         amplitude: Some(Amplitude::new("gain", "a stopping vortex").linear()),
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "Darabi & Wygnanski, J. Fluid Mech. 510 (2004): separation of a flow after forcing stops",
     };

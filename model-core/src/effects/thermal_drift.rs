@@ -48,6 +48,7 @@ impl<T: Real> Physics<T> for ThermalDrift<T> {
         amplitude: Some(Amplitude::new("amplitude", "a thermal drift").linear()),
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "Bruun, Hot-wire Anemometry (1995), ch. 7",
     };

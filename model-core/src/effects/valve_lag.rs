@@ -47,6 +47,7 @@ impl<T: Real> Physics<T> for ValveLag<T> {
         amplitude: Some(Amplitude::new("opening_time", "a lag of the valve").together()),
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "first-order valve model; e.g. Topçu et al., Mechatronics 16 (2006)",
     };

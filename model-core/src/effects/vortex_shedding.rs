@@ -64,6 +64,7 @@ impl<T: Real> Physics<T> for VortexShedding<T> {
         amplitude: Some(Amplitude::new("gain", "vortex shedding").linear()),
         channel: None,
         needs: Needs::Nothing,
+        base: false,
         law: None,
         source: "Cattafesta & Sheplak, Annu. Rev. Fluid Mech. 43 (2011)",
     };

@@ -37,6 +37,7 @@ impl<T: Real> Physics<T> for ZeroOffset<T> {
         amplitude: Some(Amplitude::new("level", "an offset of the sensor").linear()),
         channel: None,
         needs: Needs::Nothing,
+        base: true,
         law: None,
         source: "calibration: the zero of normalised friction is the natural, separated flow",
     };

@@ -1,19 +1,15 @@
-//! The rigs that a board runs in lockstep with the host, and the host with it:
-//! the same function builds both.
+//! The rigs that a board runs in lockstep with the host, one for each model that
+//! `identified` has.
 
 use crate::controller::{Controller, Reading, Settings};
-use crate::law::{Direct, Law, Relay, RelaySettings};
+use crate::law::{Driven, Law, driven};
 use crate::link::lockstep::BATCH;
-use crate::sensor::{Calibration, Range};
-use crate::tracking::Track;
-use identified::{averaged, effects, full};
+use crate::relay::Relay;
+use crate::sensor::{Calibration, Channel, Range};
 use model_core::average::MovingAverage;
-use model_core::history::{BitHistory, DelayLine};
+use model_core::control::{HoldTimes, Pulses, Tracking};
 
-/// How many cases there are.
-pub const CASES: [&str; 4] = ["full model", "averaged model", "effects", "law"];
-
-/// Calibration and limits of the lockstep rig.
+/// Calibration and limits of the lockstep rig, without a measured channel.
 pub const SETTINGS: Settings = Settings {
     calibration: Calibration {
         zero: 800.0,
@@ -24,29 +20,73 @@ pub const SETTINGS: Settings = Settings {
         upper_rail: 4087.0,
         stuck_after: 500,
     },
-    residual_envelope: 1.0,
+    channel: None,
+    // The plant is not what the models are of.
+    residual_envelope: f32::INFINITY,
 };
 
-/// Thresholds of the relay in the model cases.
-pub const RELAY: RelaySettings = RelaySettings {
+/// The law of models without one.
+pub const RELAY: Relay = Relay {
     opens_below: 0.45,
     shuts_above: 0.55,
-    min_on: 20,
-    min_off: 20,
+    hold: HoldTimes { on: 20, off: 20 },
 };
 
+/// The settings for a model whose channels are usually at `references`.
+#[must_use]
+pub const fn settings(references: &[f32]) -> Settings {
+    let channel = match references {
+        [] => None,
+        [reference, ..] => Some(Channel::around(*reference)),
+    };
+    Settings {
+        channel,
+        ..SETTINGS
+    }
+}
+
+/// What a generated file says of a law: its constants, or nothing.
+pub trait OrRelay {
+    /// The law that runs.
+    type Law;
+    /// The law itself, or `relay` where there is none.
+    fn or(self, relay: Relay) -> Self::Law;
+}
+
+impl OrRelay for () {
+    type Law = Relay;
+    fn or(self, relay: Relay) -> Relay {
+        relay
+    }
+}
+
+impl OrRelay for Tracking<f32> {
+    type Law = Self;
+    fn or(self, _relay: Relay) -> Self {
+        self
+    }
+}
+
+impl<P> OrRelay for Pulses<P> {
+    type Law = Self;
+    fn or(self, _relay: Relay) -> Self {
+        self
+    }
+}
+
 /// An armed controller around `law`.
-pub fn armed<L: Law>(law: L) -> Controller<L> {
-    let mut controller = Controller::new(SETTINGS, law);
+pub fn armed<L: Law>(settings: Settings, law: L) -> Controller<L> {
+    let mut controller = Controller::new(settings, law);
     controller.arm();
     controller
 }
 
 /// One step of a case.
 #[inline]
-pub fn step<L: Law>(controller: &mut Controller<L>, counts: u16) -> (f32, bool) {
+pub fn step<L: Law>(controller: &mut Controller<L>, counts: u16, channel: u16) -> (f32, bool) {
     let tick = controller.tick(Reading {
         counts: f32::from(counts),
+        channel: f32::from(channel),
         periods: 1,
     });
     (tick.predicted, tick.open)
@@ -54,87 +94,84 @@ pub fn step<L: Law>(controller: &mut Controller<L>, counts: u16) -> (f32, bool) 
 
 const _: () = assert!(BATCH <= 32, "decisions of a batch fit in 32 bits");
 
-type FullOutputs = DelayLine<f32, { full::OUTPUTS }>;
-type FullJets = BitHistory<{ full::WORDS }>;
-type Full = Relay<full::Identified, FullOutputs, FullJets, Direct>;
-type Averaged = Relay<
-    averaged::Identified,
-    DelayLine<f32, { averaged::OUTPUTS }>,
-    BitHistory<{ averaged::WORDS }>,
-    MovingAverage<f32, { averaged::WINDOW as usize }>,
->;
-type Effects = Relay<
-    effects::Identified,
-    DelayLine<f32, { effects::OUTPUTS }>,
-    DelayLine<f32, { effects::JETS }>,
-    Direct,
->;
-type Tracked = Track<full::Identified, FullOutputs, FullJets, { full::LOOK_AHEAD }>;
+macro_rules! rigs {
+    ($($model:ident)+) => {
+        /// The models, in the order of their numbers.
+        pub const CASES: &[&str] = &[$(stringify!($model)),+];
 
-/// All cases, each from rest when it is started.
+        /// A rig, from rest.
+        #[allow(non_camel_case_types, reason = "named as the models are")]
+        #[allow(clippy::large_enum_variant, reason = "there is one")]
+        enum Rig {
+            $($model(
+                Controller<
+                    driven!(<identified::$model::Law as OrRelay>::Law, identified::$model)
+                >,
+            ),)+
+        }
+
+        impl Rig {
+            /// The case of that number; the numbers are those of `CASES`.
+            fn new(case: u8) -> Option<Self> {
+                let mut next = 0;
+                $(
+                    if case == next {
+                        return Some(Self::$model($model()));
+                    }
+                    next += 1;
+                )+
+                let _ = next;
+                None
+            }
+
+            #[inline]
+            fn step(&mut self, counts: u16, channel: u16) -> (f32, bool) {
+                match self {
+                    $(Self::$model(controller) => step(controller, counts, channel),)+
+                }
+            }
+        }
+
+        $(
+            #[inline(never)]
+            fn $model() -> Controller<
+                driven!(<identified::$model::Law as OrRelay>::Law, identified::$model)
+            > {
+                use identified::$model::{LAW, REFERENCES, model, state};
+                let model = model();
+                let state = state(&model);
+                let law = Driven::new(LAW.or(RELAY), model, state, MovingAverage::new());
+                armed(settings(&REFERENCES), law)
+            }
+        )+
+    };
+}
+identified::each_model!(rigs);
+
+/// The present case, from rest when it is started.
 pub struct Rigs {
-    case: u8,
-    full: Controller<Full>,
-    averaged: Controller<Averaged>,
-    effects: Controller<Effects>,
-    law: Controller<Tracked>,
-}
-
-fn full_rig() -> Controller<Full> {
-    let model = full::model();
-    armed(Relay::new(model, full::state(&model), Direct, RELAY))
-}
-
-fn averaged_rig() -> Controller<Averaged> {
-    let model = averaged::model();
-    let state = averaged::state(&model);
-    armed(Relay::new(model, state, MovingAverage::new(), RELAY))
-}
-
-fn effects_rig() -> Controller<Effects> {
-    let model = effects::model();
-    armed(Relay::new(model, effects::state(&model), Direct, RELAY))
-}
-
-fn law_rig() -> Controller<Tracked> {
-    let model = full::model();
-    armed(Track::new(full::LAW, model, full::state(&model)))
+    rig: Option<Rig>,
 }
 
 impl Rigs {
-    /// Case 0, and all others, from rest.
+    /// None started yet.
     #[must_use]
-    pub fn new() -> Self {
-        Self {
-            case: 0,
-            full: full_rig(),
-            averaged: averaged_rig(),
-            effects: effects_rig(),
-            law: law_rig(),
-        }
+    pub const fn new() -> Self {
+        Self { rig: None }
     }
 
     /// Begins a case from rest; `false` if there is none of that number.
     pub fn start(&mut self, case: u8) -> bool {
-        self.case = case;
-        match case {
-            0 => self.full = full_rig(),
-            1 => self.averaged = averaged_rig(),
-            2 => self.effects = effects_rig(),
-            3 => self.law = law_rig(),
-            _ => return false,
-        }
-        true
+        self.rig = Rig::new(case);
+        self.rig.is_some()
     }
 
     /// One step of the present case: prediction and decision.
     #[inline]
-    pub fn step(&mut self, counts: u16) -> (f32, bool) {
-        match self.case {
-            0 => step(&mut self.full, counts),
-            1 => step(&mut self.averaged, counts),
-            2 => step(&mut self.effects, counts),
-            _ => step(&mut self.law, counts),
+    pub fn step(&mut self, counts: u16, channel: u16) -> (f32, bool) {
+        match &mut self.rig {
+            Some(rig) => rig.step(counts, channel),
+            None => (0.0, false),
         }
     }
 }
@@ -151,15 +188,15 @@ mod tests {
 
     #[test]
     fn every_case_switches_and_starts_anew() {
+        let mut rigs = Rigs::new();
         for case in 0..CASES.len() as u8 {
-            let mut rigs = Rigs::new();
             let mut run = || {
                 assert!(rigs.start(case));
                 let mut trace = std::vec::Vec::new();
                 let mut predicted = 0.0_f32;
                 for k in 0..3000_u16 {
                     let counts = (800.0 + predicted * 2000.0).clamp(10.0, 4000.0) as u16 + k % 2;
-                    let (next, open) = rigs.step(counts);
+                    let (next, open) = rigs.step(counts, 2048 + k % 100);
                     predicted = next;
                     trace.push((next.to_bits(), open));
                 }
@@ -169,6 +206,6 @@ mod tests {
             assert_eq!(run(), first, "case {case}");
             assert!(first.windows(2).any(|w| w[0].1 && !w[1].1), "case {case}");
         }
-        assert!(!Rigs::new().start(CASES.len() as u8));
+        assert!(!rigs.start(CASES.len() as u8));
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::controller::{Controller, Mode};
 use crate::law::Law;
+use heapless::Vec;
 
 /// Samples between two lines of telemetry.
 const TELEMETRY: u32 = 100;
@@ -79,48 +80,41 @@ pub enum Command {
 }
 
 /// Collects a line.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Console {
-    line: [u8; 8],
-    length: usize,
+    /// One longer than the longest command: what does not fit is none.
+    line: Vec<u8, 7>,
 }
 
 impl Console {
     /// An empty line.
     #[must_use]
     pub const fn new() -> Self {
-        Self {
-            line: [0; 8],
-            length: 0,
-        }
+        Self { line: Vec::new() }
     }
 
     /// Takes a byte; a line end gives a command, an empty line none.
     pub fn receive(&mut self, byte: u8) -> Option<Command> {
         if byte != b'\n' && byte != b'\r' {
-            if let Some(slot) = self.line.get_mut(self.length) {
-                *slot = byte;
-            }
-            self.length = self.length.saturating_add(1);
+            let _ = self.line.push(byte);
             return None;
         }
-        let command = match self.line.get(..self.length) {
-            Some(b"") => None,
-            Some(b"arm") => Some(Command::Arm),
-            Some(b"disarm") => Some(Command::Disarm),
-            Some(b"status") => Some(Command::Status),
+        let command = match self.line.as_slice() {
+            b"" => None,
+            b"arm" => Some(Command::Arm),
+            b"disarm" => Some(Command::Disarm),
+            b"status" => Some(Command::Status),
             _ => Some(Command::Unknown),
         };
-        self.length = 0;
+        self.line.clear();
         command
     }
 }
 
 /// A line of text; what does not fit is cut off.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Line {
-    bytes: [u8; 96],
-    length: usize,
+    bytes: Vec<u8, 96>,
 }
 
 impl Line {
@@ -137,10 +131,7 @@ impl Line {
     }
 
     fn new(prefix: &str, mode: Mode, friction: f32, open: bool, samples: u64) -> Self {
-        let mut line = Self {
-            bytes: [0; 96],
-            length: 0,
-        };
+        let mut line = Self { bytes: Vec::new() };
         line.text(prefix);
         match mode {
             Mode::Disarmed => line.text("disarmed"),
@@ -162,14 +153,11 @@ impl Line {
     /// The bytes to send.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
-        self.bytes.get(..self.length).unwrap_or(&self.bytes)
+        &self.bytes
     }
 
     fn byte(&mut self, byte: u8) {
-        if let Some(slot) = self.bytes.get_mut(self.length) {
-            *slot = byte;
-            self.length += 1;
-        }
+        let _ = self.bytes.push(byte);
     }
 
     fn text(&mut self, text: &str) {
@@ -260,11 +248,14 @@ mod tests {
     fn the_operator_is_answered_and_told_of_changes() {
         use crate::cases::{RELAY, SETTINGS};
         use crate::controller::Reading;
-        use crate::law::{Direct, Relay};
+        use crate::law::{Driven, driven};
+        use crate::relay::Relay;
         use identified::full;
+        use model_core::average::MovingAverage;
 
         let model = full::model();
-        let relay = Relay::new(model, full::state(&model), Direct, RELAY);
+        let relay: driven!(Relay, full) =
+            Driven::new(RELAY, model, full::state(&model), MovingAverage::new());
         let mut controller = Controller::new(SETTINGS, relay);
         let mut operator = Operator::new();
         let mut typed = |text: &str, controller: &mut Controller<_>| {
@@ -279,7 +270,11 @@ mod tests {
         let mut operator = Operator::new();
         for k in 0..250_u16 {
             let counts = f32::from(800 + k % 2);
-            controller.tick(Reading { counts, periods: 1 });
+            controller.tick(Reading {
+                counts,
+                channel: 0.0,
+                periods: 1,
+            });
             lines += u32::from(operator.report(&controller).is_some());
         }
         // One for the change of mode, two for the time.

@@ -2,7 +2,7 @@
 
 use crate::fault::Fault;
 use crate::law::Law;
-use crate::sensor::{Calibration, Range, Watch};
+use crate::sensor::{Calibration, Channel, Range, Watch};
 
 /// What the operator set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,6 +23,8 @@ pub struct Settings {
     pub calibration: Calibration,
     /// What a healthy sensor does not do.
     pub range: Range,
+    /// The measured channel, where the model needs one.
+    pub channel: Option<Channel>,
     /// Largest residual, averaged over about 64 samples, that the model's
     /// envelope allows, y.
     pub residual_envelope: f32,
@@ -31,8 +33,10 @@ pub struct Settings {
 /// What the sensor gave at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
-    /// Counts of the converter.
+    /// Counts of the sensor.
     pub counts: f32,
+    /// Counts of the measured channel; not looked at where the model needs none.
+    pub channel: f32,
     /// Sample periods since the reading before: 1 unless one was missed.
     pub periods: u32,
 }
@@ -54,6 +58,8 @@ pub struct Controller<L> {
     settings: Settings,
     law: L,
     watch: Watch,
+    /// Of the measured channel.
+    channel: Watch,
     mode: Mode,
     /// Samples since the start; 2⁶⁴ of them do not come.
     samples: u64,
@@ -73,6 +79,7 @@ impl<L: Law> Controller<L> {
             settings,
             law,
             watch: Watch::new(),
+            channel: Watch::new(),
             mode: Mode::Disarmed,
             samples: 0,
             strayed: 0.0,
@@ -142,6 +149,21 @@ impl<L: Law> Controller<L> {
     pub fn tick(&mut self, reading: Reading) -> Tick {
         self.samples = self.samples.wrapping_add(u64::from(reading.periods));
         let mut fault = self.watch.check(&self.settings.range, reading.counts);
+        let mut value = 0.0;
+        if let Some(channel) = &self.settings.channel {
+            if self
+                .channel
+                .check(&channel.range, reading.channel)
+                .is_some()
+            {
+                fault = fault.or(Some(Fault::Channel));
+            }
+            value = channel.calibration.value(reading.channel);
+            if !value.is_finite() {
+                value = channel.reference;
+            }
+        }
+        let channels = [value];
         // A sensor that is ill before the start is seen at arming, not before.
         if reading.periods > 1 {
             fault = Some(Fault::Overrun);
@@ -149,14 +171,14 @@ impl<L: Law> Controller<L> {
         if let (Some(fault), Mode::Armed) = (fault, self.mode) {
             self.latch(fault);
         }
-        let y = self.settings.calibration.friction(reading.counts);
+        let y = self.settings.calibration.value(reading.counts);
         self.last = y;
         // A reading that is no number must not enter the averages.
         let y = if y.is_finite() { y } else { 0.0 };
         let action = if self.mode == Mode::Armed {
-            self.law.act(y)
+            self.law.act(y, &channels)
         } else {
-            self.law.idle(y)
+            self.law.idle(y, &channels)
         };
         self.strayed += (action.residual - self.strayed) * Self::SHARE;
         let strayed = self.strayed.abs();
@@ -182,15 +204,19 @@ impl<L: Law> Controller<L> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::law::{Direct, Relay, RelaySettings};
-    use identified::full;
+    use crate::law::{Driven, driven};
+    use crate::relay::Relay;
+    use identified::{full, own};
+    use model_core::average::MovingAverage;
+    use model_core::control::HoldTimes;
 
-    type Law = Relay<
-        full::Identified,
-        model_core::history::DelayLine<f32, { full::OUTPUTS }>,
-        model_core::history::BitHistory<{ full::WORDS }>,
-        Direct,
-    >;
+    type Law = driven!(Relay, full);
+
+    const RELAY: Relay = Relay {
+        opens_below: 0.45,
+        shuts_above: 0.55,
+        hold: HoldTimes { on: 20, off: 20 },
+    };
 
     const SETTINGS: Settings = Settings {
         calibration: Calibration {
@@ -202,23 +228,25 @@ mod tests {
             upper_rail: 4087.0,
             stuck_after: 200,
         },
+        channel: None,
         residual_envelope: 0.3,
     };
 
+    fn reading(counts: f32) -> Reading {
+        Reading {
+            counts,
+            channel: 0.0,
+            periods: 1,
+        }
+    }
+
     fn controller() -> Controller<Law> {
         let model = full::model();
-        let relay = Relay::new(
-            model,
-            full::state(&model),
-            Direct,
-            RelaySettings {
-                opens_below: 0.45,
-                shuts_above: 0.55,
-                min_on: 20,
-                min_off: 20,
-            },
-        );
-        Controller::new(SETTINGS, relay)
+        let state = full::state(&model);
+        Controller::new(
+            SETTINGS,
+            Driven::new(RELAY, model, state, MovingAverage::new()),
+        )
     }
 
     /// A sensor that shows what the model says, with the last count flickering.
@@ -230,7 +258,7 @@ mod tests {
         };
         for k in 0..samples {
             let counts = (500.0 + tick.predicted / 0.0005).clamp(9.0, 4086.0) + (k % 2) as f32;
-            tick = controller.tick(Reading { counts, periods: 1 });
+            tick = controller.tick(reading(counts));
         }
         tick
     }
@@ -253,33 +281,21 @@ mod tests {
         type Ill = (Fault, fn(u32) -> Reading);
         let ill: [Ill; 5] = [
             (Fault::Overrun, |_| Reading {
-                counts: 600.0,
                 periods: 2,
+                ..reading(600.0)
             }),
-            (Fault::NotFinite, |_| Reading {
-                counts: f32::NAN,
-                periods: 1,
-            }),
-            (Fault::AtRail, |_| Reading {
-                counts: 4095.0,
-                periods: 1,
-            }),
-            (Fault::Stuck, |_| Reading {
-                counts: 700.0,
-                periods: 1,
-            }),
-            (Fault::Residual, |k| Reading {
-                counts: 3500.0 + (k % 3) as f32,
-                periods: 1,
-            }),
+            (Fault::NotFinite, |_| reading(f32::NAN)),
+            (Fault::AtRail, |_| reading(4095.0)),
+            (Fault::Stuck, |_| reading(700.0)),
+            (Fault::Residual, |k| reading(3500.0 + (k % 3) as f32)),
         ];
-        for (fault, reading) in ill {
+        for (fault, ill) in ill {
             let mut controller = controller();
             controller.arm();
             assert!(healthy(&mut controller, 100).open);
             let mut k = 0;
             while controller.mode() == Mode::Armed {
-                controller.tick(reading(k));
+                controller.tick(ill(k));
                 k += 1;
                 assert!(k < 400, "{fault:?} was not seen");
             }
@@ -292,6 +308,56 @@ mod tests {
             controller.arm();
             assert_eq!(controller.mode(), Mode::Armed);
         }
+    }
+
+    /// The model hears the channel, and an ill channel shuts the valve but does
+    /// not poison the model.
+    #[test]
+    fn the_measured_channel_reaches_the_model_and_is_watched() {
+        let settings = Settings {
+            channel: Some(Channel {
+                calibration: Calibration {
+                    zero: 0.0,
+                    per_count: 0.01,
+                },
+                range: Range {
+                    lower_rail: 8.0,
+                    upper_rail: 4087.0,
+                    stuck_after: u32::MAX,
+                },
+                reference: own::REFERENCES[0],
+            }),
+            residual_envelope: 10.0,
+            ..SETTINGS
+        };
+        let model = own::model();
+        let law: driven!(Relay, own) =
+            Driven::new(RELAY, model, own::state(&model), MovingAverage::new());
+        let mut cold = Controller::new(settings, law);
+        cold.arm();
+        let mut warm = cold.clone();
+        let tick = |controller: &mut Controller<_>, k: u32, channel: f32| {
+            let counts = 600.0 + (k % 2) as f32;
+            controller.tick(Reading {
+                counts,
+                channel,
+                periods: 1,
+            })
+        };
+        let run = |controller: &mut Controller<_>, channel: f32| {
+            let ticks = (0..900).map(|k| tick(controller, k, channel));
+            ticks.map(|tick| tick.predicted).fold(0.0, f32::max)
+        };
+        // 20 and 25 degrees: the warm film shows less.
+        let (at_20, at_25) = (run(&mut cold, 2000.0), run(&mut warm, 2500.0));
+        assert!(at_20 > 0.1 && at_25 < 0.95 * at_20, "{at_20} {at_25}");
+        let ill = tick(&mut cold, 0, f32::NAN);
+        assert_eq!((ill.mode, ill.open), (Mode::Faulted(Fault::Channel), false));
+        assert!(tick(&mut cold, 1, 2000.0).predicted.is_finite());
+        assert_eq!(
+            tick(&mut warm, 0, 4095.0).mode,
+            Mode::Faulted(Fault::Channel)
+        );
     }
 
     /// 49 days at 1 kHz: nothing may happen at 2³².

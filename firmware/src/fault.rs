@@ -12,6 +12,8 @@ pub enum Fault {
     AtRail,
     /// The sensor has not changed for too long.
     Stuck,
+    /// A measured channel gave no number or is at an end of its range.
+    Channel,
     /// The sensor and the model have parted.
     Residual,
     /// The watchdog restarted the board.
@@ -22,11 +24,12 @@ pub enum Fault {
 
 impl Fault {
     /// All faults.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Overrun,
         Self::NotFinite,
         Self::AtRail,
         Self::Stuck,
+        Self::Channel,
         Self::Residual,
         Self::Watchdog,
         Self::SelfTest,
@@ -40,6 +43,7 @@ impl Fault {
             Self::NotFinite => "not-finite",
             Self::AtRail => "at-rail",
             Self::Stuck => "stuck",
+            Self::Channel => "channel",
             Self::Residual => "residual",
             Self::Watchdog => "watchdog",
             Self::SelfTest => "self-test",

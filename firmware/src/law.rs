@@ -1,6 +1,8 @@
-//! What decides the valve's position from the reading.
+//! What decides the valve's position from the reading, with the model beside it.
 
+use core::fmt;
 use model_core::average::MovingAverage;
+use model_core::control::golden::GoldenLaw;
 use model_core::history::Memory;
 use model_core::model::StateOf;
 use model_core::{Input, Parts, step};
@@ -19,10 +21,48 @@ pub struct Action {
 /// A law with its model. Called once a sample, armed or not, so that the model
 /// knows what has been issued.
 pub trait Law {
-    /// Decides with the reading y; the valve will do what is returned.
-    fn act(&mut self, y: f32) -> Action;
+    /// Decides with the reading y and the measured channels; the valve will do
+    /// what is returned.
+    fn act(&mut self, y: f32, channels: &[f32]) -> Action;
     /// Takes note of a sample at which the valve stays shut.
-    fn idle(&mut self, y: f32) -> Action;
+    fn idle(&mut self, y: f32, channels: &[f32]) -> Action;
+}
+
+/// The constants of a law that runs with model `M`, memories `Y` and `J`, and
+/// room to look `A` samples ahead. A generated file's `LAW` is one.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is no law that a board can run",
+    note = "a model gets a law from `host-fit design`"
+)]
+pub trait Designed<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize> {
+    /// What the law remembers.
+    type State;
+
+    /// From rest, the model at `model`.
+    fn start(&self, model: &StateOf<f32, M, Y, J>) -> Self::State;
+
+    /// Where the valve is to be. `alone` is the model left to itself: it knows
+    /// what was issued while the law was idle.
+    fn act(
+        &self,
+        state: &mut Self::State,
+        model: &M,
+        alone: &StateOf<f32, M, Y, J>,
+        y: f32,
+        channels: &[f32],
+    ) -> bool;
+
+    /// Takes note of a sample at which the valve stays shut.
+    fn idle(&self, state: &mut Self::State);
+
+    /// Whether the law decides what it decided where it was generated.
+    fn holds(
+        &self,
+        golden: &GoldenLaw,
+        model: &M,
+        state: StateOf<f32, M, Y, J>,
+        channels: &[f32],
+    ) -> bool;
 }
 
 /// What of the reading is compared with the model's output.
@@ -31,88 +71,75 @@ pub trait Smoothing {
     fn smooth(&mut self, y: f32) -> f32;
 }
 
-/// The reading itself, for full models.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Direct;
-
-impl Smoothing for Direct {
-    #[inline]
-    fn smooth(&mut self, y: f32) -> f32 {
-        y
-    }
-}
-
-/// Its moving average, for averaged models, eq. (12).
+/// The reading's moving average, for averaged models, eq. (12); with `W` = 1 the
+/// reading itself.
 impl<const W: usize> Smoothing for MovingAverage<f32, W> {
     #[inline]
     fn smooth(&mut self, y: f32) -> f32 {
-        self.push(y)
+        if W > 1 { self.push(y) } else { y }
     }
 }
 
-/// Thresholds and hold times of a [`Relay`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RelaySettings {
-    /// Opens below, y.
-    pub opens_below: f32,
-    /// Shuts above, y.
-    pub shuts_above: f32,
-    /// Shortest time open, samples.
-    pub min_on: u32,
-    /// Shortest time shut, samples.
-    pub min_off: u32,
-}
-
-/// A relay with hysteresis and hold times; the model runs beside it. The plain
-/// law, for bringing up a rig.
+/// A law with its model, and the model by itself beside it.
 #[derive(Clone)]
-pub struct Relay<M: Parts<f32>, Y, J, S> {
+pub struct Driven<D, M, Y, J, S, const A: usize>
+where
+    D: Designed<M, Y, J, A>,
+    M: Parts<f32>,
+    Y: Memory<f32>,
+    J: Memory<f32>,
+{
+    design: D,
+    state: D::State,
     model: M,
-    state: StateOf<f32, M, Y, J>,
+    /// The model left to itself. The law's own may follow the sensor, also one
+    /// that is ill.
+    alone: StateOf<f32, M, Y, J>,
     smoothing: S,
-    settings: RelaySettings,
-    open: bool,
-    /// Samples since the last switch, saturating.
-    held: u32,
 }
 
-impl<M, Y, J, S> Relay<M, Y, J, S>
+/// The type of law `$law` with the model of a generated file.
+macro_rules! driven {
+    ($law:ty, $($model:tt)+) => {
+        $crate::law::Driven<
+            $law,
+            $($model)+::Identified,
+            $($model)+::Outputs,
+            $($model)+::Jets,
+            ::model_core::average::MovingAverage<f32, { $($model)+::READINGS }>,
+            { $($model)+::LOOK_AHEAD },
+        >
+    };
+}
+pub(crate) use driven;
+
+impl<D, M, Y, J, S, const A: usize> Driven<D, M, Y, J, S, A>
 where
+    D: Designed<M, Y, J, A>,
     M: Parts<f32>,
     Y: Memory<f32>,
     J: Memory<f32>,
     S: Smoothing,
 {
-    /// Shut, with the model in `state`.
-    pub fn new(
-        model: M,
-        state: StateOf<f32, M, Y, J>,
-        smoothing: S,
-        settings: RelaySettings,
-    ) -> Self {
+    /// Shut, with the model in the state `at_rest`.
+    pub fn new(design: D, model: M, at_rest: StateOf<f32, M, Y, J>, smoothing: S) -> Self {
         Self {
+            state: design.start(&at_rest),
+            design,
             model,
-            state,
+            alone: at_rest,
             smoothing,
-            settings,
-            open: false,
-            held: u32::MAX,
         }
     }
 
+    /// What the model by itself says of a sample, and how far `y` is from it.
     #[inline]
-    fn issue(&mut self, open: bool, y: f32) -> Action {
-        self.held = if open == self.open {
-            self.held.saturating_add(1)
-        } else {
-            1
-        };
-        self.open = open;
+    fn issue(&mut self, open: bool, y: f32, channels: &[f32]) -> Action {
         let input = Input {
             command: if open { 1.0 } else { 0.0 },
-            channels: &[],
+            channels,
         };
-        let predicted = step(&self.model, &mut self.state, &input).measured;
+        let predicted = step(&self.model, &mut self.alone, &input).measured;
         Action {
             open,
             predicted,
@@ -121,64 +148,39 @@ where
     }
 }
 
-impl<M, Y, J, S> Law for Relay<M, Y, J, S>
+impl<D, M, Y, J, S, const A: usize> Law for Driven<D, M, Y, J, S, A>
 where
+    D: Designed<M, Y, J, A>,
     M: Parts<f32>,
     Y: Memory<f32>,
     J: Memory<f32>,
     S: Smoothing,
 {
     #[inline]
-    fn act(&mut self, y: f32) -> Action {
-        let settings = &self.settings;
-        let shortest = if self.open {
-            settings.min_on
-        } else {
-            settings.min_off
-        };
-        let open = if self.held < shortest {
-            self.open
-        } else if self.open {
-            y <= settings.shuts_above
-        } else {
-            y < settings.opens_below
-        };
-        self.issue(open, y)
+    fn act(&mut self, y: f32, channels: &[f32]) -> Action {
+        let open = self
+            .design
+            .act(&mut self.state, &self.model, &self.alone, y, channels);
+        self.issue(open, y, channels)
     }
 
     #[inline]
-    fn idle(&mut self, y: f32) -> Action {
-        self.issue(false, y)
+    fn idle(&mut self, y: f32, channels: &[f32]) -> Action {
+        self.design.idle(&mut self.state);
+        self.issue(false, y, channels)
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use identified::full;
-
-    #[test]
-    fn hold_times_are_kept_under_any_reading() {
-        let settings = RelaySettings {
-            opens_below: 0.45,
-            shuts_above: 0.55,
-            min_on: 15,
-            min_off: 10,
-        };
-        let model = full::model();
-        let mut relay = Relay::new(model, full::state(&model), Direct, settings);
-        let mut seed = 7_u32;
-        let (mut open, mut held, mut switches) = (false, u32::MAX, 0);
-        for _ in 0..20_000 {
-            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let action = relay.act((seed >> 8) as f32 / (1 << 24) as f32);
-            if action.open == open {
-                held = held.saturating_add(1);
-            } else {
-                assert!(held >= if open { 15 } else { 10 }, "{held}");
-                (open, held, switches) = (action.open, 1, switches + 1);
-            }
-        }
-        assert!(switches > 500);
+impl<D, M, Y, J, S, const A: usize> fmt::Debug for Driven<D, M, Y, J, S, A>
+where
+    D: Designed<M, Y, J, A> + fmt::Debug,
+    M: Parts<f32>,
+    Y: Memory<f32>,
+    J: Memory<f32>,
+{
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Driven")
+            .field("design", &self.design)
+            .finish_non_exhaustive()
     }
 }

@@ -1,14 +1,11 @@
 //! What the boards run: the model that `identified` calls `on_board`, and its law.
-//!
-//! Another kind of law than the one that holds a reference is put here: [`Relay`](crate::law::Relay)
-//! takes any model.
 
 use crate::controller::{Controller, Settings};
-use crate::sensor::{Calibration, Range};
+use crate::law::{Designed, Driven, driven};
+use crate::sensor::{Calibration, Channel, Range};
 use crate::start::{self, Failure};
-use crate::tracking::Track;
 use identified::on_board as model;
-use model_core::history::{BitHistory, DelayLine};
+use model_core::average::MovingAverage;
 
 /// The rig's constants: measure them before the air is on (`WIRING.md`).
 pub const SETTINGS: Settings = Settings {
@@ -21,27 +18,58 @@ pub const SETTINGS: Settings = Settings {
         upper_rail: 4087.0,
         stuck_after: 500,
     },
+    // The channel's own calibration goes here, if the model needs a channel.
+    channel: match model::REFERENCES.as_slice() {
+        [] => None,
+        [reference, ..] => Some(Channel::around(*reference)),
+    },
     residual_envelope: 0.5,
 };
 
-type Outputs = DelayLine<f32, { model::OUTPUTS }>;
-type Jets = BitHistory<{ model::WORDS }>;
-
 /// The law with its model.
-pub type OnBoard = Track<model::Identified, Outputs, Jets, { model::LOOK_AHEAD }>;
+pub type OnBoard = driven!(model::Law, model);
+
+/// The model's sample period, µs: what the boards' timers are set to.
+pub const PERIOD_US: u32 = (model::SAMPLE_PERIOD_S * 1e6 + 0.5) as u32;
+
+/// RAM of the boards, bytes.
+const RAM: usize = 128 * 1024;
+/// What is left of it for the log, the serial line and the calls, bytes.
+const FREE: usize = 8 * 1024;
+
+// `host-fit codegen --board` says the same with the key of the model file.
+const _: () = {
+    assert!(
+        PERIOD_US >= 200 && PERIOD_US <= 100_000,
+        "the boards' timers and watchdogs are good for 0.2 to 100 ms"
+    );
+    assert!(
+        model::CHANNELS.len() <= 1,
+        "the model's effects need more measured channels than the one spare input of the board"
+    );
+    // The loop itself, a copy while it is built, and as much for the self-test.
+    assert!(
+        4 * size_of::<Controller<OnBoard>>() <= RAM - FREE,
+        "model and law do not fit the board's memory: use shorter lags or delays"
+    );
+};
 
 /// The loop, disarmed and at rest.
 #[must_use]
 pub fn controller() -> Controller<OnBoard> {
     let model = model::model();
-    let law = Track::new(model::LAW, model, model::state(&model));
-    Controller::new(SETTINGS, law)
+    let state = model::state(&model);
+    Controller::new(
+        SETTINGS,
+        Driven::new(model::LAW, model, state, MovingAverage::new()),
+    )
 }
 
 /// The start-up self-test of constants, model and law.
 ///
 /// # Errors
 /// What is wrong.
+#[inline(never)]
 pub fn self_test() -> Result<(), Failure> {
     let model = model::model();
     start::self_test(
@@ -51,11 +79,11 @@ pub fn self_test() -> Result<(), Failure> {
         model::CHECKSUM,
         &model::GOLDEN,
     )?;
-    let state = model::state(&model);
-    let holds = model::LAW_GOLDEN.holds::<_, _, _, { model::LOOK_AHEAD }>(
+    let holds = <model::Law as Designed<_, _, _, { model::LOOK_AHEAD }>>::holds(
         &model::LAW,
+        &model::LAW_GOLDEN,
         &model,
-        state,
+        model::state(&model),
         &model::REFERENCES,
     );
     holds.then_some(()).ok_or(Failure::Law)
@@ -73,11 +101,15 @@ mod tests {
         for away in [0.9_f32, 1.5, -0.35] {
             let mut controller = controller();
             controller.arm();
-            let counts = SETTINGS.calibration.zero + away / SETTINGS.calibration.per_count;
+            let counts = SETTINGS.calibration.counts(away);
             let mut k = 0;
             while controller.mode() == Mode::Armed {
                 let counts = counts + (k % 2) as f32;
-                controller.tick(Reading { counts, periods: 1 });
+                controller.tick(Reading {
+                    counts,
+                    channel: 2048.0,
+                    periods: 1,
+                });
                 k += 1;
                 assert!(k < 400, "{away}");
             }
@@ -92,10 +124,13 @@ mod tests {
         controller.arm();
         let (mut predicted, mut sum) = (0.0_f32, 0.0);
         for k in 0..10_000_u16 {
-            let counts = SETTINGS.calibration.zero
-                + predicted / SETTINGS.calibration.per_count
-                + f32::from(k % 2);
-            predicted = controller.tick(Reading { counts, periods: 1 }).predicted;
+            let counts = SETTINGS.calibration.counts(predicted) + f32::from(k % 2);
+            let reading = Reading {
+                counts,
+                channel: 2048.0,
+                periods: 1,
+            };
+            predicted = controller.tick(reading).predicted;
             if k >= 5_000 {
                 sum += predicted / 5_000.0;
             }

@@ -8,6 +8,8 @@ use embedded_hal::digital::OutputPin;
 pub trait Sensor {
     /// The newest reading in counts; not finite where there is none.
     fn counts(&mut self) -> f32;
+    /// The newest reading of the measured channel, likewise.
+    fn channel(&mut self) -> f32;
 }
 
 /// The board's clock.
@@ -70,7 +72,11 @@ where
         let periods = now.wrapping_sub(self.last).max(1);
         self.last = now;
         let counts = self.sensor.counts();
-        let tick = self.controller.tick(Reading { counts, periods });
+        let tick = self.controller.tick(Reading {
+            counts,
+            channel: self.sensor.channel(),
+            periods,
+        });
         let _ = if tick.open {
             self.valve.set_high()
         } else {
@@ -90,17 +96,22 @@ mod tests {
     use super::*;
     use crate::cases::{RELAY, SETTINGS};
     use crate::fault::Fault;
-    use crate::law::{Direct, Relay};
+    use crate::law::{Driven, driven};
+    use crate::relay::Relay;
     use core::cell::Cell;
     use core::convert::Infallible;
     use embedded_hal::digital::ErrorType;
     use identified::full;
+    use model_core::average::MovingAverage;
 
     struct Flicker(bool);
     impl Sensor for Flicker {
         fn counts(&mut self) -> f32 {
             self.0 = !self.0;
             SETTINGS.calibration.zero + if self.0 { 1.0 } else { 0.0 }
+        }
+        fn channel(&mut self) -> f32 {
+            f32::NAN
         }
     }
 
@@ -132,7 +143,8 @@ mod tests {
             let clock = Cell::new(u32::MAX - 100);
             let (valve, lamp) = (Cell::new(true), Cell::new(true));
             let model = full::model();
-            let relay = Relay::new(model, full::state(&model), Direct, RELAY);
+            let relay: driven!(Relay, full) =
+                Driven::new(RELAY, model, full::state(&model), MovingAverage::new());
             let controller = Controller::new(SETTINGS, relay);
             let mut rig = Rig::new(controller, Flicker(false), &clock, Pin(&valve), Pin(&lamp));
             assert_eq!((valve.get(), lamp.get()), (false, false));

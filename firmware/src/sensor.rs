@@ -2,21 +2,28 @@
 
 use crate::fault::Fault;
 
-/// From the converter's counts to y.
+/// From the converter's counts to what is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
-    /// Counts of the natural flow, y = 0.
+    /// Counts of 0: for the sensor those of the natural flow, y = 0.
     pub zero: f32,
-    /// y per count.
+    /// y, or the channel's unit, per count.
     pub per_count: f32,
 }
 
 impl Calibration {
-    /// y of a reading in counts.
+    /// What a reading in counts stands for.
     #[inline]
     #[must_use]
-    pub fn friction(&self, counts: f32) -> f32 {
+    pub fn value(&self, counts: f32) -> f32 {
         (counts - self.zero) * self.per_count
+    }
+
+    /// The counts that stand for `value`.
+    #[inline]
+    #[must_use]
+    pub fn counts(&self, value: f32) -> f32 {
+        self.zero + value / self.per_count
     }
 }
 
@@ -30,6 +37,46 @@ pub struct Range {
     /// Equal readings in a row that mean a stuck sensor: noise moves a healthy
     /// one by a count now and then.
     pub stuck_after: u32,
+}
+
+/// A measured channel that the model's effects need.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Channel {
+    /// From counts to its unit.
+    pub calibration: Calibration,
+    /// What a healthy one does not do.
+    pub range: Range,
+    /// What counts where there is no reading, in its unit.
+    pub reference: f32,
+}
+
+impl Channel {
+    /// A channel whose middle counts are its reference and whose whole range is
+    /// twice the reference, or 2 units where that is more: to be replaced by
+    /// what was measured.
+    #[must_use]
+    pub const fn around(reference: f32) -> Self {
+        const MIDDLE: f32 = 2048.0;
+        let half = if reference.abs() > 1.0 {
+            reference.abs()
+        } else {
+            1.0
+        };
+        let per_count = half / MIDDLE;
+        Self {
+            calibration: Calibration {
+                zero: MIDDLE - reference / per_count,
+                per_count,
+            },
+            range: Range {
+                lower_rail: 8.0,
+                upper_rail: 4087.0,
+                // A slow quantity may well stay the same.
+                stuck_after: u32::MAX,
+            },
+            reference,
+        }
+    }
 }
 
 /// Watches the readings.

@@ -67,8 +67,10 @@ mod tests {
     use super::*;
     use crate::cases::{RELAY, SETTINGS};
     use crate::controller::Mode;
-    use crate::law::{Direct, Relay};
+    use crate::law::{Driven, driven};
+    use crate::relay::Relay;
     use identified::full;
+    use model_core::average::MovingAverage;
     use model_core::model::vector;
 
     fn tested(model: &full::Base) -> Result<(), Failure> {
@@ -85,7 +87,7 @@ mod tests {
     fn damage_is_told_apart() {
         let mut model = full::BASE;
         assert_eq!(tested(&model), Ok(()));
-        model.delay.floor += 1.0;
+        model.delay.law.floor += 1.0;
         assert_eq!(tested(&model), Err(Failure::Golden));
         model.b = vector([0.009]);
         assert_eq!(tested(&model), Err(Failure::Checksum));
@@ -99,7 +101,8 @@ mod tests {
             (Err(Failure::Checksum), true, Fault::SelfTest),
         ] {
             let model = full::model();
-            let relay = Relay::new(model, full::state(&model), Direct, RELAY);
+            let relay: driven!(Relay, full) =
+                Driven::new(RELAY, model, full::state(&model), MovingAverage::new());
             let mut controller = Controller::new(SETTINGS, relay);
             latch(&mut controller, test, by_watchdog);
             controller.arm();

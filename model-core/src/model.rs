@@ -244,16 +244,17 @@ where
     Y: Memory<T>,
     J: Memory<T>,
 {
-    observe_delay(model, state, input, 0, (&Known::NOTHING, usize::MAX)).0
+    observe_delay::<true, _, _, _, _>(model, state, input, 0, (&Known::NOTHING, usize::MAX)).0
 }
 
 /// [`observe`], and the shortest of the input delays. The delay may come out too
 /// short where it is longer than `within`: where the command has not changed for
 /// as long as delays differ, the same is read whichever it is, and the delay law
 /// is not asked. Of the recursion's terms those that are known are given, with
-/// the lag from which on they are.
+/// the lag from which on they are. Where `SENSED` is false the sensor is not
+/// asked either: the flow stands for what it would show.
 #[inline(always)]
-pub(crate) fn observe_delay<T, M, Y, J>(
+pub(crate) fn observe_delay<const SENSED: bool, T, M, Y, J>(
     model: &M,
     state: &mut StateOf<T, M, Y, J>,
     input: &Input<'_, T>,
@@ -293,7 +294,11 @@ where
     };
 
     (at.arrived, at.present) = arriving.jet(0);
-    let measured = effects.sense(&mut state.effects, flow, &at);
+    let measured = if SENSED {
+        effects.sense(&mut state.effects, flow, &at)
+    } else {
+        flow
+    };
     let recursion = model.recursion();
     let first = at.arrived;
     let mut strength = |l: usize| if l == 0 { first } else { arriving.jet(l).0 };

@@ -220,7 +220,7 @@ impl<T: Real> Bilinear<'_, T> {
 
     /// The rate, per sample, at which y approaches its equilibrium under
     /// constant jets: 1 − Σ a_i − Σ_l j_l Σ_j c_jl.
-    #[inline]
+    #[inline(always)]
     pub fn relaxation(&self, mut arriving: impl FnMut(usize) -> T) -> T {
         let mut rate = self.state_relaxation();
         for l in 0..self.b.len() {

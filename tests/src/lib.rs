@@ -2,6 +2,7 @@
 //! for effects hidden in simulated rigs.
 
 pub mod campaign;
+pub mod lockstep;
 
 use std::path::PathBuf;
 use std::process::Command;

@@ -94,12 +94,27 @@ const STEPS: &[Step] = &[
         for board in crate::firmware::BOARDS {
             crate::firmware::firmware(&["--board".to_owned(), board.to_owned()])?;
         }
-        crate::firmware::build("nucleo-f446re", "nucleo-pil", &[]).map(|_| ())
+        crate::firmware::build("nucleo-f446re", "nucleo-pil", &[], None).map(|_| ())
     }),
     ("faults", || crate::faults::faults(&[])),
     // Links only without panics; runs the constants; checks the budgets.
     ("pil", crate::budgets::check),
+    // The whole way: what the demo found is built for the board and runs there.
+    ("demo on board", demo_on_board),
 ];
+
+fn demo_on_board() -> Result<()> {
+    let out = crate::shell::target().join("demo");
+    run(
+        cargo(&["run", "--release", "--quiet", "--package", "host-fit"])
+            .args(["--", "demo", "--out"])
+            .arg(&out),
+    )?;
+    let model = out.join("controlled.toml").to_string_lossy().into_owned();
+    let with = |option: &str, value: &str| ["--model", &model, option, value].map(str::to_owned);
+    crate::firmware::firmware(&with("--board", crate::firmware::BOARDS[0]))?;
+    crate::pil::pil(&with("--steps", "5000")).map(|_| ())
+}
 
 fn ci(arguments: &[String]) -> Result<()> {
     if let Some(unknown) = arguments

@@ -30,7 +30,7 @@ const INJECTED: [(&str, &str); 6] = [
 const DAMAGED: [(&str, &str); 2] = [("7", "self-test: Checksum"), ("8", "self-test: Golden")];
 
 pub(crate) fn faults(_arguments: &[String]) -> Result<()> {
-    let elf = build("qemu-mps2", "qemu-mps2", &["--features", "defmt"])?;
+    let elf = build("qemu-mps2", "qemu-mps2", &["--features", "defmt"], None)?;
     let log = elf.with_extension("log");
     let mut process = qemu(&elf)
         .args(["-semihosting-config", "enable=on,target=native,chardev=log"])

@@ -2,15 +2,16 @@
 
 use crate::Task;
 use crate::elf::{Elf, Section};
+use crate::identified;
 use crate::setup::{TARGETS, cross_cargo};
 use crate::shell::{command, firmware_target, root, run};
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 pub(crate) const TASK: Task = Task {
     name: "firmware",
-    does: "builds the flashable ELF: --board nucleo-f446re|qemu-mps2",
+    does: "builds the flashable ELF: --board nucleo-f446re|qemu-mps2, --model FILE",
     run: firmware,
 };
 
@@ -20,26 +21,87 @@ pub(crate) const BOARD_TARGET: &str = TARGETS[0];
 /// A board with a program of its own name.
 pub(crate) const BOARDS: [&str; 2] = ["nucleo-f446re", "qemu-mps2"];
 
+/// What to build, as the command line says.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Chosen {
+    /// The board.
+    pub(crate) board: Option<&'static str>,
+    /// A user's model instead of the bundled one.
+    pub(crate) model: Option<PathBuf>,
+}
+
+impl Chosen {
+    /// Reads `--board` and `--model`.
+    pub(crate) fn read(arguments: &[String]) -> Result<Self> {
+        let mut chosen = Self::default();
+        let mut rest = arguments.iter();
+        while let Some(option) = rest.next() {
+            let value = rest
+                .next()
+                .with_context(|| format!("{option} needs a value"))?;
+            match option.as_str() {
+                "--board" => {
+                    let known = BOARDS.into_iter().find(|board| board == value);
+                    chosen.board = Some(known.with_context(|| {
+                        format!("no board `{value}`; there are {}", BOARDS.join(", "))
+                    })?);
+                }
+                "--model" => chosen.model = Some(value.into()),
+                _ => bail!("unknown option {option}; there are --board and --model"),
+            }
+        }
+        Ok(chosen)
+    }
+
+    /// The board's own program, with the model that was chosen.
+    pub(crate) fn build(&self, board: &str) -> Result<PathBuf> {
+        let Some(model) = &self.model else {
+            return build(board, board, &[], None);
+        };
+        let constants = identified::of(model)?;
+        let elf = build(board, board, &[], Some(&constants)).with_context(|| {
+            format!(
+                "{} does not fit the board; the message above says what of it",
+                model.display()
+            )
+        })?;
+        // The next build of the bundled model must not take its place.
+        let stem = model.file_stem().unwrap_or_default().to_string_lossy();
+        let own = firmware_target().join(format!("{board}-{stem}"));
+        std::fs::copy(&elf, &own).with_context(|| own.display().to_string())?;
+        Ok(own)
+    }
+}
+
 pub(crate) fn firmware(arguments: &[String]) -> Result<()> {
-    let board = match arguments {
-        [option, board] if option == "--board" && BOARDS.contains(&board.as_str()) => board,
-        _ => bail!("name a board: --board {}", BOARDS.join(" or --board ")),
-    };
-    let elf = build(board, board, &[])?;
+    let chosen = Chosen::read(arguments)?;
+    let board = chosen
+        .board
+        .with_context(|| format!("name a board: --board {}", BOARDS.join(" or --board ")))?;
+    let elf = chosen.build(board)?;
     let size = size(&elf)?;
     eprintln!("flash {} bytes, static RAM {} bytes", size.flash, size.ram);
     println!("{}", elf.display());
     Ok(())
 }
 
-/// Builds program `bin` of package `board`; a panic in it would not link.
-pub(crate) fn build(board: &str, bin: &str, options: &[&str]) -> Result<PathBuf> {
+/// Builds program `bin` of package `board`; a panic in it would not link. The
+/// folder `constants` takes the place of the bundled ones.
+pub(crate) fn build(
+    board: &str,
+    bin: &str,
+    options: &[&str],
+    constants: Option<&Path>,
+) -> Result<PathBuf> {
     let mut cargo = cross_cargo("build", BOARD_TARGET)?;
     cargo
         .args(["--package", board, "--bin", bin])
         .args(options)
         .current_dir(root().join("firmware"))
         .env("CARGO_TARGET_DIR", firmware_target());
+    if let Some(constants) = constants {
+        cargo.env("IDENTIFIED", constants);
+    }
     run(&mut cargo)?;
     Ok(firmware_target()
         .join(BOARD_TARGET)
@@ -88,4 +150,29 @@ pub(crate) fn size(elf: &Path) -> Result<Size> {
         flash: sum(|section| section.stored),
         ram: sum(|section| section.writable),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_are_read_in_any_order_and_unknown_ones_named() {
+        let read = |line: &str| {
+            let arguments: Vec<String> = line.split_whitespace().map(str::to_owned).collect();
+            Chosen::read(&arguments)
+        };
+        let chosen = read("--model a/b.toml --board qemu-mps2").expect("both");
+        assert_eq!(chosen.board, Some("qemu-mps2"));
+        assert_eq!(chosen.model, Some("a/b.toml".into()));
+        assert_eq!(read("").expect("none"), Chosen::default());
+        for (line, named) in [
+            ("--board uno", "`uno`"),
+            ("--board", "--board"),
+            ("--modle x", "--modle"),
+        ] {
+            let error = read(line).expect_err("wrong").to_string();
+            assert!(error.contains(named), "{error}");
+        }
+    }
 }

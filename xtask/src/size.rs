@@ -2,13 +2,13 @@
 
 use crate::Task;
 use crate::elf::{Elf, Symbol};
-use crate::firmware::{BOARDS, build};
-use anyhow::{Result, bail};
+use crate::firmware::{BOARDS, Chosen};
+use anyhow::Result;
 use std::collections::BTreeMap;
 
 pub(crate) const TASK: Task = Task {
     name: "size",
-    does: "what takes the flash, by crate and by symbol: --board nucleo-f446re|qemu-mps2",
+    does: "what takes the flash, by crate and by symbol: --board nucleo-f446re|qemu-mps2, --model FILE",
     run: size,
 };
 
@@ -16,12 +16,9 @@ pub(crate) const TASK: Task = Task {
 const LARGEST: usize = 20;
 
 fn size(arguments: &[String]) -> Result<()> {
-    let board = match arguments {
-        [] => BOARDS[0],
-        [option, board] if option == "--board" && BOARDS.contains(&board.as_str()) => board,
-        _ => bail!("the only option is --board {}", BOARDS.join(" or --board ")),
-    };
-    let elf = Elf::read(&build(board, board, &[])?)?;
+    let chosen = Chosen::read(arguments)?;
+    let board = chosen.board.unwrap_or(BOARDS[0]);
+    let elf = Elf::read(&chosen.build(board)?)?;
     let flash: u64 = elf
         .sections
         .iter()

@@ -18,7 +18,7 @@ pub struct Measured<S> {
 }
 
 impl<S: Stopwatch> Measured<S> {
-    /// All cases from rest.
+    /// No case started yet.
     #[must_use]
     pub fn new(stopwatch: S) -> Self {
         Self {
@@ -36,9 +36,9 @@ impl<S: Stopwatch> Cases for Measured<S> {
     }
 
     #[inline(never)]
-    fn step(&mut self, counts: u16) -> (f32, bool) {
+    fn step(&mut self, counts: u16, channel: u16) -> (f32, bool) {
         let rigs = &mut self.rigs;
-        let (result, ticks) = self.stopwatch.measure(|| rigs.step(counts));
+        let (result, ticks) = self.stopwatch.measure(|| rigs.step(counts, channel));
         self.report.steps = self.report.steps.wrapping_add(1);
         self.report.ticks = self.report.ticks.wrapping_add(u64::from(ticks));
         self.report.most = self.report.most.max(ticks);

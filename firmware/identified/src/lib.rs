@@ -1,22 +1,20 @@
-//! Constants that `host-fit codegen` wrote from the model files in `models/`;
-//! `cargo xtask identified` writes them anew, and CI compares.
+//! Constants that `host-fit codegen` wrote, a module for each model; `on_board` is
+//! the one that the boards run.
+//!
+//! Those in `generated/` are of the model files in `models/`: `cargo xtask
+//! identified` writes them anew, and CI compares. `cargo xtask firmware --model
+//! FILE` puts the constants of that model in their place for one build.
 #![no_std]
 #![forbid(unsafe_code)]
 
-pub mod averaged;
-pub mod effects;
-pub mod full;
-pub mod own;
-
-/// The model that the boards run: replace it with your own generated file.
-pub use full as on_board;
+include!(concat!(env!("OUT_DIR"), "/models.rs"));
 
 #[cfg(test)]
 mod tests {
     use model_core::self_test::checksum;
 
     macro_rules! says_what_the_host_said {
-        ($($name:ident),+) => {$(
+        ($($name:ident)+) => {$(
             #[test]
             fn $name() {
                 use super::$name::*;
@@ -26,7 +24,7 @@ mod tests {
             }
         )+};
     }
-    says_what_the_host_said!(full, averaged, effects, own);
+    each_model!(says_what_the_host_said);
 
     macro_rules! decides_what_the_host_decided {
         ($($name:ident: $test:ident),+) => {$(
@@ -48,18 +46,18 @@ mod tests {
 
     #[test]
     fn pulses_come_as_designed() {
-        use super::averaged::{HOLD, LAW};
-        use model_core::control::Hold;
-        let (mut at, mut hold) = (0, Hold::closed());
-        let valve = (0..2 * LAW.period).map(|_| {
-            let wanted = LAW.next(&mut at);
-            (wanted, hold.pass(&HOLD, wanted))
-        });
-        let mut open = 0;
-        for (wanted, on) in valve {
-            assert_eq!(wanted, on, "the valve can follow");
+        use super::averaged::{LAW, LAW_GOLDEN};
+        use model_core::control::pulses::Played;
+        let (mut at, mut played, mut open) = (0, Played::new(), 0);
+        for _ in 0..2 * LAW.train.period {
+            let on = LAW.step(&mut played);
+            assert_eq!(LAW.train.next(&mut at), on, "the valve can follow");
             open += u32::from(on);
         }
-        assert_eq!((open, 2 * LAW.period), (2 * 237, 2 * 555));
+        assert_eq!((open, 2 * LAW.train.period), (2 * 237, 2 * 555));
+        assert!(LAW_GOLDEN.holds_for_pulses(&LAW));
+        let mut other = LAW;
+        other.train.pulses[0].1 += 1;
+        assert!(!LAW_GOLDEN.holds_for_pulses(&other));
     }
 }

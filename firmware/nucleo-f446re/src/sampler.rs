@@ -1,55 +1,67 @@
-//! The sensor: TIM2 starts a conversion on PA0 every millisecond, and the
-//! converter's interrupt puts the reading away and counts the period.
+//! The sensor on PA0 and the measured channel on PA1: TIM2 starts a conversion of
+//! the one every sample period, the converter adds one of the other, and its
+//! interrupt puts the readings away and counts the period.
 
 use crate::clocks::CORE;
 use core::sync::atomic::{AtomicU32, Ordering};
 use firmware::rig::{Clock, Sensor};
-use stm32f4xx_hal::gpio::{Analog, PA0};
+use stm32f4xx_hal::gpio::{Analog, PA0, PA1};
 use stm32f4xx_hal::interrupt;
 use stm32f4xx_hal::pac::{ADC_COMMON, ADC1, Interrupt, NVIC, TIM2};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-/// Samples per second.
-const RATE: u32 = 1000;
-
 static READING: AtomicU32 = AtomicU32::new(0);
+static CHANNEL: AtomicU32 = AtomicU32::new(0);
 static PERIODS: AtomicU32 = AtomicU32::new(0);
 
 /// The readings, and the sample clock that they are.
 pub struct Sampler {
-    _pin: PA0<Analog>,
+    _pins: (PA0<Analog>, PA1<Analog>),
 }
 
 impl Sampler {
-    /// Starts the 1 kHz conversions. Written register by register: the HAL
-    /// calibrates with a division that can panic (RM0390, 13.13).
+    /// Starts the conversions, one every `period` µs. Written register by
+    /// register: the HAL calibrates with a division that can panic (RM0390, 13.13).
     #[must_use]
     pub fn start(
         converter: ADC1,
         common: &ADC_COMMON,
-        pin: PA0<Analog>,
+        pins: (PA0<Analog>, PA1<Analog>),
         timer: TIM2,
+        period: u32,
         rcc: &mut Rcc,
     ) -> Self {
         ADC1::enable(rcc);
         ADC1::reset(rcc);
-        // 84 MHz / 4 = 21 MHz; 480 cycles of it are 23 µs, for a source of some kΩ.
+        // 84 MHz / 4 = 21 MHz; 480 cycles of it are 23 µs, for sources of some kΩ.
         common.ccr().write(|w| w.adcpre().div4());
-        converter.smpr2().write(|w| w.smp0().cycles480());
-        converter.cr1().write(|w| w.eocie().enabled());
-        // One conversion of channel 0, which the resets of SQR1 to SQR3 say.
+        converter
+            .smpr2()
+            .write(|w| w.smp0().cycles480().smp1().cycles480());
+        // One conversion of channel 0, which the resets of SQR1 to SQR3 say; after it
+        // by itself one of channel 1, the only one of the injected group. That group
+        // has a register of its own, so the two cannot be mixed up.
+        // SAFETY: a channel's number in a field for it.
+        converter
+            .jsqr()
+            .write(|w| unsafe { w.jl().bits(0).jsq4().bits(1) });
+        converter
+            .cr1()
+            .write(|w| w.jauto().enabled().jeocie().enabled());
         converter.cr2().write(|w| {
             w.exten().rising_edge().extsel().tim2trgo();
             w.eocs().each_conversion().adon().enabled()
         });
         TIM2::enable(rcc);
         TIM2::reset(rcc);
-        timer.arr().write(|w| w.set(CORE / RATE - 1));
+        timer
+            .arr()
+            .write(|w| w.set((CORE / 1_000_000).saturating_mul(period).saturating_sub(1)));
         timer.cr2().write(|w| w.mms().update());
         // SAFETY: the interrupt touches the converter and atomics only.
         unsafe { NVIC::unmask(Interrupt::ADC) };
         timer.cr1().write(|w| w.cen().enabled());
-        Self { _pin: pin }
+        Self { _pins: pins }
     }
 }
 
@@ -63,6 +75,9 @@ pub fn periods() -> u32 {
 impl Sensor for Sampler {
     fn counts(&mut self) -> f32 {
         READING.load(Ordering::Relaxed) as f32
+    }
+    fn channel(&mut self) -> f32 {
+        CHANNEL.load(Ordering::Relaxed) as f32
     }
 }
 
@@ -86,10 +101,13 @@ fn ADC() {
     if overwritten {
         converter.sr().modify(|_, w| w.ovr().clear_bit());
     }
-    READING.store(
-        converter.dr().read().data().bits().into(),
-        Ordering::Relaxed,
+    converter.sr().modify(|_, w| w.jeoc().clear_bit());
+    let (reading, channel) = (
+        converter.dr().read().data().bits(),
+        converter.jdr1().read().jdata().bits(),
     );
+    READING.store(reading.into(), Ordering::Relaxed);
+    CHANNEL.store(channel.into(), Ordering::Relaxed);
     let periods = PERIODS.load(Ordering::Relaxed);
     PERIODS.store(
         periods.wrapping_add(1 + u32::from(overwritten)),

@@ -1,7 +1,10 @@
 //! USART2 at 115 200 baud, 8N1: the serial port that the ST-LINK shows on USB.
 
 use crate::clocks::APB1;
-use firmware::queue::Queue;
+use core::cell::Cell;
+use critical_section::Mutex;
+use heapless::Deque;
+use heapless::spsc::{Consumer, Producer, Queue};
 use stm32f4xx_hal::gpio::{Input, PA2, PA3};
 use stm32f4xx_hal::interrupt;
 use stm32f4xx_hal::pac::{Interrupt, NVIC, USART2};
@@ -9,14 +12,16 @@ use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
 const BAUD: u32 = 115_200;
 
-/// What was received while the loop was busy.
-static RECEIVED: Queue<128> = Queue::new();
+/// Where the interrupt puts what was received while the loop was busy. It is
+/// handed over once, and only the interrupt has it then.
+static RECEIVED: Mutex<Cell<Option<Producer<'static, u8>>>> = Mutex::new(Cell::new(None));
 
 /// The serial line. Nothing here waits: bytes go out one at a time, when there
 /// is room, from [`Uart::work`].
 pub struct Uart {
     registers: USART2,
-    sending: Queue<512>,
+    received: Option<Consumer<'static, u8>>,
+    sending: Deque<u8, 512>,
 }
 
 impl Uart {
@@ -26,6 +31,13 @@ impl Uart {
         let _ = (tx.into_alternate::<7>(), rx.into_alternate::<7>());
         USART2::enable(rcc);
         USART2::reset(rcc);
+        // `None` if this were called twice: there is one line.
+        let queue = cortex_m::singleton!(: Queue<u8, 128> = Queue::new());
+        let received = queue.map(|queue| {
+            let (producer, consumer) = queue.split();
+            critical_section::with(|section| RECEIVED.borrow(section).set(Some(producer)));
+            consumer
+        });
         // SAFETY: the divisor fits its 16 bits; the interrupt only touches the
         // receiver and its queue.
         unsafe {
@@ -40,20 +52,21 @@ impl Uart {
         });
         Self {
             registers,
-            sending: Queue::new(),
+            received,
+            sending: Deque::new(),
         }
     }
 
     /// A byte, if one has come.
     #[inline]
     pub fn receive(&mut self) -> Option<u8> {
-        RECEIVED.take()
+        self.received.as_mut()?.dequeue()
     }
 
     /// Gives `bytes` to be sent; what does not fit is lost.
     pub fn send(&mut self, bytes: &[u8]) {
         for byte in bytes {
-            self.sending.put(*byte);
+            let _ = self.sending.push_back(*byte);
         }
     }
 
@@ -61,7 +74,7 @@ impl Uart {
     #[inline]
     pub fn work(&mut self) {
         if self.registers.sr().read().txe().bit_is_set()
-            && let Some(byte) = self.sending.take()
+            && let Some(byte) = self.sending.pop_front()
         {
             self.registers.dr().write(|w| w.dr().set(byte.into()));
         }
@@ -74,7 +87,15 @@ fn USART2() {
     let registers = unsafe { &*USART2::ptr() };
     // In this order the two clear an overrun, too.
     if registers.sr().read().rxne().bit_is_set() {
-        RECEIVED.put(registers.dr().read().dr().bits() as u8);
+        let byte = registers.dr().read().dr().bits() as u8;
+        critical_section::with(|section| {
+            let slot = RECEIVED.borrow(section);
+            if let Some(mut producer) = slot.take() {
+                // A byte that finds no room is lost, and its command not understood.
+                let _ = producer.enqueue(byte);
+                slot.set(Some(producer));
+            }
+        });
     } else {
         let _ = registers.dr().read();
     }

@@ -1,6 +1,7 @@
 //! Frames: content and CRC-32, byte-stuffed (COBS) so that 0 occurs only
 //! between frames. After any loss the next 0 begins afresh.
 
+use heapless::Vec;
 use model_core::self_test::Crc32;
 
 /// Longest content of a frame, bytes.
@@ -29,20 +30,16 @@ fn checksum(content: &[u8]) -> u32 {
 }
 
 /// A frame ready for the wire.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Frame {
-    wire: [u8; WIRE],
-    length: usize,
+    wire: Vec<u8, WIRE>,
 }
 
 impl Frame {
     /// Nothing to send.
     #[must_use]
     pub const fn empty() -> Self {
-        Self {
-            wire: [0; WIRE],
-            length: 0,
-        }
+        Self { wire: Vec::new() }
     }
 
     /// The frame of `content`, of which at most [`CONTENT`] bytes are taken.
@@ -62,7 +59,7 @@ impl Frame {
             }
             if *byte == 0 || code == u8::MAX {
                 frame.set(code_at, code);
-                code_at = frame.length;
+                code_at = frame.wire.len();
                 code = 1;
                 frame.put(0);
             }
@@ -73,10 +70,7 @@ impl Frame {
     }
 
     fn put(&mut self, byte: u8) {
-        if let Some(slot) = self.wire.get_mut(self.length) {
-            *slot = byte;
-            self.length += 1;
-        }
+        let _ = self.wire.push(byte);
     }
 
     fn set(&mut self, at: usize, byte: u8) {
@@ -88,15 +82,16 @@ impl Frame {
     /// The bytes to send; none for an empty frame.
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
-        self.wire.get(..self.length).unwrap_or(&[])
+        &self.wire
     }
 }
 
 /// Collects frames from the wire.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Receiver {
-    content: [u8; CONTENT + 4],
-    length: usize,
+    content: Vec<u8, { CONTENT + 4 }>,
+    /// Whether `content` was handed out and the next byte begins afresh.
+    done: bool,
     /// Bytes until the next stuffed zero; 0 before a frame's first byte.
     left: u8,
     /// Whether a zero belongs where the count ends.
@@ -109,8 +104,8 @@ impl Receiver {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            content: [0; CONTENT + 4],
-            length: 0,
+            content: Vec::new(),
+            done: false,
             left: 0,
             zero_due: false,
             damage: None,
@@ -120,6 +115,10 @@ impl Receiver {
     /// Takes a byte. At the end of a frame gives its content, or what is wrong
     /// with it.
     pub fn receive(&mut self, byte: u8) -> Option<Result<&[u8], Damage>> {
+        if self.done {
+            self.done = false;
+            self.content.clear();
+        }
         if byte == 0 {
             return self.finish();
         }
@@ -137,19 +136,15 @@ impl Receiver {
     }
 
     fn put(&mut self, byte: u8) {
-        match self.content.get_mut(self.length) {
-            Some(slot) => {
-                *slot = byte;
-                self.length += 1;
-            }
-            None => self.damage = Some(Damage::TooLong),
+        if self.content.push(byte).is_err() {
+            self.damage = Some(Damage::TooLong);
         }
     }
 
     fn finish(&mut self) -> Option<Result<&[u8], Damage>> {
-        let (length, left, damage) = (self.length, self.left, self.damage);
-        let begun = self.zero_due || left > 0 || length > 0;
-        self.length = 0;
+        let (left, damage) = (self.left, self.damage);
+        let begun = self.zero_due || left > 0 || !self.content.is_empty();
+        self.done = true;
         self.left = 0;
         self.zero_due = false;
         self.damage = None;
@@ -163,8 +158,7 @@ impl Receiver {
         if left > 0 {
             return Some(Err(Damage::Stuffing));
         }
-        let received = self.content.get(..length).unwrap_or(&[]);
-        let Some((content, crc)) = received.split_last_chunk::<4>() else {
+        let Some((content, crc)) = self.content.split_last_chunk::<4>() else {
             return Some(Err(Damage::Checksum));
         };
         if checksum(content) == u32::from_le_bytes(*crc) {

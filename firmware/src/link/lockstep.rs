@@ -9,11 +9,12 @@
 //! | request | content after kind (1 byte) and number (2 bytes, low first) | reply's content after the same |
 //! |---|---|---|
 //! | `START` | case (1) | 1 if there is such a case, else 0 (1) |
-//! | `STEPS` | readings in counts (2 each) | predictions (4 each, bits of f32), decisions (1 bit each, in 4 bytes) |
+//! | `STEPS` | the measured channel in counts (2), readings of the sensor in counts (2 each) | predictions (4 each, bits of f32), decisions (1 bit each, in 4 bytes) |
 //! | `REPORT` | – | steps (4), clock ticks spent in steps (8), most in one step (4), stack used (4) |
 //! | anything else or damaged | | `DAMAGED`, number 0 |
 
 use super::frame::{CONTENT, Frame, Receiver};
+use heapless::Vec;
 
 /// Begins a case from rest.
 pub const START: u8 = 1;
@@ -80,8 +81,9 @@ impl Report {
 pub trait Cases {
     /// Begins a case from rest; `false` if there is none of that number.
     fn start(&mut self, case: u8) -> bool;
-    /// One step: what was predicted, and whether the valve is to be open.
-    fn step(&mut self, counts: u16) -> (f32, bool);
+    /// One step with the counts of sensor and measured channel: what was
+    /// predicted, and whether the valve is to be open.
+    fn step(&mut self, counts: u16, channel: u16) -> (f32, bool);
     /// What was measured since the start of the case.
     fn report(&mut self) -> Report;
 }
@@ -132,13 +134,14 @@ impl<C: Cases> Server<C> {
             }
             STEPS => {
                 let mut decisions = 0_u32;
-                let readings = rest.chunks_exact(2).take(BATCH).enumerate();
-                for (i, counts) in readings {
-                    let counts = match counts {
-                        [low, high] => u16::from_le_bytes([*low, *high]),
-                        _ => 0,
-                    };
-                    let (predicted, open) = self.cases.step(counts);
+                let mut counts = rest.chunks_exact(2).map(|counts| match counts {
+                    [low, high] => u16::from_le_bytes([*low, *high]),
+                    _ => 0,
+                });
+                // The same for the whole batch: what is measured besides is slow.
+                let channel = counts.next().unwrap_or(0);
+                for (i, counts) in counts.take(BATCH).enumerate() {
+                    let (predicted, open) = self.cases.step(counts, channel);
                     reply.put(&predicted.to_bits().to_le_bytes());
                     decisions |= u32::from(open) << (i % BATCH);
                 }
@@ -154,15 +157,13 @@ impl<C: Cases> Server<C> {
 }
 
 struct Reply {
-    content: [u8; CONTENT],
-    length: usize,
+    content: Vec<u8, CONTENT>,
 }
 
 impl Reply {
     fn new(kind: u8, number: u16) -> Self {
         let mut reply = Self {
-            content: [0; CONTENT],
-            length: 0,
+            content: Vec::new(),
         };
         let [low, high] = number.to_le_bytes();
         reply.put(&[kind, low, high]);
@@ -170,16 +171,11 @@ impl Reply {
     }
 
     fn put(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            if let Some(slot) = self.content.get_mut(self.length) {
-                *slot = *byte;
-                self.length += 1;
-            }
-        }
+        let _ = self.content.extend_from_slice(bytes);
     }
 
     fn content(&self) -> &[u8] {
-        self.content.get(..self.length).unwrap_or(&[])
+        &self.content
     }
 }
 
@@ -199,8 +195,8 @@ mod tests {
             (self.sum, self.steps) = (0.0, 0);
             case == 0
         }
-        fn step(&mut self, counts: u16) -> (f32, bool) {
-            self.sum += f32::from(counts);
+        fn step(&mut self, counts: u16, channel: u16) -> (f32, bool) {
+            self.sum += f32::from(counts) + 1000.0 * f32::from(channel);
             self.steps += 1;
             (self.sum, self.steps.is_multiple_of(3))
         }
@@ -236,11 +232,11 @@ mod tests {
         assert_eq!(ask(&mut server, &[START, 0, 0, 0], None), [START, 0, 0, 1]);
         assert_eq!(ask(&mut server, &[START, 1, 0, 9], None), [START, 1, 0, 0]);
         assert_eq!(ask(&mut server, &[START, 2, 0, 0], None)[3], 1);
-        let batch = [STEPS, 3, 0, 10, 0, 20, 0, 0, 1];
+        let batch = [STEPS, 3, 0, 1, 0, 10, 0, 20, 0, 0, 1];
         let first = ask(&mut server, &batch, None);
         assert_eq!(&first[..3], [STEPS, 3, 0]);
-        assert_eq!(first[3..7], 10.0_f32.to_le_bytes());
-        assert_eq!(first[11..15], 286.0_f32.to_le_bytes());
+        assert_eq!(first[3..7], 1010.0_f32.to_le_bytes());
+        assert_eq!(first[11..15], 3286.0_f32.to_le_bytes());
         assert_eq!(first[15..], 0b100_u32.to_le_bytes());
         assert_eq!(ask(&mut server, &batch, None), first);
         let report = ask(&mut server, &[REPORT, 4, 0], None);
@@ -250,7 +246,7 @@ mod tests {
 
     #[test]
     fn a_lost_byte_is_reported_and_the_request_can_be_repeated() {
-        let batch = [STEPS, 3, 0, 10, 0, 20, 0, 0, 1];
+        let batch = [STEPS, 3, 0, 1, 0, 10, 0, 20, 0, 0, 1];
         for lost in 0..Frame::new(&batch).bytes().len() - 1 {
             let mut server = Server::new(Counter { sum: 0.0, steps: 0 });
             let reply = ask(&mut server, &batch, Some(lost));

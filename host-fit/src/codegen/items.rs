@@ -1,536 +1,153 @@
-//! The items of the generated file.
+//! The items of the generated file that every model has.
 
-use super::layout::{array, documented, number, numbers};
-use super::{CodegenError, law, spec_of};
-use crate::model::{Added, Delay, Footprint, Model, TransportLaw};
-use crate::user_effect::rust_source;
+use super::delay::Written;
+use super::{CodegenError, spec_of};
+use crate::model::{Added, Footprint, Model};
+use crate::user_effect::{number, rust_module};
 use model_core::effect::{RustType, Setting, Spec};
 use model_core::effects;
-use std::fmt::Write as _;
+use model_core::recursion::{Grading, LagConvention};
+use proc_macro2::{Ident, Literal, TokenStream};
+use quote::{format_ident, quote};
 
-pub(super) fn imports(out: &mut String, model: &Model, graded: bool) {
-    let mut lines = vec!["use model_core::checks;".to_owned()];
-    if let Some(designed) = &model.law {
-        lines.extend(law::imports(designed));
-    }
-    let mut named: Vec<&str> = Vec::new();
-    // A user's own effects bring their `new` with them.
-    let (mut physics, mut setting) = (false, false);
-    match &model.delay {
-        Delay::Fixed { .. } => lines.push("use model_core::delay::FixedDelay;".to_owned()),
-        Delay::Law(law) => {
-            lines.push("use model_core::delay::ScaledDelay;".to_owned());
-            named.push(rust_name(law.spec));
-            (physics, setting) = (!is_frozen(model), !is_frozen(model));
-        }
-    }
-    for added in &model.effects {
-        setting = true;
-        if let Some(spec) = effects::spec(&added.name) {
-            physics = true;
-            named.push(rust_name(spec));
-        }
-    }
-    named.sort_unstable();
-    named.dedup();
-    if physics {
-        lines.push("use model_core::effect::{Physics, Setting};".to_owned());
-    } else if setting {
-        lines.push("use model_core::effect::Setting;".to_owned());
-    }
-    lines.extend(
-        named
-            .iter()
-            .map(|name| format!("use model_core::effects::{name};")),
-    );
-    if is_frozen(model) {
-        lines.push("use model_core::frozen::{self, Frozen};".to_owned());
-    }
-    let state = if graded { "GradedState" } else { "OnOffState" };
-    lines.push(format!(
-        "use model_core::model::{{Averaging, {state}, Params, Parts, matrix, vector}};"
-    ));
-    lines.push("use model_core::recursion::{Grading, LagConvention};".to_owned());
-    lines.push("use model_core::self_test::Golden;".to_owned());
-    out.push('\n');
-    for line in lines {
-        out.push_str(&line);
-        out.push('\n');
+/// A list of the nearest `f32`s.
+pub(super) fn listed(values: &[f64]) -> TokenStream {
+    let values = values.iter().map(|value| number(*value, ""));
+    quote!([#(#values),*])
+}
+
+/// A list of samples.
+pub(super) fn lags(values: &[u16]) -> TokenStream {
+    let values = values.iter().map(|lag| Literal::u16_unsuffixed(*lag));
+    quote!([#(#values),*])
+}
+
+/// A count without a suffix.
+pub(super) fn count(value: usize) -> Literal {
+    Literal::usize_unsuffixed(value)
+}
+
+/// A word of 32 bits, as it would be compared.
+pub(super) fn word(value: u32) -> Literal {
+    let text = format!("0x{:04x}_{:04x}", value >> 16, value & 0xffff);
+    text.parse()
+        .unwrap_or_else(|_| Literal::u32_unsuffixed(value))
+}
+
+pub(super) fn imports(law: &Written) -> TokenStream {
+    let frozen = law.is_constant.then(|| {
+        quote!(
+            use model_core::frozen::{self, Frozen};
+        )
+    });
+    quote! {
+        use model_core::checks;
+        use model_core::control::golden::GoldenLaw;
+        #frozen
+        use model_core::model::{Averaging, Params, State, StateOf, matrix, vector};
+        use model_core::recursion::{Grading, LagConvention};
+        use model_core::self_test::Golden;
     }
 }
 
-/// Whether the constants are part of the code: those of some delay laws are
-/// computed where they are used, for the sample period.
-fn is_frozen(model: &Model) -> bool {
-    match &model.delay {
-        Delay::Fixed { .. } => true,
-        Delay::Law(law) => fields(law).is_some(),
-    }
-}
-
-/// The law's public fields, if they are its parameters.
-fn fields(law: &TransportLaw) -> Option<&'static [&'static str]> {
-    law.spec.law.and_then(|card| card.fields)
-}
-
-pub(super) fn sizes(out: &mut String, model: &Model, memory: &Footprint) {
-    let _ = write!(
-        out,
-        "
-/// Sample period, s.
-pub const SAMPLE_PERIOD_S: f32 = {};
-/// Outputs kept: more than the longest lag, and no less than the averaging window.
-pub const OUTPUTS: usize = {};
-",
-        number(model.sample_period_s),
-        memory.outputs
-    );
-    if memory.graded {
-        let _ = write!(
-            out,
-            "/// Jet strengths kept: more than the longest input delay.
-pub const JETS: usize = {};
-",
-            memory.jets
-        );
+pub(super) fn sizes(model: &Model, memory: &Footprint) -> TokenStream {
+    let period = number(model.sample_period_s, "");
+    let window = Literal::u32_unsuffixed(model.averaging.window);
+    let readings = if model.averaging.averaged_model {
+        quote!(WINDOW as usize)
     } else {
-        let _ = write!(
-            out,
-            "/// Commands kept, in words of 32: more than the longest input delay.
-pub const WORDS: usize = {};
-",
-            memory.words()
-        );
+        quote!(1)
+    };
+    let (outputs, jets) = (count(memory.outputs), count(memory.jets));
+    let kept = if memory.graded {
+        quote!(model_core::history::DelayLine<f32, JETS>)
+    } else {
+        quote!(model_core::history::BitHistory<{ JETS.div_ceil(32) }>)
+    };
+    let names = memory.channels.iter().map(|channel| channel.name.as_str());
+    let references: Vec<f64> = memory.references();
+    let (channels, references) = (count(references.len()), listed(&references));
+    quote! {
+        /// Sample period, s.
+        pub const SAMPLE_PERIOD_S: f32 = #period;
+        /// W, samples.
+        pub const WINDOW: u32 = #window;
+        /// Readings that are averaged before they are compared with the model.
+        pub const READINGS: usize = #readings;
+        /// Outputs kept: more than the longest lag, and no less than the averaging window.
+        pub const OUTPUTS: usize = #outputs;
+        /// Jet strengths kept: more than the longest input delay.
+        pub const JETS: usize = #jets;
+        /// Measured channels that the effects need, in the order in which they are passed.
+        pub const CHANNELS: [&str; #channels] = [#(#names),*];
+        /// Usual values of the channels, in their units.
+        pub const REFERENCES: [f32; #channels] = #references;
+        /// Past outputs.
+        pub type Outputs = model_core::history::DelayLine<f32, OUTPUTS>;
+        /// Past jet strengths.
+        pub type Jets = #kept;
     }
-    let references: Vec<f32> = memory.references();
-    let names = memory.channels.iter();
-    let names: Vec<String> = names.map(|channel| format!("{:?}", channel.name)).collect();
-    let _ = writeln!(
-        out,
-        "/// Measured channels that the effects need, in the order in which they are passed."
-    );
-    array(out, "CHANNELS", &format!("[&str; {}]", names.len()), &names);
-    let _ = writeln!(out, "/// Usual values of the channels, in their units.");
-    array(
-        out,
-        "REFERENCES",
-        &format!("[f32; {}]", names.len()),
-        &references
-            .iter()
-            .map(|x| format!("{x:?}"))
-            .collect::<Vec<_>>(),
-    );
 }
 
-pub(super) fn effect_type(model: &Model, added: &Added) -> Result<String, CodegenError> {
-    let spec = spec_of(model, added)?;
-    if model.definition(spec.name).is_some() {
-        return Ok(spec.rust.to_owned());
-    }
-    let name = rust_name(spec);
-    Ok(match spec.rust_type {
-        RustType::Plain => name.to_owned(),
-        RustType::Numbers => format!("{name}<f32>"),
-        RustType::Buffer(time) => format!("{name}<f32, {}>", buffer(model, added, time)),
+pub(super) fn types(model: &Model, law: &Written) -> Result<TokenStream, CodegenError> {
+    let each = model.effects.iter().enumerate().map(|(i, added)| {
+        let (doc, name) = (format!(" {}.", added.name), effect(i, "Effect"));
+        let kind = effect_type(model, added)?;
+        Ok(quote! {
+            #[doc = #doc]
+            pub type #name = #kind;
+        })
+    });
+    let each: Vec<TokenStream> = each.collect::<Result<_, CodegenError>>()?;
+    let chain = nested(model.effects.len(), "Effect");
+    let sizes = [model.a.len(), model.product_lags.len(), model.b.len()].map(count);
+    let kind = &law.kind;
+    let identified = if law.is_constant {
+        quote! {
+            /// Structure, coefficients and delay law: N1, N2, N3 as identified.
+            pub type Base = Params<f32, #(#sizes),*, Delay, ()>;
+            /// The model: its constants are part of the code.
+            pub type Identified = Frozen<Constants, Effects>;
+        }
+    } else {
+        quote! {
+            /// The model: N1, N2, N3 as identified.
+            pub type Identified = Params<f32, #(#sizes),*, Delay, Effects>;
+        }
+    };
+    Ok(quote! {
+        #(#each)*
+        /// The delay law.
+        pub type Delay = #kind;
+        /// The effects, in the order of the physics.
+        pub type Effects = #chain;
+        #identified
+        /// What the model remembers.
+        pub type IdentifiedState = StateOf<f32, Identified, Outputs, Jets>;
     })
 }
 
-pub(super) fn types(out: &mut String, model: &Model, graded: bool) -> Result<(), CodegenError> {
-    let inputs = model.b.len();
-    let delay = match &model.delay {
-        Delay::Fixed { .. } => format!("FixedDelay<[u16; {inputs}]>"),
-        Delay::Law(law) => format!(
-            "ScaledDelay<{}<f32>, [f32; {inputs}], {}>",
-            rust_name(law.spec),
-            !law.interpolated
-        ),
-    };
-    out.push('\n');
-    for (i, added) in model.effects.iter().enumerate() {
-        let _ = writeln!(
-            out,
-            "/// {}.\npub type Effect{} = {};",
-            added.name,
-            i + 1,
-            effect_type(model, added)?
-        );
+fn effect_type(model: &Model, added: &Added) -> Result<TokenStream, CodegenError> {
+    let spec = spec_of(model, added)?;
+    let path = path(spec.rust)?;
+    if model.definition(spec.name).is_some() {
+        return Ok(path);
     }
-    let chain = nested(model.effects.len(), "Effect");
-    let sizes = format!("{}, {}", model.a.len(), model.product_lags.len());
-    let identified = if is_frozen(model) {
-        format!(
-            "/// Structure, coefficients and delay law: N1, N2, N3 as identified.
-pub type Base = Params<f32, {sizes}, {inputs}, Delay, ()>;
-/// The model: its constants are part of the code.
-pub type Identified = Frozen<Constants, Effects>;
-"
-        )
-    } else {
-        format!(
-            "/// The model: N1, N2, N3 as identified.
-pub type Identified = Params<f32, {sizes}, {inputs}, Delay, Effects>;
-"
-        )
-    };
-    let state = if graded {
-        "GradedState<f32, OUTPUTS, JETS, Identified>"
-    } else {
-        "OnOffState<f32, OUTPUTS, WORDS, Identified>"
-    };
-    let _ = write!(
-        out,
-        "/// The delay law.
-pub type Delay = {delay};
-/// The effects, in the order of the physics.
-pub type Effects = {chain};
-{identified}/// What the model remembers.
-pub type IdentifiedState = {state};
-"
-    );
-    Ok(())
+    let path = quote!(model_core::effects::#path);
+    Ok(match spec.rust_type {
+        RustType::Plain => path,
+        RustType::Numbers => quote!(#path<f32>),
+        RustType::Buffer(time) => {
+            let length = count(buffer(model, added, time));
+            quote!(#path<f32, #length>)
+        }
+    })
 }
 
-pub(super) fn coefficients(out: &mut String, model: &Model) {
-    let lags = |lags: &[u16]| lags.iter().map(u16::to_string).collect::<Vec<_>>();
-    let (n1, n2, n3) = (model.a.len(), model.product_lags.len(), model.b.len());
-    out.push('\n');
-    documented(
-        out,
-        "τ_i, samples.",
-        "STATE_LAGS",
-        &format!("[u16; {n1}]"),
-        &lags(&model.state_lags),
-    );
-    documented(
-        out,
-        "a_i.",
-        "A",
-        &format!("[f32; {n1}]"),
-        &numbers(&model.a),
-    );
-    documented(
-        out,
-        "τ̄_j, samples.",
-        "PRODUCT_LAGS",
-        &format!("[u16; {n2}]"),
-        &lags(&model.product_lags),
-    );
-    documented(
-        out,
-        "b_l.",
-        "B",
-        &format!("[f32; {n3}]"),
-        &numbers(&model.b),
-    );
-    for l in 0..n3 {
-        let column: Vec<f64> = model.c.iter().copied().skip(l * n2).take(n2).collect();
-        documented(
-            out,
-            &format!("c_j{}.", l + 1),
-            &format!("C{}", l + 1),
-            &format!("[f32; {n2}]"),
-            &numbers(&column),
-        );
-    }
-    match &model.delay {
-        Delay::Fixed { delays } => {
-            documented(
-                out,
-                "h_l, samples.",
-                "DELAYS",
-                &format!("[u16; {n3}]"),
-                &lags(delays),
-            );
-        }
-        Delay::Law(law) => {
-            documented(
-                out,
-                &format!("{}: {}.", law.spec.name, with_units(law.spec)),
-                "DELAY_PARAMETERS",
-                &format!("[f32; {}]", law.parameters.len()),
-                &numbers(&law.parameters),
-            );
-            documented(
-                out,
-                "Shortest and longest delay of the law, samples.",
-                "DELAY_RANGE",
-                "[f32; 2]",
-                &numbers(&law.range(model.sample_period_s)),
-            );
-            documented(
-                out,
-                "f_l, the delays of the inputs in units of the law's.",
-                "DELAY_FACTORS",
-                &format!("[f32; {n3}]"),
-                &numbers(&law.factors),
-            );
-        }
-    }
-    for (i, added) in model.effects.iter().enumerate() {
-        let Some(spec) = model.spec(&added.name) else {
-            continue;
-        };
-        documented(
-            out,
-            &format!("{}: {}.", spec.name, with_units(spec)),
-            &format!("EFFECT{}", i + 1),
-            &format!("[f32; {}]", added.parameters.len()),
-            &numbers(&added.parameters),
-        );
-    }
-}
-
-pub(super) fn compile_time_checks(out: &mut String, model: &Model, graded: bool) {
-    let kept = if graded { "JETS" } else { "32 * WORDS" };
-    let averaged = if model.averaging.averaged_model {
-        " + WINDOW as usize"
-    } else {
-        ""
-    };
-    let _ = write!(
-        out,
-        "
-/// W, samples.
-pub const WINDOW: u32 = {};
-/// What lags mean.
-pub const CONVENTION: LagConvention = LagConvention::{:?};
-/// The response to jets of part strength.
-pub const GRADING: Grading = Grading::{:?};
-/// d, what drives the flow without jets.
-pub const CONSTANT: f32 = {};
-
-const _: () = {{
-    assert!(CONSTANT.is_finite(), \"the constant is not finite\");
-    assert!(checks::finite(&A), \"a coefficient a is not finite\");
-    assert!(checks::finite(&B), \"a coefficient b is not finite\");
-",
-        model.averaging.window,
-        model.convention,
-        model.grading,
-        number(model.constant),
-    );
-    for l in 1..=model.b.len() {
-        let _ = writeln!(
-            out,
-            "    assert!(checks::finite(&C{l}), \"a coefficient c is not finite\");"
-        );
-    }
-    let _ = write!(
-        out,
-        "    assert!(
-        OUTPUTS >= checks::outputs_for(&STATE_LAGS, CONVENTION),
-        \"a state lag reaches beyond the outputs kept\"
-    );
-    assert!(
-        OUTPUTS >= checks::outputs_for(&PRODUCT_LAGS, CONVENTION),
-        \"a product lag reaches beyond the outputs kept\"
-    );
-    assert!(
-        OUTPUTS >= WINDOW as usize,
-        \"the averaging window reaches beyond the outputs kept\"
-    );
-"
-    );
-    let mut fits = |delay: String| {
-        let condition = format!("{kept} > {delay}{averaged}");
-        let _ = write!(
-            out,
-            "    assert!(
-        {condition},
-        \"an input delay reaches beyond the commands kept\"
-    );
-"
-        );
-    };
-    match &model.delay {
-        Delay::Fixed { delays } => {
-            for l in 0..delays.len() {
-                fits(format!("DELAYS[{l}] as usize"));
-            }
-        }
-        Delay::Law(law) => {
-            for l in 0..law.factors.len() {
-                fits(format!(
-                    "(DELAY_FACTORS[{l}] * DELAY_RANGE[1] + 0.5) as usize"
-                ));
-            }
-        }
-    }
-    out.push_str("};\n");
-}
-
-pub(super) fn constructors(out: &mut String, model: &Model, graded: bool) {
-    let frozen = is_frozen(model);
-    let delay = match &model.delay {
-        Delay::Fixed { .. } => "FixedDelay { delays: DELAYS }".to_owned(),
-        Delay::Law(law) => {
-            let name = rust_name(law.spec);
-            let prepared = match fields(law) {
-                None => format!("{name}::new(&DELAY_PARAMETERS, &SETTING)"),
-                Some(fields) => {
-                    let each = fields.iter().enumerate();
-                    let lines: String = each
-                        .map(|(i, field)| format!("            {field}: DELAY_PARAMETERS[{i}],\n"))
-                        .collect();
-                    format!("{name} {{\n{lines}        }}")
-                }
-            };
-            format!(
-                "ScaledDelay {{
-        law: {prepared},
-        factors: DELAY_FACTORS,
-    }}"
-            )
-        }
-    };
-    let effects = if model.effects.is_empty() {
-        "()"
-    } else {
-        "effects()"
-    };
-    let base_effects = if frozen { "()" } else { effects };
-    let columns: Vec<String> = (1..=model.b.len()).map(|l| format!("C{l}")).collect();
-    let params = format!(
-        "Params {{
-    convention: CONVENTION,
-    grading: GRADING,
-    averaging: Averaging {{
-        window: WINDOW,
-        averaged_model: {},
-    }},
-    constant: CONSTANT,
-    state_lags: STATE_LAGS,
-    a: vector(A),
-    product_lags: PRODUCT_LAGS,
-    b: vector(B),
-    c: matrix([{}]),
-    delay: {delay},
-    effects: {base_effects},
-}}",
-        model.averaging.averaged_model,
-        columns.join(", "),
-    );
-    if frozen {
-        let _ = write!(
-            out,
-            "
-/// Structure, coefficients and delay law.
-pub const BASE: Base = {params};
-
-/// Where the model finds its constants.
-#[derive(Clone, Copy, Debug)]
-pub struct Constants;
-
-impl frozen::Constants<f32> for Constants {{
-    type Base = Base;
-    const BASE: &'static Base = &BASE;
-}}
-"
-        );
-    }
-    let body = if frozen {
-        format!("Frozen::new({effects})")
-    } else {
-        params.replace('\n', "\n    ")
-    };
-    let (prepared, constant) = if model.effects.is_empty() && frozen {
-        ("", "const ")
-    } else {
-        (", its effects prepared for the sample period", "")
-    };
-    let _ = write!(
-        out,
-        "
-/// The model{prepared}.
-#[must_use]
-pub {constant}fn model() -> Identified {{
-    {body}
-}}
-"
-    );
-    if !model.effects.is_empty() || !frozen {
-        out.push_str(
-            "
-const SETTING: Setting<f32> = Setting {
-    period: SAMPLE_PERIOD_S,
-    channel: 0,
-    reference: 1.0,
-};
-",
-        );
-    }
-    if !model.effects.is_empty() {
-        out.push_str("\nfn effects() -> Effects {\n");
-        let channels = model.channels();
-        for (i, added) in model.effects.iter().enumerate() {
-            let n = i + 1;
-            let channel = channels
-                .iter()
-                .position(|name| added.channel.as_ref() == Some(name));
-            let _ = match channel {
-                None => writeln!(
-                    out,
-                    "    let effect{n} = Effect{n}::new(&EFFECT{n}, &SETTING);"
-                ),
-                Some(channel) => writeln!(
-                    out,
-                    "    let effect{n} = Effect{n}::new(
-        &EFFECT{n},
-        &Setting {{
-            channel: {channel},
-            reference: REFERENCES[{channel}],
-            ..SETTING
-        }},
-    );"
-                ),
-            };
-        }
-        let _ = writeln!(out, "    {}\n}}", nested(model.effects.len(), "effect"));
-    }
-    let method = if graded {
-        "graded_state"
-    } else {
-        "on_off_state"
-    };
-    let _ = write!(
-        out,
-        "
-/// The state at rest.
-#[must_use]
-pub fn state(model: &Identified) -> IdentifiedState {{
-    model.{method}()
-}}
-"
-    );
-}
-
-/// The user's own effects, written out: `model-core` does not have them.
-pub(super) fn own_effects(out: &mut String, model: &Model) {
-    for added in &model.effects {
-        if let Some(definition) = model.definition(&added.name) {
-            let setting = Setting {
-                period: model.sample_period_s as f32,
-                channel: 0,
-                reference: added.reference() as f32,
-            };
-            out.push('\n');
-            out.push_str(&rust_source(definition, &added.parameters, &setting));
-        }
-    }
-}
-
-/// The parameters with their units.
-fn with_units(spec: &Spec) -> String {
-    let each = spec.parameters.iter();
-    let units: Vec<String> = each.map(|p| format!("{} ({})", p.name, p.unit)).collect();
-    if units.is_empty() {
-        return "no parameters".to_owned();
-    }
-    units.join(", ")
-}
-
-pub(super) fn rust_name(spec: &Spec) -> &'static str {
-    spec.rust.rsplit("::").next().unwrap_or(spec.rust)
+fn path(text: &str) -> Result<TokenStream, CodegenError> {
+    text.parse().map_err(|_| CodegenError::UnknownEffect {
+        name: text.to_owned(),
+    })
 }
 
 /// Samples of memory of an effect that reaches back as long as the parameter
@@ -540,9 +157,248 @@ pub(super) fn buffer(model: &Model, added: &Added, time: usize) -> usize {
     time.clamp(0.0, effects::LONGEST_BUFFER as f64) as usize + 3
 }
 
+pub(super) fn coefficients(model: &Model, law: &Written) -> TokenStream {
+    let (n1, n2, n3) = (model.a.len(), model.product_lags.len(), model.b.len());
+    let [one, two, three] = [n1, n2, n3].map(count);
+    let (state_lags, product_lags) = (lags(&model.state_lags), lags(&model.product_lags));
+    let (a, b, constant) = (
+        listed(&model.a),
+        listed(&model.b),
+        number(model.constant, ""),
+    );
+    let columns = (0..n3).map(|l| {
+        let column: Vec<f64> = model.c.iter().copied().skip(l * n2).take(n2).collect();
+        let (doc, name) = (format!(" c_j{}.", l + 1), effect(l, "C"));
+        let column = listed(&column);
+        quote! {
+            #[doc = #doc]
+            pub const #name: [f32; #two] = #column;
+        }
+    });
+    let parameters = model.effects.iter().enumerate().filter_map(|(i, added)| {
+        let spec = model.spec(&added.name)?;
+        let doc = format!(" {}: {}.", spec.name, with_units(spec));
+        let (name, length) = (effect(i, "EFFECT"), count(added.parameters.len()));
+        let values = listed(&added.parameters);
+        Some(quote! {
+            #[doc = #doc]
+            pub const #name: [f32; #length] = #values;
+        })
+    });
+    let delays = &law.constants;
+    let convention = match model.convention {
+        LagConvention::Literal => quote!(LagConvention::Literal),
+        LagConvention::OneStep => quote!(LagConvention::OneStep),
+    };
+    let grading = match model.grading {
+        Grading::Proportional => quote!(Grading::Proportional),
+        Grading::Interpolated => quote!(Grading::Interpolated),
+        Grading::Switched => quote!(Grading::Switched),
+    };
+    quote! {
+        /// What lags mean.
+        pub const CONVENTION: LagConvention = #convention;
+        /// The response to jets of part strength.
+        pub const GRADING: Grading = #grading;
+        /// d, what drives the flow without jets.
+        pub const CONSTANT: f32 = #constant;
+        /// τ_i, samples.
+        pub const STATE_LAGS: [u16; #one] = #state_lags;
+        /// a_i.
+        pub const A: [f32; #one] = #a;
+        /// τ̄_j, samples.
+        pub const PRODUCT_LAGS: [u16; #two] = #product_lags;
+        /// b_l.
+        pub const B: [f32; #three] = #b;
+        #(#columns)*
+        #delays
+        #(#parameters)*
+    }
+}
+
+pub(super) fn compile_time_checks(model: &Model, law: &Written) -> TokenStream {
+    let columns = (0..model.b.len()).map(|l| effect(l, "C"));
+    let (longest, first) = (&law.longest, &law.first_arrival);
+    quote! {
+        /// Longest time from a command to its first arrival, samples.
+        pub const FIRST_ARRIVAL: usize = #first;
+
+        const _: () = {
+            assert!(CONSTANT.is_finite(), "the constant is not finite");
+            assert!(checks::finite(&A), "a coefficient a is not finite");
+            assert!(checks::finite(&B), "a coefficient b is not finite");
+            #(assert!(checks::finite(&#columns), "a coefficient c is not finite");)*
+            assert!(
+                OUTPUTS >= checks::outputs_for(&STATE_LAGS, CONVENTION),
+                "a state lag reaches beyond the outputs kept"
+            );
+            assert!(
+                OUTPUTS >= checks::outputs_for(&PRODUCT_LAGS, CONVENTION),
+                "a product lag reaches beyond the outputs kept"
+            );
+            assert!(
+                OUTPUTS >= WINDOW as usize,
+                "the averaging window reaches beyond the outputs kept"
+            );
+            #(assert!(
+                JETS >= #longest + READINGS,
+                "an input delay reaches beyond the commands kept"
+            );)*
+        };
+    }
+}
+
+pub(super) fn constructors(model: &Model, law: &Written) -> TokenStream {
+    let made = if model.effects.is_empty() {
+        quote!(())
+    } else {
+        quote!(effects())
+    };
+    let columns = (0..model.b.len()).map(|l| effect(l, "C"));
+    let (value, averaged) = (&law.value, model.averaging.averaged_model);
+    let params = |effects: TokenStream| {
+        quote! {
+            Params {
+                convention: CONVENTION,
+                grading: GRADING,
+                averaging: Averaging { window: WINDOW, averaged_model: #averaged },
+                constant: CONSTANT,
+                state_lags: STATE_LAGS,
+                a: vector(A),
+                product_lags: PRODUCT_LAGS,
+                b: vector(B),
+                c: matrix([#(#columns),*]),
+                delay: #value,
+                effects: #effects,
+            }
+        }
+    };
+    let needs_setting = !model.effects.is_empty() || !law.is_constant;
+    let setting = needs_setting.then(|| {
+        quote! {
+            const SETTING: model_core::effect::Setting<f32> = model_core::effect::Setting {
+                period: SAMPLE_PERIOD_S,
+                channel: 0,
+                reference: 1.0,
+            };
+        }
+    });
+    let (base, body) = if law.is_constant {
+        let base = params(quote!(()));
+        let base = quote! {
+            /// Structure, coefficients and delay law.
+            pub const BASE: Base = #base;
+
+            /// Where the model finds its constants.
+            #[derive(Clone, Copy, Debug)]
+            pub struct Constants;
+
+            impl frozen::Constants<f32> for Constants {
+                type Base = Base;
+                const BASE: &'static Base = &BASE;
+            }
+        };
+        (Some(base), quote!(Frozen::new(#made)))
+    } else {
+        (None, params(made))
+    };
+    let effects = (!model.effects.is_empty()).then(|| prepared(model));
+    quote! {
+        #base
+        #setting
+        #effects
+
+        /// The model, its effects prepared for the sample period.
+        #[must_use]
+        pub fn model() -> Identified {
+            #body
+        }
+
+        /// The state at rest.
+        #[must_use]
+        pub fn state(model: &Identified) -> IdentifiedState {
+            State::at_rest(model, Outputs::new(), Jets::new())
+        }
+    }
+}
+
+/// The function that prepares the effects.
+fn prepared(model: &Model) -> TokenStream {
+    let channels = model.channels();
+    let each = model.effects.iter().enumerate().map(|(i, added)| {
+        let (name, kind) = (effect(i, "effect"), effect(i, "Effect"));
+        let values = effect(i, "EFFECT");
+        let used = channels
+            .iter()
+            .position(|name| added.channel.as_ref() == Some(name));
+        let setting = match used.map(count) {
+            None => quote!(&SETTING),
+            Some(channel) => quote! {
+                &model_core::effect::Setting {
+                    channel: #channel,
+                    reference: REFERENCES[#channel],
+                    ..SETTING
+                }
+            },
+        };
+        // A user's own effect brings its `new` with it.
+        let new = if model.definition(&added.name).is_some() {
+            quote!(#kind::new)
+        } else {
+            quote!(model_core::effect::Physics::new)
+        };
+        quote!(let #name: #kind = #new(&#values, #setting);)
+    });
+    let chain = nested(model.effects.len(), "effect");
+    quote! {
+        fn effects() -> Effects {
+            #(#each)*
+            #chain
+        }
+    }
+}
+
+/// The user's own effects, written out: `model-core` does not have them.
+pub(super) fn own_effects(model: &Model) -> Vec<TokenStream> {
+    let own = model.effects.iter().filter_map(|added| {
+        let definition = model.definition(&added.name)?;
+        Some(rust_module(
+            definition,
+            &added.parameters,
+            &setting(model, added),
+        ))
+    });
+    own.collect()
+}
+
+/// What a user's own effect is told.
+pub(super) fn setting(model: &Model, added: &Added) -> Setting<f32> {
+    Setting {
+        period: model.sample_period_s as f32,
+        channel: 0,
+        reference: added.reference() as f32,
+    }
+}
+
+/// The parameters with their units.
+pub(super) fn with_units(spec: &Spec) -> String {
+    let each = spec.parameters.iter();
+    let units: Vec<String> = each.map(|p| format!("{} ({})", p.name, p.unit)).collect();
+    if units.is_empty() {
+        return "no parameters".to_owned();
+    }
+    units.join(", ")
+}
+
+/// `name` and the number of an effect or input, from 1.
+fn effect(index: usize, name: &str) -> Ident {
+    format_ident!("{name}{}", index + 1)
+}
+
 /// `(name1, (name2, ()))`.
-fn nested(effects: usize, name: &str) -> String {
-    (1..=effects)
-        .rev()
-        .fold("()".to_owned(), |chain, i| format!("({name}{i}, {chain})"))
+fn nested(effects: usize, name: &str) -> TokenStream {
+    (0..effects).rev().fold(quote!(()), |chain, i| {
+        let name = effect(i, name);
+        quote!((#name, #chain))
+    })
 }

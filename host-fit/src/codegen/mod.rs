@@ -1,18 +1,31 @@
 //! Rust constants for a board from an identified model.
 //!
-//! The text is the same bytes for the same model, formatted as rustfmt would,
-//! and compiles in a `no_std` crate that depends on `model-core` only. Numbers
-//! are the nearest `f32`, written as short as they can be read back.
+//! The text is the same bytes for the same model and compiles in a `no_std`
+//! crate that depends on `model-core` only. Numbers are the nearest `f32`,
+//! written as short as they can be read back. Whatever the model has, the file
+//! exports the same names, so that firmware compiles against any:
+//!
+//! | name | is |
+//! |---|---|
+//! | `Identified`, `model()` | the model |
+//! | `IdentifiedState`, `state(&model)` | what it remembers, at rest |
+//! | `Outputs`, `OUTPUTS`, `Jets`, `JETS` | its memories and their lengths, samples |
+//! | `CHANNELS`, `REFERENCES` | measured channels, and what they usually are |
+//! | `SAMPLE_PERIOD_S`, `WINDOW`, `READINGS` | period, averaging window, readings to average |
+//! | `Law`, `LAW`, `LOOK_AHEAD` | the designed law; `()` for none |
+//! | `CHECKSUM`, `GOLDEN`, `LAW_GOLDEN` | what a board checks before it trusts them |
 
+pub mod board;
+mod delay;
 mod items;
 mod law;
-mod layout;
 
-use crate::model::{Added, Delay, Model};
+use crate::model::{Added, Delay, Footprint, Model};
 use model_core::control::tracking::Unusable;
 use model_core::effect::Spec;
 use model_core::self_test;
-use std::fmt::Write as _;
+use proc_macro2::{Literal, TokenStream};
+use quote::quote;
 use thiserror::Error;
 
 /// Expected values in the golden run.
@@ -54,6 +67,15 @@ pub enum CodegenError {
     /// The designed law does not fit the model.
     #[error("the designed law does not fit the model: {0}; run `host-fit design` again")]
     Law(#[from] Unusable),
+    /// What was written is no Rust.
+    #[error(
+        "the generated Rust cannot be parsed: {problem}. This is a fault of the tool; \
+         report it with the model file."
+    )]
+    Malformed {
+        /// What the parser says.
+        problem: String,
+    },
 }
 
 /// The generated file `identified.rs` for `model`.
@@ -62,22 +84,30 @@ pub enum CodegenError {
 /// A number beyond `f32`, an unknown effect, or a model that is unstable.
 pub fn generate(model: &Model) -> Result<String, CodegenError> {
     check(model)?;
-    let mut out = String::new();
-    header(&mut out, model);
     let memory = model.memory();
-    let graded = memory.graded;
-    items::imports(&mut out, model, graded);
-    items::sizes(&mut out, model, &memory);
-    items::types(&mut out, model, graded)?;
-    items::coefficients(&mut out, model);
-    items::compile_time_checks(&mut out, model, graded);
-    items::constructors(&mut out, model, graded);
-    items::own_effects(&mut out, model);
-    golden(&mut out, model)?;
-    if let Some(designed) = &model.law {
-        law::items(&mut out, model, designed)?;
-    }
-    Ok(out)
+    let delays = delay::written(model);
+    let mut sections = vec![
+        header(model),
+        items::imports(&delays),
+        items::sizes(model, &memory),
+        items::types(model, &delays)?,
+        items::coefficients(model, &delays),
+        items::compile_time_checks(model, &delays),
+        items::constructors(model, &delays),
+        golden(model, &memory)?,
+        law::items(model)?,
+    ];
+    sections.extend(items::own_effects(model));
+    let sections = sections.into_iter().map(text);
+    Ok(sections.collect::<Result<Vec<_>, _>>()?.join("\n"))
+}
+
+/// Items as text, one section of the file.
+fn text(items: TokenStream) -> Result<String, CodegenError> {
+    let file = syn::parse2(items).map_err(|error| CodegenError::Malformed {
+        problem: error.to_string(),
+    })?;
+    Ok(prettyplease::unparse(&file))
 }
 
 fn check(model: &Model) -> Result<(), CodegenError> {
@@ -115,15 +145,12 @@ fn spec_of(model: &Model, added: &Added) -> Result<&'static Spec, CodegenError> 
         })
 }
 
-fn header(out: &mut String, model: &Model) {
+fn header(model: &Model) -> TokenStream {
     let training = &model.training;
+    let mut lines = Vec::new();
     let mut line = |text: String| {
-        out.push_str("//!");
-        if !text.is_empty() {
-            out.push(' ');
-            out.push_str(&text);
-        }
-        out.push('\n');
+        let space = if text.is_empty() { "" } else { " " };
+        lines.push(format!("{space}{text}"));
     };
     let tool = if training.tool_version.is_empty() {
         env!("CARGO_PKG_VERSION")
@@ -174,53 +201,44 @@ fn header(out: &mut String, model: &Model) {
         "- units: y is the normalised friction gain, u is 0 or 1, delays and lags are samples of {:?} s",
         model.sample_period_s
     ));
+    quote!(#(#![doc = #lines])*)
 }
 
 /// Checksum and golden run, by the code that the host simulates with.
-fn golden(out: &mut String, model: &Model) -> Result<(), CodegenError> {
+fn golden(model: &Model, memory: &Footprint) -> Result<TokenStream, CodegenError> {
     let prepared = model.prepare::<f32>();
-    let size = model.memory();
     // Long enough for what is sent to arrive, twice over.
-    let memory = model.longest_lag().max(model.longest_delay());
-    let every = (2 * memory).div_ceil(GOLDEN_VALUES).clamp(32, 4096) as u32;
-    let state = size.at_rest(&prepared);
+    let longest = model.longest_lag().max(model.longest_delay());
+    let every = (2 * longest).div_ceil(GOLDEN_VALUES).clamp(32, 4096) as u32;
     let mut values = Vec::with_capacity(GOLDEN_VALUES);
     let mut unstable = None;
     self_test::run(
         &prepared,
-        state,
-        &size.references(),
+        memory.at_rest(&prepared),
+        &memory.references(),
         every,
         GOLDEN_VALUES,
         |i, bits| {
             if !f32::from_bits(bits).is_finite() {
                 unstable.get_or_insert((i as u32 + 1) * every);
             }
-            values.push(format!("0x{:04x}_{:04x}", bits >> 16, bits & 0xffff));
+            values.push(items::word(bits));
         },
     );
     if let Some(samples) = unstable {
         return Err(CodegenError::Unstable { samples });
     }
-    let checksum = self_test::checksum(&prepared);
-    let _ = write!(
-        out,
-        "
-/// CRC-32 of structure and coefficients, for the start-up self-test.
-pub const CHECKSUM: u32 = 0x{:04x}_{:04x};
-/// What the model says to the golden run, bit for bit, as the host computed it.
-pub const GOLDEN: Golden<{GOLDEN_VALUES}> = Golden {{
-    every: {every},
-    expected: [
-",
-        checksum >> 16,
-        checksum & 0xffff
-    );
-    for value in values {
-        let _ = writeln!(out, "        {value},");
-    }
-    out.push_str("    ],\n};\n");
-    Ok(())
+    let checksum = items::word(self_test::checksum(&prepared));
+    let (count, every) = (items::count(GOLDEN_VALUES), Literal::u32_unsuffixed(every));
+    Ok(quote! {
+        /// CRC-32 of structure and coefficients, for the start-up self-test.
+        pub const CHECKSUM: u32 = #checksum;
+        /// What the model says to the golden run, bit for bit, as the host computed it.
+        pub const GOLDEN: Golden<#count> = Golden {
+            every: #every,
+            expected: [#(#values),*],
+        };
+    })
 }
 
 #[cfg(test)]
@@ -240,20 +258,9 @@ mod tests {
         assert_eq!(generate(&model.clone()).expect("constants"), text);
         assert_eq!(
             text,
-            include_str!("../../../firmware/identified/src/full.rs"),
+            include_str!("../../../firmware/identified/generated/full.rs"),
             "regenerate with `cargo xtask identified`"
         );
-    }
-
-    /// Numbers read back as the nearest f32, and small ones are not lost.
-    #[test]
-    fn numbers_survive_their_text() {
-        for value in [0.1, -0.0049, 1e-7, 3.2e-38, 1.0 / 3.0, -0.0, 16_777_217.0] {
-            let text = layout::number(value);
-            let read: f32 = text.parse().expect("a number");
-            assert_eq!(read.to_bits(), (value as f32).to_bits(), "{text}");
-            assert!(text.contains(['.', 'e']), "{text} is no float literal");
-        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //!
 //! It is fitted, diagnosed, simulated and generated like an effect of the
 //! catalogue: [`Definition::spec`] is its identity card, [`UserEffect`] runs it
-//! on the host, [`rust_source`] writes it for the board with the same
+//! on the host, `rust_module` writes it for the board with the same
 //! operations in the same order. `docs/user-effects.md` describes the file.
 
 mod expression;
@@ -12,7 +12,8 @@ mod program;
 mod rust;
 
 pub use interpreter::{UserEffect, UserState};
-pub use rust::{module_name, rust_source, type_name};
+pub(crate) use rust::{line_lengths, number, rust_module};
+pub use rust::{module_name, type_name};
 
 use expression::{Compiler, Fault, Meaning};
 use model_core::effect::{Needs, Parameter, Place, RustType, Spec, Starts, Unit};
@@ -854,7 +855,7 @@ update = "reading"
             if let Ok(definition) = Definition::from_toml(&source, "own.toml") {
                 let effect = UserEffect::new(definition, &[0.1_f32], &setting());
                 prop_assert_eq!(response(&effect).len(), 400);
-                prop_assert!(!rust_source(definition, &[0.1], &setting()).is_empty());
+                prop_assert!(!rust_module(definition, &[0.1], &setting()).is_empty());
             }
         }
     }

@@ -5,9 +5,10 @@ use super::interpreter::LONGEST_DELAY;
 use super::program::{Binary, Op, Register, Signal, Unary};
 use super::{Definition, UserEffect};
 use model_core::effect::{Place, Setting};
-use std::fmt::Write as _;
+use proc_macro2::{Ident, Literal, Punct, Spacing, TokenStream, TokenTree};
+use quote::{TokenStreamExt as _, format_ident, quote};
 
-/// Name of the module that [`rust_source`] writes: `user_` and the effect's name.
+/// Name of the module that [`rust_module`] writes: `user_` and the effect's name.
 #[must_use]
 pub fn module_name(effect: &str) -> String {
     format!("user_{}", effect.replace('-', "_"))
@@ -24,48 +25,75 @@ pub fn type_name(effect: &str) -> String {
     words.collect()
 }
 
+/// The `f32` nearest to `value`, written as short as it can be read back.
+pub(crate) fn number(value: f64, suffix: &str) -> TokenStream {
+    let value = value as f32;
+    let mut tokens = TokenStream::new();
+    if value.is_sign_negative() {
+        tokens.append(Punct::new('-', Spacing::Alone));
+    }
+    let text = format!("{:?}{suffix}", value.abs());
+    // What is not finite has no literal; it is refused before.
+    let literal = text.parse().unwrap_or_else(|_| Literal::f32_suffixed(0.0));
+    tokens.append(literal);
+    tokens
+}
+
 /// A module with a type that implements `model_core::Effect<f32>`, made by
 /// `new(&[f32; P], &Setting<f32>)`.
 ///
 /// Memories of delayed signals are as long as `parameters` (the definition's
 /// order and units) need them at `setting`'s sample period, so constants and
-/// module belong together. The text compiles in a `no_std` crate that depends
-/// on `model-core` only, and is laid out as rustfmt would.
-#[must_use]
-pub fn rust_source(
+/// module belong together. It compiles in a `no_std` crate that depends on
+/// `model-core` only.
+pub(crate) fn rust_module(
     definition: &'static Definition,
     parameters: &[f64],
     setting: &Setting<f32>,
-) -> String {
-    let values: Vec<f32> = parameters.iter().map(|value| *value as f32).collect();
-    let lengths = UserEffect::new(definition, &values, setting).line_lengths();
+) -> TokenStream {
     let writer = Writer {
         definition,
-        lengths,
+        lengths: line_lengths(definition, parameters, setting),
     };
     writer.module()
 }
 
-/// A struct's value as the last line of a function; short ones on one line.
-fn literal(out: &mut String, name: &str, entries: &[String]) {
-    const LONGEST_ON_A_LINE: usize = 18;
-    let joined = entries.join(", ");
-    if entries.is_empty() {
-        let _ = writeln!(out, "            {name} {{}}");
-    } else if joined.chars().count() <= LONGEST_ON_A_LINE {
-        let _ = writeln!(out, "            {name} {{ {joined} }}");
-    } else {
-        let _ = writeln!(out, "            {name} {{");
-        for entry in entries {
-            let _ = writeln!(out, "                {entry},");
-        }
-        out.push_str("            }\n");
-    }
+/// Samples that each memory of a delayed signal holds.
+pub(crate) fn line_lengths(
+    definition: &'static Definition,
+    parameters: &[f64],
+    setting: &Setting<f32>,
+) -> Vec<usize> {
+    let values: Vec<f32> = parameters.iter().map(|value| *value as f32).collect();
+    UserEffect::new(definition, &values, setting).line_lengths()
 }
 
 struct Writer {
     definition: &'static Definition,
     lengths: Vec<usize>,
+}
+
+/// A field of the effect or of its memory.
+struct Field {
+    name: Ident,
+    kind: TokenStream,
+    /// What it is made of; nothing where a result has its name.
+    value: Option<TokenStream>,
+}
+
+impl Field {
+    fn declared(&self) -> TokenStream {
+        let Self { name, kind, .. } = self;
+        quote!(#name: #kind)
+    }
+
+    fn made(&self) -> TokenStream {
+        let name = &self.name;
+        match &self.value {
+            Some(value) => quote!(#name: #value),
+            None => quote!(#name),
+        }
+    }
 }
 
 impl Writer {
@@ -95,95 +123,110 @@ impl Writer {
     }
 
     /// What an operation says at the place where it is used.
-    fn operand(&self, register: Register, preparing: bool) -> String {
-        let field = |name: String| {
+    fn operand(&self, register: Register, preparing: bool) -> TokenStream {
+        let field = |name: Ident| {
             if preparing {
-                name
+                quote!(#name)
             } else {
-                format!("self.{name}")
+                quote!(self.#name)
             }
         };
         match self.op(register) {
-            Op::Number(value) => format!("{:?}_f32", value as f32),
+            Op::Number(value) => number(value, "_f32"),
             Op::Parameter(index) => field(self.parameter(index)),
-            Op::Period if preparing => "setting.period".to_owned(),
-            Op::Period => "self.period".to_owned(),
-            Op::Reference if preparing => "setting.reference".to_owned(),
-            Op::Reference => "self.reference".to_owned(),
-            _ if self.is_once(register) => field(format!("k{register}")),
-            _ => format!("v{register}"),
+            Op::Period if preparing => quote!(setting.period),
+            Op::Period => quote!(self.period),
+            Op::Reference if preparing => quote!(setting.reference),
+            Op::Reference => quote!(self.reference),
+            _ if self.is_once(register) => field(format_ident!("k{register}")),
+            _ => {
+                let name = format_ident!("v{register}");
+                quote!(#name)
+            }
         }
     }
 
-    fn parameter(&self, index: usize) -> String {
+    fn parameter(&self, index: usize) -> Ident {
         let parameter = self.definition.spec.parameters.get(index);
-        format!("p_{}", parameter.map_or("", |parameter| parameter.name))
+        format_ident!("p_{}", parameter.map_or("", |parameter| parameter.name))
     }
 
     /// The right side of `let` for an operation on others.
-    fn right_side(&self, op: &Op, preparing: bool) -> String {
+    fn right_side(&self, op: &Op, preparing: bool) -> TokenStream {
         let of = |register: Register| self.operand(register, preparing);
         match *op {
             Op::Unary(f, x) => {
                 let x = of(x);
                 match f {
-                    Unary::Negative => format!("-{x}"),
-                    Unary::Not => format!("!{x}"),
-                    Unary::Abs => format!("Real::abs({x})"),
-                    Unary::Sqrt => format!("Real::sqrt({x})"),
-                    Unary::Exp => format!("Real::exp({x})"),
-                    Unary::Cbrt => format!("Real::cbrt({x})"),
-                    Unary::Sin => format!("Real::sin({x})"),
-                    Unary::Cos => format!("Real::cos({x})"),
+                    Unary::Negative => quote!(-#x),
+                    Unary::Not => quote!(!#x),
+                    Unary::Abs => quote!(Real::abs(#x)),
+                    Unary::Sqrt => quote!(Real::sqrt(#x)),
+                    Unary::Exp => quote!(Real::exp(#x)),
+                    Unary::Cbrt => quote!(Real::cbrt(#x)),
+                    Unary::Sin => quote!(Real::sin(#x)),
+                    Unary::Cos => quote!(Real::cos(#x)),
                 }
             }
             Op::Binary(f, x, y) => {
                 let (x, y) = (of(x), of(y));
-                let sign = match f {
-                    Binary::Min => return format!("Real::at_most({x}, {y})"),
-                    Binary::Max => return format!("Real::at_least({x}, {y})"),
-                    Binary::Add => "+",
-                    Binary::Subtract => "-",
-                    Binary::Multiply => "*",
-                    Binary::Divide => "/",
-                    Binary::Less => "<",
-                    Binary::LessOrEqual => "<=",
-                    Binary::Greater => ">",
-                    Binary::GreaterOrEqual => ">=",
-                    Binary::Equal => "==",
-                    Binary::Unequal => "!=",
-                    Binary::And => "&&",
-                    Binary::Or => "||",
-                };
-                format!("{x} {sign} {y}")
+                match f {
+                    Binary::Min => quote!(Real::at_most(#x, #y)),
+                    Binary::Max => quote!(Real::at_least(#x, #y)),
+                    Binary::Add => quote!(#x + #y),
+                    Binary::Subtract => quote!(#x - #y),
+                    Binary::Multiply => quote!(#x * #y),
+                    Binary::Divide => quote!(#x / #y),
+                    Binary::Less => quote!(#x < #y),
+                    Binary::LessOrEqual => quote!(#x <= #y),
+                    Binary::Greater => quote!(#x > #y),
+                    Binary::GreaterOrEqual => quote!(#x >= #y),
+                    Binary::Equal => quote!(#x == #y),
+                    Binary::Unequal => quote!(#x != #y),
+                    Binary::And => quote!(#x && #y),
+                    Binary::Or => quote!(#x || #y),
+                }
             }
             Op::Select {
                 condition,
                 then,
                 otherwise,
-            } => format!(
-                "if {} {{ {} }} else {{ {} }}",
-                of(condition),
-                of(then),
-                of(otherwise)
-            ),
+            } => {
+                let (condition, then, otherwise) = (of(condition), of(then), of(otherwise));
+                quote!(if #condition { #then } else { #otherwise })
+            }
             Op::State(index) => {
-                let state = self.definition.program.states.get(index);
-                format!("state.s_{}", state.map_or("", |state| state.name.as_str()))
+                let name = self.state(index);
+                quote!(state.#name)
             }
             Op::Signal(signal) => match signal {
-                Signal::Own => "signal".to_owned(),
-                Signal::Command => "at.command".to_owned(),
-                Signal::Flow => "at.flow".to_owned(),
-                Signal::Arrived => "at.arrived".to_owned(),
-                Signal::Relaxation => "flow.relaxation".to_owned(),
-                Signal::Channel => "channel.copied().unwrap_or(self.reference)".to_owned(),
-                Signal::Time => "state.clock.time(self.period)".to_owned(),
-                Signal::SinceEdge => "state.clock.since_edge(self.period)".to_owned(),
+                Signal::Own => quote!(signal),
+                Signal::Command => quote!(at.command),
+                Signal::Flow => quote!(at.flow),
+                Signal::Arrived => quote!(at.arrived),
+                Signal::Relaxation => quote!(flow.relaxation),
+                Signal::Channel => {
+                    quote!(
+                        at.channels
+                            .get(self.channel)
+                            .copied()
+                            .unwrap_or(self.reference)
+                    )
+                }
+                Signal::Time => quote!(state.clock.time(self.period)),
+                Signal::SinceEdge => quote!(state.clock.since_edge(self.period)),
             },
-            Op::Delayed { line, .. } => format!("self.tap{line}.read(&state.line{line})"),
-            Op::Number(_) | Op::Parameter(_) | Op::Period | Op::Reference => String::new(),
+            Op::Delayed { line, .. } => {
+                let (tap, line) = (format_ident!("tap{line}"), format_ident!("line{line}"));
+                quote!(self.#tap.read(&state.#line))
+            }
+            Op::Number(_) | Op::Parameter(_) | Op::Period | Op::Reference => TokenStream::new(),
         }
+    }
+
+    fn state(&self, index: usize) -> Ident {
+        let state = self.definition.program.states.get(index);
+        format_ident!("s_{}", state.map_or("", |state| state.name.as_str()))
     }
 
     /// Whether the value is the very last thing computed: it is then returned
@@ -194,44 +237,6 @@ impl Writer {
         register == program.value
             && program.states.is_empty()
             && last.is_some_and(|(last, ..)| last == register)
-    }
-
-    fn result(&self, out: &mut String, register: Register, op: &Op) {
-        if self.is_last(register) {
-            self.line(out, "", op, "", false);
-        } else {
-            self.line(out, &format!("let v{register} = "), op, ";", false);
-        }
-    }
-
-    /// An operation, broken as rustfmt breaks a long choice.
-    fn line(&self, out: &mut String, before: &str, op: &Op, after: &str, preparing: bool) {
-        const LONGEST_CHOICE: usize = 50;
-        let right = self.right_side(op, preparing);
-        match *op {
-            // As the last line of a function, a choice is always broken.
-            Op::Select {
-                condition,
-                then,
-                otherwise,
-            } if right.len() > LONGEST_CHOICE || before.is_empty() => {
-                let of = |register: Register| self.operand(register, preparing);
-                let _ = writeln!(
-                    out,
-                    "            {before}if {} {{
-                {}
-            }} else {{
-                {}
-            }}{after}",
-                    of(condition),
-                    of(then),
-                    of(otherwise)
-                );
-            }
-            _ => {
-                let _ = writeln!(out, "            {before}{right}{after}");
-            }
-        }
     }
 
     /// Whether results of `register` are needed at every sample.
@@ -252,66 +257,132 @@ impl Writer {
         self.definition.program.reads(Op::Signal(signal))
     }
 
-    /// Fields of the effect: name, type, value in `new` where it differs.
-    fn fields(&self) -> Vec<(String, String, Option<String>)> {
+    fn is_clocked(&self) -> bool {
+        self.reads(Signal::Time) || self.reads(Signal::SinceEdge)
+    }
+
+    /// Fields of the effect.
+    fn fields(&self) -> Vec<Field> {
         let mut fields = Vec::new();
-        let clocked = self.reads(Signal::Time) || self.reads(Signal::SinceEdge);
-        let (mut period, mut reference) = (clocked, self.reads(Signal::Channel));
+        let (mut period, mut reference) = (self.is_clocked(), self.reads(Signal::Channel));
         for (register, op, _) in self.ops() {
             if let Op::Delayed { line, delay, .. } = op {
-                let tap = format!(
-                    "Tap::between(Real::at_most({} / setting.period, {LONGEST_DELAY}.0_f32))",
-                    self.operand(*delay, true)
-                );
-                fields.push((format!("tap{line}"), "Tap<f32>".to_owned(), Some(tap)));
+                let delay = self.operand(*delay, true);
+                let longest = number(f64::from(LONGEST_DELAY), "_f32");
+                fields.push(Field {
+                    name: format_ident!("tap{line}"),
+                    kind: quote!(Tap<f32>),
+                    value: Some(quote! {
+                        Tap::between(Real::at_most(#delay / setting.period, #longest))
+                    }),
+                });
             }
             if !self.is_field(register) {
                 continue;
             }
-            match op {
-                Op::Period => period = true,
-                Op::Reference => reference = true,
-                _ => {
-                    let kind = if self.is_condition(register) {
-                        "bool"
-                    } else {
-                        "f32"
-                    };
-                    fields.push((self.operand(register, true), kind.to_owned(), None));
+            let kind = if self.is_condition(register) {
+                quote!(bool)
+            } else {
+                quote!(f32)
+            };
+            let name = match op {
+                Op::Period => {
+                    period = true;
+                    continue;
                 }
-            }
+                Op::Reference => {
+                    reference = true;
+                    continue;
+                }
+                Op::Parameter(index) => self.parameter(*index),
+                _ => format_ident!("k{register}"),
+            };
+            fields.push(Field {
+                name,
+                kind,
+                value: None,
+            });
         }
-        let mut setting = |name: &str, kind: &str| {
-            let value = Some(format!("setting.{name}"));
-            fields.push((name.to_owned(), kind.to_owned(), value));
+        let mut setting = |name: &str, kind: TokenStream| {
+            let name = format_ident!("{name}");
+            let value = Some(quote!(setting.#name));
+            fields.push(Field { name, kind, value });
         };
         if period {
-            setting("period", "f32");
+            setting("period", quote!(f32));
         }
         if self.reads(Signal::Channel) {
-            setting("channel", "usize");
+            setting("channel", quote!(usize));
         }
         if reference {
-            setting("reference", "f32");
+            setting("reference", quote!(f32));
         }
         fields
     }
 
-    fn module(&self) -> String {
-        let spec = &self.definition.spec;
-        let program = &self.definition.program;
-        let clocked = self.reads(Signal::Time) || self.reads(Signal::SinceEdge);
-        let mut out = String::new();
-        let (module, own) = (module_name(spec.name), type_name(spec.name));
-        let _ = writeln!(
-            out,
-            "/// {}: {}.",
-            spec.name,
-            spec.summary.trim_end_matches('.')
-        );
-        let _ = writeln!(out, "///\n/// `{}`", spec.equation);
-        let _ = writeln!(out, "pub mod {module} {{");
+    /// What it remembers.
+    fn memory(&self) -> Vec<Field> {
+        let mut memory = Vec::new();
+        if self.is_clocked() {
+            memory.push(Field {
+                name: format_ident!("clock"),
+                kind: quote!(Clock<f32>),
+                value: Some(quote!(Clock::new())),
+            });
+        }
+        for (index, state) in self.definition.program.states.iter().enumerate() {
+            memory.push(Field {
+                name: self.state(index),
+                kind: quote!(f32),
+                value: Some(number(state.start, "")),
+            });
+        }
+        for (line, length) in self.lengths.iter().enumerate() {
+            let length = Literal::usize_unsuffixed(*length);
+            memory.push(Field {
+                name: format_ident!("line{line}"),
+                kind: quote!(DelayLine<f32, #length>),
+                value: Some(quote!(DelayLine::new())),
+            });
+        }
+        memory
+    }
 
+    fn module(&self) -> TokenStream {
+        let spec = &self.definition.spec;
+        let summary = format!(" {}: {}.", spec.name, spec.summary.trim_end_matches('.'));
+        let equation = format!(" `{}`", spec.equation);
+        let module = format_ident!("{}", module_name(spec.name));
+        let own = format_ident!("{}", type_name(spec.name));
+        let imports = self.imports();
+        let (fields, memory) = (self.fields(), self.memory());
+        let declared = fields.iter().map(Field::declared);
+        let remembered = memory.iter().map(Field::declared);
+        let constructor = self.constructor(&own, &fields);
+        let effect = self.effect(&own, &memory);
+        quote! {
+            #[doc = #summary]
+            #[doc = ""]
+            #[doc = #equation]
+            pub mod #module {
+                #imports
+
+                /// Prepared for a sample period.
+                #[derive(Clone, Copy, Debug, PartialEq)]
+                pub struct #own { #(#declared),* }
+
+                /// What it remembers.
+                #[derive(Clone, Copy, Debug, PartialEq)]
+                pub struct State { #(#remembered),* }
+
+                #constructor
+                #effect
+            }
+        }
+    }
+
+    fn imports(&self) -> TokenStream {
+        let program = &self.definition.program;
         let calls = |op: &Op| {
             matches!(
                 op,
@@ -322,229 +393,199 @@ impl Writer {
                     | Op::Delayed { .. }
             )
         };
-        if program.ops.iter().any(calls) {
-            out.push_str("    use model_core::Real;\n");
-        }
-        if clocked {
-            out.push_str("    use model_core::clock::Clock;\n");
-        }
-        if program.lines > 0 {
-            out.push_str("    use model_core::delay::Tap;\n");
-        }
-        out.push_str(match spec.place {
-            Place::Flow => "    use model_core::effect::{Effect, Flow, Instant, Setting};\n",
-            Place::Jet | Place::Delay | Place::Sensor => {
-                "    use model_core::effect::{Effect, Instant, Setting};\n"
-            }
-        });
-        if program.lines > 0 {
-            out.push_str("    use model_core::history::{DelayLine, Memory};\n");
-        }
-
-        let fields = self.fields();
-        out.push_str("\n    /// Prepared for a sample period.\n");
-        out.push_str("    #[derive(Clone, Copy, Debug, PartialEq)]\n");
-        if fields.is_empty() {
-            let _ = writeln!(out, "    pub struct {own} {{}}");
-        } else {
-            let _ = writeln!(out, "    pub struct {own} {{");
-            for (name, kind, _) in &fields {
-                let _ = writeln!(out, "        {name}: {kind},");
-            }
-            out.push_str("    }\n");
-        }
-
-        let mut memory: Vec<(String, String, String)> = Vec::new();
-        if clocked {
-            let new = "Clock::new()".to_owned();
-            memory.push(("clock".to_owned(), "Clock<f32>".to_owned(), new));
-        }
-        for state in &program.states {
-            let start = format!("{:?}", state.start as f32);
-            memory.push((format!("s_{}", state.name), "f32".to_owned(), start));
-        }
-        for (line, length) in self.lengths.iter().enumerate() {
-            let kind = format!("DelayLine<f32, {length}>");
-            memory.push((format!("line{line}"), kind, "DelayLine::new()".to_owned()));
-        }
-        out.push_str("\n    /// What it remembers.\n");
-        out.push_str("    #[derive(Clone, Copy, Debug, PartialEq)]\n");
-        if memory.is_empty() {
-            out.push_str("    pub struct State {}\n");
-        } else {
-            out.push_str("    pub struct State {\n");
-            for (name, kind, _) in &memory {
-                let _ = writeln!(out, "        {name}: {kind},");
-            }
-            out.push_str("    }\n");
-        }
-        self.constructor(&mut out, &own, &fields);
-        self.effect(&mut out, &own, &memory, clocked);
-        out.push_str("}\n");
-        out
-    }
-
-    fn constructor(
-        &self,
-        out: &mut String,
-        own: &str,
-        fields: &[(String, String, Option<String>)],
-    ) {
-        let parameters = self.definition.spec.parameters;
-        let names: Vec<String> = (0..parameters.len()).map(|i| self.parameter(i)).collect();
-        // What is used only to prepare other results is not a field.
-        let is_prepared = |op: &Op, once: bool| {
-            once && !matches!(
-                op,
-                Op::Number(_) | Op::Parameter(_) | Op::Period | Op::Reference
+        let real = (program.ops.iter().any(calls)).then(|| {
+            quote!(
+                use model_core::Real;
             )
-        };
-        let reads_setting = fields
-            .iter()
-            .any(|(_, _, value)| value.as_ref().is_some_and(|v| v.contains("setting.")))
-            || self.ops().any(|(_, op, once)| {
-                is_prepared(op, once)
-                    && op
-                        .operands()
-                        .any(|r| matches!(self.op(r), Op::Period | Op::Reference))
-            });
-        let setting = if reads_setting { "setting" } else { "_setting" };
-        let first = if names.is_empty() {
-            "_parameters"
+        });
+        let clock = self.is_clocked().then(|| {
+            quote!(
+                use model_core::clock::Clock;
+            )
+        });
+        let (tap, line) = if program.lines > 0 {
+            (
+                quote!(
+                    use model_core::delay::Tap;
+                ),
+                quote!(
+                    use model_core::history::{DelayLine, Memory};
+                ),
+            )
         } else {
-            "parameters"
+            Default::default()
         };
-        let _ = write!(
-            out,
-            "
-    impl {own} {{
-        /// Prepares the effect.
-        #[must_use]
-        pub fn new({first}: &[f32; {}], {setting}: &Setting<f32>) -> Self {{
-",
-            names.len()
-        );
-        if !names.is_empty() {
-            let line = format!("            let [{}] = *parameters;", names.join(", "));
-            if line.len() <= 100 {
-                let _ = writeln!(out, "{line}");
-            } else {
-                out.push_str("            let [\n");
-                for name in &names {
-                    let _ = writeln!(out, "                {name},");
-                }
-                out.push_str("            ] = *parameters;\n");
-            }
+        let flow = (self.definition.spec.place == Place::Flow).then(|| quote!(Flow,));
+        quote! {
+            #real
+            #clock
+            #tap
+            use model_core::effect::{Effect, #flow Instant, Setting};
+            #line
         }
-        for (register, op, once) in self.ops() {
-            if is_prepared(op, once) {
-                self.line(out, &format!("let k{register} = "), op, ";", true);
-            }
-        }
-        let entries: Vec<String> = fields
-            .iter()
-            .map(|(name, _, value)| match value {
-                Some(value) => format!("{name}: {value}"),
-                None => name.clone(),
-            })
-            .collect();
-        literal(out, "Self", &entries);
-        out.push_str("        }\n    }\n");
     }
 
-    fn effect(
-        &self,
-        out: &mut String,
-        own: &str,
-        memory: &[(String, String, String)],
-        clocked: bool,
-    ) {
-        let spec = &self.definition.spec;
-        let program = &self.definition.program;
-        let _ = write!(
-            out,
-            "
-    impl Effect<f32> for {own} {{
-        type State = State;
-
-        fn start(&self) -> State {{
-"
-        );
-        let entries: Vec<String> = memory
-            .iter()
-            .map(|(name, _, start)| format!("{name}: {start}"))
-            .collect();
-        literal(out, "State", &entries);
-        out.push_str("        }\n\n");
-        let state = if memory.is_empty() { "_state" } else { "state" };
-        let signals = [
-            Signal::Command,
-            Signal::Flow,
-            Signal::Arrived,
-            Signal::Channel,
-        ];
-        let at = if clocked || signals.iter().any(|signal| self.reads(*signal)) {
-            "at"
-        } else {
-            "_at"
-        };
-        let own_signal = if self.reads(Signal::Own) {
-            "signal"
-        } else {
-            "_signal"
-        };
-        let _ = match spec.place {
-            Place::Flow => {
-                let flow = if self.reads(Signal::Relaxation) {
-                    "flow"
-                } else {
-                    "_flow"
-                };
-                write!(
-                    out,
-                    "        fn drives(&self) -> bool {{
-            true
-        }}
-
-        fn drive(&self, {state}: &mut State, {flow}: &Flow<f32>, {at}: &Instant<'_, f32>) -> f32 {{
-"
+    fn constructor(&self, own: &Ident, fields: &[Field]) -> TokenStream {
+        let count = self.definition.spec.parameters.len();
+        let names: Vec<Ident> = (0..count).map(|i| self.parameter(i)).collect();
+        let taken = (count > 0).then(|| quote!(let [#(#names),*] = *parameters;));
+        let prepared = self.ops().filter(|(_, op, once)| {
+            *once
+                && !matches!(
+                    op,
+                    Op::Number(_) | Op::Parameter(_) | Op::Period | Op::Reference
                 )
-            }
-            Place::Jet => writeln!(
-                out,
-                "        fn jet(&self, {state}: &mut State, {own_signal}: f32, {at}: &Instant<'_, f32>) -> f32 {{"
-            ),
-            Place::Sensor | Place::Delay => writeln!(
-                out,
-                "        fn sense(&self, {state}: &mut State, {own_signal}: f32, {at}: &Instant<'_, f32>) -> f32 {{"
-            ),
+        });
+        let prepared = prepared.map(|(register, op, _)| {
+            let (name, value) = (format_ident!("k{register}"), self.right_side(op, true));
+            quote!(let #name = #value;)
+        });
+        let made = fields.iter().map(Field::made);
+        let body = quote! {
+            #taken
+            #(#prepared)*
+            Self { #(#made),* }
         };
-        if clocked {
-            out.push_str("            state.clock.tick(at.command);\n");
-        }
-        for (register, op, once) in self.ops() {
-            if once {
-                continue;
+        let setting = named_if_used("setting", &body);
+        let parameters = named_if_used("parameters", &body);
+        let count = Literal::usize_unsuffixed(count);
+        quote! {
+            impl #own {
+                /// Prepares the effect.
+                #[must_use]
+                pub fn new(#parameters: &[f32; #count], #setting: &Setting<f32>) -> Self {
+                    #body
+                }
             }
-            match op {
+        }
+    }
+
+    fn effect(&self, own: &Ident, memory: &[Field]) -> TokenStream {
+        let program = &self.definition.program;
+        let remembered = memory.iter().map(Field::made);
+        let clock = self
+            .is_clocked()
+            .then(|| quote!(state.clock.tick(at.command);));
+        let each = self.ops().filter(|(_, _, once)| !once);
+        let each = each.map(|(register, op, _)| {
+            let pushed = match op {
                 Op::Delayed { line, signal, .. } => {
-                    let signal = self.operand(*signal, false);
-                    let _ = writeln!(out, "            state.line{line}.push({signal});");
+                    let (line, signal) =
+                        (format_ident!("line{line}"), self.operand(*signal, false));
+                    Some(quote!(state.#line.push(#signal);))
                 }
-                Op::Signal(Signal::Channel) => {
-                    out.push_str("            let channel = at.channels.get(self.channel);\n");
+                _ => None,
+            };
+            let value = self.right_side(op, false);
+            let result = if self.is_last(register) {
+                value
+            } else {
+                let name = format_ident!("v{register}");
+                quote!(let #name = #value;)
+            };
+            quote!(#pushed #result)
+        });
+        let updates = program.states.iter().enumerate().map(|(index, state)| {
+            let (name, value) = (self.state(index), self.operand(state.update, false));
+            quote!(state.#name = #value;)
+        });
+        let value = (!self.is_last(program.value)).then(|| self.operand(program.value, false));
+        let body = quote! {
+            #clock
+            #(#each)*
+            #(#updates)*
+            #value
+        };
+        let state = named_if_used("state", &body);
+        let at = named_if_used("at", &body);
+        let hook = match self.definition.spec.place {
+            Place::Flow => {
+                let flow = named_if_used("flow", &body);
+                quote! {
+                    fn drives(&self) -> bool {
+                        true
+                    }
+                    fn drive(
+                        &self,
+                        #state: &mut State,
+                        #flow: &Flow<f32>,
+                        #at: &Instant<'_, f32>,
+                    ) -> f32 {
+                        #body
+                    }
                 }
-                _ => {}
             }
-            self.result(out, register, op);
+            place @ (Place::Jet | Place::Sensor | Place::Delay) => {
+                let hook = format_ident!("{}", if place == Place::Jet { "jet" } else { "sense" });
+                let signal = named_if_used("signal", &body);
+                quote! {
+                    fn #hook(
+                        &self,
+                        #state: &mut State,
+                        #signal: f32,
+                        #at: &Instant<'_, f32>,
+                    ) -> f32 {
+                        #body
+                    }
+                }
+            }
+        };
+        quote! {
+            impl Effect<f32> for #own {
+                type State = State;
+                fn start(&self) -> State {
+                    State { #(#remembered),* }
+                }
+                #hook
+            }
         }
-        for state in &program.states {
-            let value = self.operand(state.update, false);
-            let _ = writeln!(out, "            state.s_{} = {value};", state.name);
+    }
+}
+
+/// An argument's name; with `_` before it where `body` does not use it.
+fn named_if_used(name: &str, body: &TokenStream) -> Ident {
+    fn uses(body: &TokenStream, name: &str) -> bool {
+        let mut before = None;
+        body.clone().into_iter().any(|token| {
+            let found = match &token {
+                // A field of that name is another thing.
+                TokenTree::Ident(ident) => ident == name && before != Some('.'),
+                TokenTree::Group(group) => uses(&group.stream(), name),
+                _ => false,
+            };
+            before = match &token {
+                TokenTree::Punct(punct) => Some(punct.as_char()),
+                _ => None,
+            };
+            found
+        })
+    }
+    if uses(body, name) {
+        format_ident!("{name}")
+    } else {
+        format_ident!("_{name}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers read back as the nearest f32, and small ones are not lost.
+    #[test]
+    fn numbers_survive_their_text() {
+        for value in [0.1, -0.0049, 1e-7, 3.2e-38, 1.0 / 3.0, -0.0, 16_777_217.0] {
+            let text = number(value, "").to_string().replace(' ', "");
+            let read: f32 = text.parse().expect("a number");
+            assert_eq!(read.to_bits(), (value as f32).to_bits(), "{text}");
+            assert!(text.contains(['.', 'e']), "{text} is no float literal");
         }
-        if !self.is_last(program.value) {
-            let _ = writeln!(out, "            {}", self.operand(program.value, false));
-        }
-        out.push_str("        }\n    }\n");
+    }
+
+    #[test]
+    fn an_argument_is_named_where_it_is_used() {
+        let body = quote!({ other.at + f(flow) });
+        assert_eq!(named_if_used("at", &body), "_at");
+        assert_eq!(named_if_used("flow", &body), "flow");
     }
 }

@@ -67,7 +67,7 @@ impl<T: Real> Foreknown<T> {
     }
 
     /// Moves on to a new present sample, whose past is `outputs`.
-    #[inline]
+    #[inline(always)]
     fn advance(&mut self, recursion: &Bilinear<'_, T>, outputs: &impl Past<T>) {
         self.present = (self.present + 1) % NEAR;
         let from = if self.complete { NEAR - 1 } else { 0 };
@@ -89,7 +89,8 @@ impl<T: Real> Default for Foreknown<T> {
 /// Runs `model` on from `state` under `input` until `enough` says so, and for at
 /// most as many samples as there is `room` for.
 ///
-/// `enough` is shown each sample ahead: its number from 0 on, what the model says,
+/// `enough` is shown each sample ahead: its number from 0 on, what the model says
+/// of the flow (no sensor is asked: its effects may cost more than all the rest),
 /// and whether an input issued from now on has arrived. `foreknown` belongs to `state`
 /// and is to be moved on by this function at every sample. What is foreseen is what
 /// [`step`](crate::step) would do, but for the last digits.
@@ -132,7 +133,9 @@ pub fn run<T, M, Y, J, const A: usize>(
         };
         // i + 1 inputs have been issued ahead: a delay of up to i meets one.
         let within = if arrived { 0 } else { i };
-        let (output, delay) = observe_delay(model, &mut ahead, input, within, (&known, NEAR));
+        let known = (&known, NEAR);
+        let (output, delay) =
+            observe_delay::<false, _, _, _, _>(model, &mut ahead, input, within, known);
         arrived |= delay <= i;
         let leaving = ahead.outputs.back(terms);
         ahead.average.lean(output.flow, leaving);

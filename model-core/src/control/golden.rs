@@ -1,17 +1,19 @@
-//! A golden run of the tracking law: whether a board decides what the host decided.
+//! Golden runs of the laws: whether a board decides what the host decided.
 
+use crate::control::pulses::{Played, Pulses};
 use crate::control::tracking::{Tracking, TrackingState};
 use crate::effect::Effect;
 use crate::history::Memory;
 use crate::model::{Parts, StateOf};
 use crate::self_test::{Crc32, command};
 
-/// What a tracking law must decide in the golden run, bit for bit.
+/// What a law must decide in the golden run, bit for bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GoldenLaw {
     /// Length of the run, samples.
     pub samples: u32,
-    /// CRC-32 over every decision, estimate, foreseen friction and bias.
+    /// CRC-32 over every decision, with a tracking law's estimate, foreseen
+    /// friction and bias.
     pub expected: u32,
 }
 
@@ -56,7 +58,22 @@ where
     Some(crc.value())
 }
 
+/// Plays `pulses` for as many samples and returns the CRC-32 of what the valve did.
+pub fn play<P: AsRef<[(u32, u32)]>>(pulses: &Pulses<P>, samples: u32) -> u32 {
+    let mut played = Played::new();
+    let valve = (0..samples).map(|_| pulses.step(&mut played));
+    valve
+        .fold(Crc32::new(), |crc, on| crc.word(on.into()))
+        .value()
+}
+
 impl GoldenLaw {
+    /// Whether `pulses` come as expected.
+    #[must_use]
+    pub fn holds_for_pulses<P: AsRef<[(u32, u32)]>>(&self, pulses: &Pulses<P>) -> bool {
+        play(pulses, self.samples) == self.expected
+    }
+
     /// Whether `law` on `model` decides what is expected, from `state` at rest
     /// with `channels` at their references.
     #[must_use]

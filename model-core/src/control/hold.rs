@@ -66,6 +66,17 @@ impl Hold {
         self.since >= times.of(self.on)
     }
 
+    /// A sample at which the valve is shut whatever its hold times say.
+    #[inline]
+    pub fn shut(&mut self) {
+        self.since = if self.on {
+            1
+        } else {
+            self.since.saturating_add(1)
+        };
+        self.on = false;
+    }
+
     /// Takes what is wanted for this sample and returns what the valve does.
     #[inline]
     pub fn pass(&mut self, times: &HoldTimes, wanted: bool) -> bool {

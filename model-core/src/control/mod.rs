@@ -15,6 +15,6 @@ pub mod tracking;
 
 pub use budget::{Air, Switches};
 pub use hold::{Hold, HoldTimes};
-pub use pulses::PulseTrain;
+pub use pulses::{PulseTrain, Pulses};
 pub use reference::{Reachable, Unreachable};
 pub use tracking::{Decision, Measurement, Tracking, TrackingState};

@@ -1,5 +1,7 @@
 //! Periodic on/off commands: what the maximising law plays.
 
+use crate::control::hold::{Hold, HoldTimes};
+
 /// `N` pulses in a period that repeats for ever.
 ///
 /// ```
@@ -49,6 +51,55 @@ impl<P: AsRef<[(u32, u32)]>> PulseTrain<P> {
     }
 }
 
+/// A pulse train behind a valve: what a board plays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pulses<P> {
+    /// What is wanted.
+    pub train: PulseTrain<P>,
+    /// What the valve can do.
+    pub hold: HoldTimes,
+}
+
+/// Where in its period a [`Pulses`] is, and what the valve does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Played {
+    at: u32,
+    hold: Hold,
+}
+
+impl Played {
+    /// At the period's beginning, the valve closed for long.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            at: 0,
+            hold: Hold::closed(),
+        }
+    }
+
+    /// A sample at which the valve is shut; the period begins anew.
+    #[inline]
+    pub fn shut(&mut self) {
+        self.at = 0;
+        self.hold.shut();
+    }
+}
+
+impl Default for Played {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<P: AsRef<[(u32, u32)]>> Pulses<P> {
+    /// The valve's position from now to the next sample.
+    #[inline]
+    pub fn step(&self, played: &mut Played) -> bool {
+        let wanted = self.train.next(&mut played.at);
+        played.hold.pass(&self.hold, wanted)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -67,6 +118,29 @@ mod tests {
             ]
         );
         assert_eq!(train.open(), (6, 10));
+    }
+
+    #[test]
+    fn the_valve_keeps_its_times_and_a_shut_one_begins_anew() {
+        let pulses = Pulses {
+            train: PulseTrain {
+                period: 6,
+                pulses: [(0, 1), (3, 2)],
+            },
+            hold: HoldTimes { on: 2, off: 1 },
+        };
+        let mut played = Played::new();
+        let mut play = |n: usize, played: &mut Played| {
+            let mut on = 0;
+            for _ in 0..n {
+                on = on << 1 | u32::from(pulses.step(played));
+            }
+            on
+        };
+        // The first pulse is too short for the valve.
+        assert_eq!(play(7, &mut played), 0b110_1101);
+        played.shut();
+        assert_eq!(play(6, &mut played), 0b11_0110);
     }
 
     #[test]

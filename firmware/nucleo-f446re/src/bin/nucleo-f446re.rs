@@ -15,8 +15,12 @@ use stm32f4xx_hal::pac::{CorePeripherals, Peripherals};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-/// The watchdog's patience: 20 samples; its own clock may be 50 % off.
-const PATIENCE_MS: u32 = 20;
+/// The watchdog's patience: 20 samples, 20 ms at least; its own clock may be 50 % off.
+const PATIENCE_MS: u32 = if on_board::PERIOD_US > 1000 {
+    20 * on_board::PERIOD_US / 1000
+} else {
+    20
+};
 
 #[entry]
 fn main() -> ! {
@@ -40,8 +44,9 @@ fn main() -> ! {
     let sampler = Sampler::start(
         chip.ADC1,
         &chip.ADC_COMMON,
-        a.pa0.into_analog(),
+        (a.pa0.into_analog(), a.pa1.into_analog()),
         chip.TIM2,
+        on_board::PERIOD_US,
         &mut rcc,
     );
     let lamp = a.pa5.into_push_pull_output();

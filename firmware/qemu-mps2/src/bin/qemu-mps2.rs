@@ -1,9 +1,10 @@
-//! The loop on QEMU's mps2-an386, with a flow that the model itself plays and
-//! faults that are injected over the serial line.
+//! The loop on QEMU's mps2-an386, with a flow that the model itself plays, a
+//! measured channel at its reference, and faults that are injected over the
+//! serial line.
 //!
 //! Lines: `arm`, `disarm`, `status`; and for the fault-injection run a digit:
 //! `0` a healthy sensor, `1` no number, `2` at the rail, `3` stuck, `4` away
-//! from the model, `5` a sample that takes longer than a period, `6` a loop that
+//! from the model, `c` a channel that gives no number, `5` a sample that takes longer than a period, `6` a loop that
 //! hangs, `7` and `8` a restart with a damaged coefficient and a damaged golden
 //! trajectory, `9` a restart with nothing damaged.
 #![no_std]
@@ -27,11 +28,11 @@ use qemu_mps2::clock::Ticks;
 use qemu_mps2::uart::Uart;
 use qemu_mps2::watchdog::{Watchdog, restarted};
 
-/// SysTick ticks in a sample of 1 ms.
-const TICKS_PER_SAMPLE: u32 = 25_000;
-/// At 32 ns an instruction.
-const TWO_AND_A_HALF_PERIODS: u32 = 78_000;
-/// The watchdog waits twice 10 ms.
+/// SysTick ticks in a sample, at 25 MHz.
+const TICKS_PER_SAMPLE: u32 = 25 * on_board::PERIOD_US;
+/// Instructions, at 32 ns each.
+const TWO_AND_A_HALF_PERIODS: u32 = TICKS_PER_SAMPLE / 2 * 5 * 40 / 32;
+/// The watchdog waits twice 10 samples.
 const PATIENCE: u32 = 10 * TICKS_PER_SAMPLE;
 
 /// What is to be damaged at the next start; RAM survives a restart.
@@ -53,18 +54,24 @@ impl Sensor for Played {
     fn counts(&mut self) -> f32 {
         let input = Input {
             command: if self.open { 1.0 } else { 0.0 },
-            channels: &[],
+            channels: &model::REFERENCES,
         };
         let y = step(&self.model, &mut self.state, &input).measured;
         self.flicker = !self.flicker;
         let noise = if self.flicker { 1.0 } else { 0.0 };
-        let healthy = SETTINGS.calibration.zero + y / SETTINGS.calibration.per_count + noise;
+        let healthy = SETTINGS.calibration.counts(y) + noise;
         match self.illness {
             b'1' => f32::NAN,
             b'2' => 4095.0,
             b'3' => 1000.0,
             b'4' => 3900.0 + noise,
             _ => healthy,
+        }
+    }
+    fn channel(&mut self) -> f32 {
+        match &SETTINGS.channel {
+            Some(channel) if self.illness != b'c' => channel.calibration.counts(channel.reference),
+            _ => f32::NAN,
         }
     }
 }
@@ -131,7 +138,7 @@ fn main() -> ! {
         }
         while let Some(byte) = uart.receive() {
             match byte {
-                b'0'..=b'4' => rig.sensor().illness = byte,
+                b'0'..=b'4' | b'c' => rig.sensor().illness = byte,
                 b'5' => cortex_m::asm::delay(TWO_AND_A_HALF_PERIODS),
                 b'6' => loop {
                     cortex_m::asm::nop();

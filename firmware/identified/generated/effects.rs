@@ -6,22 +6,18 @@
 //! - units: y is the normalised friction gain, u is 0 or 1, delays and lags are samples of 0.001 s
 
 use model_core::checks;
-use model_core::control::budget::Budget;
 use model_core::control::golden::GoldenLaw;
-use model_core::control::{Air, HoldTimes, Reachable, Switches, Tracking, TrackingState};
-use model_core::delay::ScaledDelay;
-use model_core::effect::{Physics, Setting};
-use model_core::effects::AmplitudeSaturation;
-use model_core::effects::HotFilmNonlinearity;
-use model_core::effects::StateDependentDelay;
-use model_core::effects::ValveLag;
 use model_core::frozen::{self, Frozen};
-use model_core::model::{Averaging, GradedState, Params, Parts, matrix, vector};
+use model_core::model::{Averaging, Params, State, StateOf, matrix, vector};
 use model_core::recursion::{Grading, LagConvention};
 use model_core::self_test::Golden;
 
 /// Sample period, s.
 pub const SAMPLE_PERIOD_S: f32 = 0.001;
+/// W, samples.
+pub const WINDOW: u32 = 250;
+/// Readings that are averaged before they are compared with the model.
+pub const READINGS: usize = 1;
 /// Outputs kept: more than the longest lag, and no less than the averaging window.
 pub const OUTPUTS: usize = 500;
 /// Jet strengths kept: more than the longest input delay.
@@ -30,15 +26,23 @@ pub const JETS: usize = 63;
 pub const CHANNELS: [&str; 0] = [];
 /// Usual values of the channels, in their units.
 pub const REFERENCES: [f32; 0] = [];
+/// Past outputs.
+pub type Outputs = model_core::history::DelayLine<f32, OUTPUTS>;
+/// Past jet strengths.
+pub type Jets = model_core::history::DelayLine<f32, JETS>;
 
 /// valve-lag.
-pub type Effect1 = ValveLag<f32>;
+pub type Effect1 = model_core::effects::valve_lag::ValveLag<f32>;
 /// amplitude-saturation.
-pub type Effect2 = AmplitudeSaturation<f32>;
+pub type Effect2 = model_core::effects::amplitude_saturation::AmplitudeSaturation<f32>;
 /// hot-film-nonlinearity.
-pub type Effect3 = HotFilmNonlinearity<f32>;
+pub type Effect3 = model_core::effects::hot_film_nonlinearity::HotFilmNonlinearity<f32>;
 /// The delay law.
-pub type Delay = ScaledDelay<StateDependentDelay<f32>, [f32; 1], true>;
+pub type Delay = model_core::delay::ScaledDelay<
+    model_core::effects::state_dependent_delay::StateDependentDelay<f32>,
+    [f32; 1],
+    true,
+>;
 /// The effects, in the order of the physics.
 pub type Effects = (Effect1, (Effect2, (Effect3, ())));
 /// Structure, coefficients and delay law: N1, N2, N3 as identified.
@@ -46,8 +50,14 @@ pub type Base = Params<f32, 5, 10, 1, Delay, ()>;
 /// The model: its constants are part of the code.
 pub type Identified = Frozen<Constants, Effects>;
 /// What the model remembers.
-pub type IdentifiedState = GradedState<f32, OUTPUTS, JETS, Identified>;
+pub type IdentifiedState = StateOf<f32, Identified, Outputs, Jets>;
 
+/// What lags mean.
+pub const CONVENTION: LagConvention = LagConvention::OneStep;
+/// The response to jets of part strength.
+pub const GRADING: Grading = Grading::Proportional;
+/// d, what drives the flow without jets.
+pub const CONSTANT: f32 = 0.0;
 /// τ_i, samples.
 pub const STATE_LAGS: [u16; 5] = [1, 44, 123, 479, 496];
 /// a_i.
@@ -58,7 +68,16 @@ pub const PRODUCT_LAGS: [u16; 10] = [1, 73, 242, 264, 299, 335, 414, 477, 494, 5
 pub const B: [f32; 1] = [0.008];
 /// c_j1.
 pub const C1: [f32; 10] = [
-    -0.0228, 0.0138, 0.0621, -0.0286, -0.0186, -0.0121, -0.0035, -0.0056, 0.0189, -0.0049,
+    -0.0228,
+    0.0138,
+    0.0621,
+    -0.0286,
+    -0.0186,
+    -0.0121,
+    -0.0035,
+    -0.0056,
+    0.0189,
+    -0.0049,
 ];
 /// state-dependent-delay: delay_floor (samples), delay_rise (samples), delay_rate (1/y).
 pub const DELAY_PARAMETERS: [f32; 3] = [47.35, 12.69, 20.18];
@@ -73,26 +92,20 @@ pub const EFFECT2: [f32; 1] = [0.2];
 /// hot-film-nonlinearity: king_ratio (-), king_offset (y).
 pub const EFFECT3: [f32; 2] = [1.0, 0.1];
 
-/// W, samples.
-pub const WINDOW: u32 = 250;
-/// What lags mean.
-pub const CONVENTION: LagConvention = LagConvention::OneStep;
-/// The response to jets of part strength.
-pub const GRADING: Grading = Grading::Proportional;
-/// d, what drives the flow without jets.
-pub const CONSTANT: f32 = 0.0;
-
+/// Longest time from a command to its first arrival, samples.
+pub const FIRST_ARRIVAL: usize = (checks::smallest(&DELAY_FACTORS) * DELAY_RANGE[1]
+    + 0.5) as usize;
 const _: () = {
     assert!(CONSTANT.is_finite(), "the constant is not finite");
-    assert!(checks::finite(&A), "a coefficient a is not finite");
-    assert!(checks::finite(&B), "a coefficient b is not finite");
-    assert!(checks::finite(&C1), "a coefficient c is not finite");
+    assert!(checks::finite(& A), "a coefficient a is not finite");
+    assert!(checks::finite(& B), "a coefficient b is not finite");
+    assert!(checks::finite(& C1), "a coefficient c is not finite");
     assert!(
-        OUTPUTS >= checks::outputs_for(&STATE_LAGS, CONVENTION),
+        OUTPUTS >= checks::outputs_for(& STATE_LAGS, CONVENTION),
         "a state lag reaches beyond the outputs kept"
     );
     assert!(
-        OUTPUTS >= checks::outputs_for(&PRODUCT_LAGS, CONVENTION),
+        OUTPUTS >= checks::outputs_for(& PRODUCT_LAGS, CONVENTION),
         "a product lag reaches beyond the outputs kept"
     );
     assert!(
@@ -100,7 +113,7 @@ const _: () = {
         "the averaging window reaches beyond the outputs kept"
     );
     assert!(
-        JETS > (DELAY_FACTORS[0] * DELAY_RANGE[1] + 0.5) as usize,
+        JETS >= (DELAY_FACTORS[0] * DELAY_RANGE[1] + 0.5) as usize + READINGS,
         "an input delay reaches beyond the commands kept"
     );
 };
@@ -119,8 +132,8 @@ pub const BASE: Base = Params {
     product_lags: PRODUCT_LAGS,
     b: vector(B),
     c: matrix([C1]),
-    delay: ScaledDelay {
-        law: StateDependentDelay {
+    delay: model_core::delay::ScaledDelay {
+        law: model_core::effects::state_dependent_delay::StateDependentDelay {
             floor: DELAY_PARAMETERS[0],
             rise: DELAY_PARAMETERS[1],
             rate: DELAY_PARAMETERS[2],
@@ -129,39 +142,33 @@ pub const BASE: Base = Params {
     },
     effects: (),
 };
-
 /// Where the model finds its constants.
 #[derive(Clone, Copy, Debug)]
 pub struct Constants;
-
 impl frozen::Constants<f32> for Constants {
     type Base = Base;
     const BASE: &'static Base = &BASE;
 }
-
+const SETTING: model_core::effect::Setting<f32> = model_core::effect::Setting {
+    period: SAMPLE_PERIOD_S,
+    channel: 0,
+    reference: 1.0,
+};
+fn effects() -> Effects {
+    let effect1: Effect1 = model_core::effect::Physics::new(&EFFECT1, &SETTING);
+    let effect2: Effect2 = model_core::effect::Physics::new(&EFFECT2, &SETTING);
+    let effect3: Effect3 = model_core::effect::Physics::new(&EFFECT3, &SETTING);
+    (effect1, (effect2, (effect3, ())))
+}
 /// The model, its effects prepared for the sample period.
 #[must_use]
 pub fn model() -> Identified {
     Frozen::new(effects())
 }
-
-const SETTING: Setting<f32> = Setting {
-    period: SAMPLE_PERIOD_S,
-    channel: 0,
-    reference: 1.0,
-};
-
-fn effects() -> Effects {
-    let effect1 = Effect1::new(&EFFECT1, &SETTING);
-    let effect2 = Effect2::new(&EFFECT2, &SETTING);
-    let effect3 = Effect3::new(&EFFECT3, &SETTING);
-    (effect1, (effect2, (effect3, ())))
-}
-
 /// The state at rest.
 #[must_use]
 pub fn state(model: &Identified) -> IdentifiedState {
-    model.graded_state()
+    State::at_rest(model, Outputs::new(), Jets::new())
 }
 
 /// CRC-32 of structure and coefficients, for the start-up self-test.
@@ -170,60 +177,37 @@ pub const CHECKSUM: u32 = 0xbe4d_6d44;
 pub const GOLDEN: Golden<32> = Golden {
     every: 32,
     expected: [
-        0x0000_0000,
-        0x3cd1_becc,
-        0x3e90_5a19,
-        0x3eb1_6c7e,
-        0x3ed0_92b4,
-        0x3ee8_c6bc,
-        0x3efc_012d,
-        0x3f05_bd25,
-        0x3f0b_e0fd,
-        0x3f0c_34b6,
-        0x3efc_248c,
-        0x3ee7_7665,
-        0x3ed4_b2e9,
-        0x3ec4_c482,
-        0x3eb5_072e,
-        0x3ee7_e1e5,
-        0x3f07_dc00,
-        0x3f08_451b,
-        0x3f09_7373,
-        0x3f0a_2f84,
-        0x3f0d_d629,
-        0x3f0b_df77,
-        0x3eff_c68e,
-        0x3eee_cd1c,
-        0x3ee0_241a,
-        0x3f0a_ef35,
-        0x3f1a_2ff7,
-        0x3f1f_dab8,
-        0x3f2a_2e10,
-        0x3f23_7ec1,
-        0x3f14_dcbe,
-        0x3f17_c71a,
+        0x0000_0000, 0x3cd1_becc, 0x3e90_5a19, 0x3eb1_6c7e, 0x3ed0_92b4, 0x3ee8_c6bc,
+        0x3efc_012d, 0x3f05_bd25, 0x3f0b_e0fd, 0x3f0c_34b6, 0x3efc_248c, 0x3ee7_7665,
+        0x3ed4_b2e9, 0x3ec4_c482, 0x3eb5_072e, 0x3ee7_e1e5, 0x3f07_dc00, 0x3f08_451b,
+        0x3f09_7373, 0x3f0a_2f84, 0x3f0d_d629, 0x3f0b_df77, 0x3eff_c68e, 0x3eee_cd1c,
+        0x3ee0_241a, 0x3f0a_ef35, 0x3f1a_2ff7, 0x3f1f_dab8, 0x3f2a_2e10, 0x3f23_7ec1,
+        0x3f14_dcbe, 0x3f17_c71a,
     ],
 };
 
-/// Longest time from a command to its first arrival, samples.
-pub const FIRST_ARRIVAL: usize = (checks::smallest(&DELAY_FACTORS) * DELAY_RANGE[1] + 0.5) as usize;
 /// Samples that the law looks ahead at most.
 pub const LOOK_AHEAD: usize = 78;
-/// The law: it holds the friction at its reference.
-pub const LAW: Tracking<f32> = Tracking {
+/// The kind of law: it holds the friction at its reference.
+pub type Law = model_core::control::Tracking<f32>;
+/// The law.
+pub const LAW: Law = model_core::control::Tracking {
     reference: 0.6,
-    reachable: Reachable {
+    reachable: model_core::control::Reachable {
         low: 0.0,
         high: 0.9139403,
     },
     slope: 0.002,
-    hold: HoldTimes { on: 18, off: 15 },
-    budget: Budget {
-        switches: Some(Switches {
+    hold: model_core::control::HoldTimes {
+        on: 18,
+        off: 15,
+    },
+    budget: model_core::control::budget::Budget {
+        switches: Some(model_core::control::Switches {
             samples_per_switch: 25,
             saved: 10,
         }),
-        air: Some(Air {
+        air: Some(model_core::control::Air {
             per_mille: 900,
             saved: 1000,
         }),
@@ -237,26 +221,16 @@ pub const LAW: Tracking<f32> = Tracking {
     correction_limit: 0.27418208,
     residual_limit: 0.9139403,
 };
-/// What the law remembers, its model included.
-pub type LawState = TrackingState<f32, IdentifiedState, LOOK_AHEAD>;
-
 const _: () = {
     assert!(
-        checks::law(&LAW),
+        checks::law(& LAW),
         "a constant of the law is out of range, or its reference is out of reach"
     );
     assert!(
-        LOOK_AHEAD >= checks::look_ahead(&LAW, FIRST_ARRIVAL),
+        LOOK_AHEAD >= checks::look_ahead(& LAW, FIRST_ARRIVAL),
         "the law looks ahead less far than delay, valve and half a hold time"
     );
 };
-
-/// The law and its model at rest.
-#[must_use]
-pub fn law_state(model: &Identified) -> LawState {
-    LAW.start(state(model))
-}
-
 /// What the law decides in its golden run, bit for bit, as the host computed it.
 pub const LAW_GOLDEN: GoldenLaw = GoldenLaw {
     samples: 4096,

@@ -6,16 +6,18 @@
 //! - units: y is the normalised friction gain, u is 0 or 1, delays and lags are samples of 0.001 s
 
 use model_core::checks;
-use model_core::delay::ScaledDelay;
-use model_core::effect::Setting;
-use model_core::effects::StateDependentDelay;
+use model_core::control::golden::GoldenLaw;
 use model_core::frozen::{self, Frozen};
-use model_core::model::{Averaging, GradedState, Params, Parts, matrix, vector};
+use model_core::model::{Averaging, Params, State, StateOf, matrix, vector};
 use model_core::recursion::{Grading, LagConvention};
 use model_core::self_test::Golden;
 
 /// Sample period, s.
 pub const SAMPLE_PERIOD_S: f32 = 0.001;
+/// W, samples.
+pub const WINDOW: u32 = 250;
+/// Readings that are averaged before they are compared with the model.
+pub const READINGS: usize = 1;
 /// Outputs kept: more than the longest lag, and no less than the averaging window.
 pub const OUTPUTS: usize = 500;
 /// Jet strengths kept: more than the longest input delay.
@@ -24,6 +26,10 @@ pub const JETS: usize = 63;
 pub const CHANNELS: [&str; 1] = ["temperature"];
 /// Usual values of the channels, in their units.
 pub const REFERENCES: [f32; 1] = [20.0];
+/// Past outputs.
+pub type Outputs = model_core::history::DelayLine<f32, OUTPUTS>;
+/// Past jet strengths.
+pub type Jets = model_core::history::DelayLine<f32, JETS>;
 
 /// supply-line-ringing.
 pub type Effect1 = user_supply_line_ringing::SupplyLineRinging;
@@ -32,7 +38,11 @@ pub type Effect2 = user_late_spring::LateSpring;
 /// warm-film.
 pub type Effect3 = user_warm_film::WarmFilm;
 /// The delay law.
-pub type Delay = ScaledDelay<StateDependentDelay<f32>, [f32; 1], true>;
+pub type Delay = model_core::delay::ScaledDelay<
+    model_core::effects::state_dependent_delay::StateDependentDelay<f32>,
+    [f32; 1],
+    true,
+>;
 /// The effects, in the order of the physics.
 pub type Effects = (Effect1, (Effect2, (Effect3, ())));
 /// Structure, coefficients and delay law: N1, N2, N3 as identified.
@@ -40,8 +50,14 @@ pub type Base = Params<f32, 5, 10, 1, Delay, ()>;
 /// The model: its constants are part of the code.
 pub type Identified = Frozen<Constants, Effects>;
 /// What the model remembers.
-pub type IdentifiedState = GradedState<f32, OUTPUTS, JETS, Identified>;
+pub type IdentifiedState = StateOf<f32, Identified, Outputs, Jets>;
 
+/// What lags mean.
+pub const CONVENTION: LagConvention = LagConvention::OneStep;
+/// The response to jets of part strength.
+pub const GRADING: Grading = Grading::Proportional;
+/// d, what drives the flow without jets.
+pub const CONSTANT: f32 = 0.0;
 /// τ_i, samples.
 pub const STATE_LAGS: [u16; 5] = [1, 44, 123, 479, 496];
 /// a_i.
@@ -52,7 +68,16 @@ pub const PRODUCT_LAGS: [u16; 10] = [1, 73, 242, 264, 299, 335, 414, 477, 494, 5
 pub const B: [f32; 1] = [0.008];
 /// c_j1.
 pub const C1: [f32; 10] = [
-    -0.0228, 0.0138, 0.0621, -0.0286, -0.0186, -0.0121, -0.0035, -0.0056, 0.0189, -0.0049,
+    -0.0228,
+    0.0138,
+    0.0621,
+    -0.0286,
+    -0.0186,
+    -0.0121,
+    -0.0035,
+    -0.0056,
+    0.0189,
+    -0.0049,
 ];
 /// state-dependent-delay: delay_floor (samples), delay_rise (samples), delay_rate (1/y).
 pub const DELAY_PARAMETERS: [f32; 3] = [47.35, 12.69, 20.18];
@@ -67,26 +92,20 @@ pub const EFFECT2: [f32; 3] = [0.3, 0.0213, 0.2];
 /// warm-film: sensitivity (1/K), warming_time (s).
 pub const EFFECT3: [f32; 2] = [0.03, 0.4];
 
-/// W, samples.
-pub const WINDOW: u32 = 250;
-/// What lags mean.
-pub const CONVENTION: LagConvention = LagConvention::OneStep;
-/// The response to jets of part strength.
-pub const GRADING: Grading = Grading::Proportional;
-/// d, what drives the flow without jets.
-pub const CONSTANT: f32 = 0.0;
-
+/// Longest time from a command to its first arrival, samples.
+pub const FIRST_ARRIVAL: usize = (checks::smallest(&DELAY_FACTORS) * DELAY_RANGE[1]
+    + 0.5) as usize;
 const _: () = {
     assert!(CONSTANT.is_finite(), "the constant is not finite");
-    assert!(checks::finite(&A), "a coefficient a is not finite");
-    assert!(checks::finite(&B), "a coefficient b is not finite");
-    assert!(checks::finite(&C1), "a coefficient c is not finite");
+    assert!(checks::finite(& A), "a coefficient a is not finite");
+    assert!(checks::finite(& B), "a coefficient b is not finite");
+    assert!(checks::finite(& C1), "a coefficient c is not finite");
     assert!(
-        OUTPUTS >= checks::outputs_for(&STATE_LAGS, CONVENTION),
+        OUTPUTS >= checks::outputs_for(& STATE_LAGS, CONVENTION),
         "a state lag reaches beyond the outputs kept"
     );
     assert!(
-        OUTPUTS >= checks::outputs_for(&PRODUCT_LAGS, CONVENTION),
+        OUTPUTS >= checks::outputs_for(& PRODUCT_LAGS, CONVENTION),
         "a product lag reaches beyond the outputs kept"
     );
     assert!(
@@ -94,7 +113,7 @@ const _: () = {
         "the averaging window reaches beyond the outputs kept"
     );
     assert!(
-        JETS > (DELAY_FACTORS[0] * DELAY_RANGE[1] + 0.5) as usize,
+        JETS >= (DELAY_FACTORS[0] * DELAY_RANGE[1] + 0.5) as usize + READINGS,
         "an input delay reaches beyond the commands kept"
     );
 };
@@ -113,8 +132,8 @@ pub const BASE: Base = Params {
     product_lags: PRODUCT_LAGS,
     b: vector(B),
     c: matrix([C1]),
-    delay: ScaledDelay {
-        law: StateDependentDelay {
+    delay: model_core::delay::ScaledDelay {
+        law: model_core::effects::state_dependent_delay::StateDependentDelay {
             floor: DELAY_PARAMETERS[0],
             rise: DELAY_PARAMETERS[1],
             rate: DELAY_PARAMETERS[2],
@@ -123,34 +142,24 @@ pub const BASE: Base = Params {
     },
     effects: (),
 };
-
 /// Where the model finds its constants.
 #[derive(Clone, Copy, Debug)]
 pub struct Constants;
-
 impl frozen::Constants<f32> for Constants {
     type Base = Base;
     const BASE: &'static Base = &BASE;
 }
-
-/// The model, its effects prepared for the sample period.
-#[must_use]
-pub fn model() -> Identified {
-    Frozen::new(effects())
-}
-
-const SETTING: Setting<f32> = Setting {
+const SETTING: model_core::effect::Setting<f32> = model_core::effect::Setting {
     period: SAMPLE_PERIOD_S,
     channel: 0,
     reference: 1.0,
 };
-
 fn effects() -> Effects {
-    let effect1 = Effect1::new(&EFFECT1, &SETTING);
-    let effect2 = Effect2::new(&EFFECT2, &SETTING);
-    let effect3 = Effect3::new(
+    let effect1: Effect1 = Effect1::new(&EFFECT1, &SETTING);
+    let effect2: Effect2 = Effect2::new(&EFFECT2, &SETTING);
+    let effect3: Effect3 = Effect3::new(
         &EFFECT3,
-        &Setting {
+        &model_core::effect::Setting {
             channel: 0,
             reference: REFERENCES[0],
             ..SETTING
@@ -158,12 +167,43 @@ fn effects() -> Effects {
     );
     (effect1, (effect2, (effect3, ())))
 }
-
+/// The model, its effects prepared for the sample period.
+#[must_use]
+pub fn model() -> Identified {
+    Frozen::new(effects())
+}
 /// The state at rest.
 #[must_use]
 pub fn state(model: &Identified) -> IdentifiedState {
-    model.graded_state()
+    State::at_rest(model, Outputs::new(), Jets::new())
 }
+
+/// CRC-32 of structure and coefficients, for the start-up self-test.
+pub const CHECKSUM: u32 = 0xbe4d_6d44;
+/// What the model says to the golden run, bit for bit, as the host computed it.
+pub const GOLDEN: Golden<32> = Golden {
+    every: 32,
+    expected: [
+        0x0000_0000, 0x3c4c_0fd2, 0x3e05_9abe, 0x3e1b_ba9b, 0x3e49_8153, 0x3e5e_d96d,
+        0x3e60_8803, 0x3e6f_d92f, 0x3e82_f3f5, 0x3e56_1f33, 0x3e24_0171, 0x3e17_ddd8,
+        0x3e07_d410, 0x3df5_239c, 0x3dd7_d1c4, 0x3e29_cada, 0x3e76_357f, 0x3e29_52a8,
+        0x3e5a_7b97, 0x3e56_940a, 0x3e77_b865, 0x3e50_7bc5, 0x3e26_451d, 0x3e1c_76c3,
+        0x3e12_cd3d, 0x3e49_6494, 0x3e8e_9e32, 0x3e89_44e5, 0x3eac_07d8, 0x3e84_e0ab,
+        0x3e49_25ec, 0x3e6b_9b76,
+    ],
+};
+
+/// Samples that the law looks ahead at most.
+pub const LOOK_AHEAD: usize = 1;
+/// The kind of law: none was designed.
+pub type Law = ();
+/// No law was designed.
+pub const LAW: Law = ();
+/// What the law decides in its golden run, bit for bit, as the host computed it.
+pub const LAW_GOLDEN: GoldenLaw = GoldenLaw {
+    samples: 4096,
+    expected: 0x0000_0000,
+};
 
 /// supply-line-ringing: the air in the supply line rings when the valves open.
 ///
@@ -172,7 +212,6 @@ pub mod user_supply_line_ringing {
     use model_core::Real;
     use model_core::clock::Clock;
     use model_core::effect::{Effect, Instant, Setting};
-
     /// Prepared for a sample period.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SupplyLineRinging {
@@ -181,13 +220,11 @@ pub mod user_supply_line_ringing {
         k11: f32,
         period: f32,
     }
-
     /// What it remembers.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct State {
         clock: Clock<f32>,
     }
-
     impl SupplyLineRinging {
         /// Prepares the effect.
         #[must_use]
@@ -202,16 +239,11 @@ pub mod user_supply_line_ringing {
             }
         }
     }
-
     impl Effect<f32> for SupplyLineRinging {
         type State = State;
-
         fn start(&self) -> State {
-            State {
-                clock: Clock::new(),
-            }
+            State { clock: Clock::new() }
         }
-
         fn jet(&self, state: &mut State, signal: f32, at: &Instant<'_, f32>) -> f32 {
             state.clock.tick(at.command);
             let v0 = signal;
@@ -238,7 +270,6 @@ pub mod user_late_spring {
     use model_core::delay::Tap;
     use model_core::effect::{Effect, Flow, Instant, Setting};
     use model_core::history::{DelayLine, Memory};
-
     /// Prepared for a sample period.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct LateSpring {
@@ -249,7 +280,6 @@ pub mod user_late_spring {
         k35: f32,
         period: f32,
     }
-
     /// What it remembers.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct State {
@@ -257,7 +287,6 @@ pub mod user_late_spring {
         s_level: f32,
         line0: DelayLine<f32, 23>,
     }
-
     impl LateSpring {
         /// Prepares the effect.
         #[must_use]
@@ -277,10 +306,8 @@ pub mod user_late_spring {
             }
         }
     }
-
     impl Effect<f32> for LateSpring {
         type State = State;
-
         fn start(&self) -> State {
             State {
                 clock: Clock::new(),
@@ -288,12 +315,15 @@ pub mod user_late_spring {
                 line0: DelayLine::new(),
             }
         }
-
         fn drives(&self) -> bool {
             true
         }
-
-        fn drive(&self, state: &mut State, flow: &Flow<f32>, at: &Instant<'_, f32>) -> f32 {
+        fn drive(
+            &self,
+            state: &mut State,
+            flow: &Flow<f32>,
+            at: &Instant<'_, f32>,
+        ) -> f32 {
             state.clock.tick(at.command);
             let v0 = state.s_level;
             let v2 = at.flow;
@@ -340,7 +370,6 @@ pub mod user_late_spring {
 pub mod user_warm_film {
     use model_core::Real;
     use model_core::effect::{Effect, Instant, Setting};
-
     /// Prepared for a sample period.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct WarmFilm {
@@ -349,13 +378,11 @@ pub mod user_warm_film {
         channel: usize,
         reference: f32,
     }
-
     /// What it remembers.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct State {
         s_film: f32,
     }
-
     impl WarmFilm {
         /// Prepares the effect.
         #[must_use]
@@ -373,18 +400,14 @@ pub mod user_warm_film {
             }
         }
     }
-
     impl Effect<f32> for WarmFilm {
         type State = State;
-
         fn start(&self) -> State {
             State { s_film: 20.0 }
         }
-
         fn sense(&self, state: &mut State, signal: f32, at: &Instant<'_, f32>) -> f32 {
             let v7 = state.s_film;
-            let channel = at.channels.get(self.channel);
-            let v8 = channel.copied().unwrap_or(self.reference);
+            let v8 = at.channels.get(self.channel).copied().unwrap_or(self.reference);
             let v9 = v8 - v7;
             let v10 = v9 * self.k6;
             let v11 = v7 + v10;
@@ -398,44 +421,3 @@ pub mod user_warm_film {
         }
     }
 }
-
-/// CRC-32 of structure and coefficients, for the start-up self-test.
-pub const CHECKSUM: u32 = 0xbe4d_6d44;
-/// What the model says to the golden run, bit for bit, as the host computed it.
-pub const GOLDEN: Golden<32> = Golden {
-    every: 32,
-    expected: [
-        0x0000_0000,
-        0x3c4c_0fd2,
-        0x3e05_9abe,
-        0x3e1b_ba9b,
-        0x3e49_8153,
-        0x3e5e_d96d,
-        0x3e60_8803,
-        0x3e6f_d92f,
-        0x3e82_f3f5,
-        0x3e56_1f33,
-        0x3e24_0171,
-        0x3e17_ddd8,
-        0x3e07_d410,
-        0x3df5_239c,
-        0x3dd7_d1c4,
-        0x3e29_cada,
-        0x3e76_357f,
-        0x3e29_52a8,
-        0x3e5a_7b97,
-        0x3e56_940a,
-        0x3e77_b865,
-        0x3e50_7bc5,
-        0x3e26_451d,
-        0x3e1c_76c3,
-        0x3e12_cd3d,
-        0x3e49_6494,
-        0x3e8e_9e32,
-        0x3e89_44e5,
-        0x3eac_07d8,
-        0x3e84_e0ab,
-        0x3e49_25ec,
-        0x3e6b_9b76,
-    ],
-};

@@ -1,0 +1,223 @@
+//! Whether the boards of this project can run a model.
+
+use super::items::{buffer, setting};
+use crate::model::{Law, Model};
+use crate::user_effect::line_lengths;
+use model_core::effect::RustType;
+use thiserror::Error;
+
+/// RAM of a board that loop and law may take, bytes: 128 KiB but for log, serial
+/// line and calls. `firmware/src/on_board.rs` has the same numbers.
+const FREE: usize = (128 - 8) * 1024;
+/// How often the loop is in memory at the start: itself, a copy while it is
+/// built, and as much for the self-test.
+const COPIES: usize = 4;
+/// Sample periods that the boards' timers and watchdogs are good for, s.
+const PERIODS: [f64; 2] = [2e-4, 0.1];
+
+/// Why a board cannot run a model.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum BoardError {
+    /// There is nothing to run.
+    #[error(
+        "key `law`: the model has no law, and a board runs one. \
+         Run `host-fit design` on it and take the file that it writes."
+    )]
+    NoLaw,
+    /// More measured channels than converters.
+    #[error(
+        "key `effect`: the model's effects need the measured channels {names}, and the board has one \
+         spare input (A1). Leave out an effect, or give the board one channel."
+    )]
+    Channels {
+        /// The channels.
+        names: String,
+    },
+    /// The timers do not go so fast or so slow.
+    #[error(
+        "key `sample_period_s`: the board samples every 0.2 to 100 ms, not every {period} s. \
+         Identify the model from records of another period."
+    )]
+    Period {
+        /// The model's, s.
+        period: f64,
+    },
+    /// Too much to remember.
+    #[error(
+        "key `{key}`: the model keeps {kept} samples for it, and with the law the loop takes \
+         {bytes} bytes of the {most} that fit the board. {remedy}"
+    )]
+    Memory {
+        /// What most of it is for.
+        key: String,
+        /// How many samples that are.
+        kept: usize,
+        /// What the loop takes.
+        bytes: usize,
+        /// What it may take.
+        most: usize,
+        /// What to do.
+        remedy: &'static str,
+    },
+}
+
+/// A memory of a model: who needs it, its length in samples, its bytes.
+type Part = (String, usize, usize, &'static str);
+
+/// Says whether the boards can run `model` with its law.
+///
+/// # Errors
+/// The key of the model file that is at fault, and what to do.
+pub fn check(model: &Model) -> Result<(), BoardError> {
+    let Some(law) = &model.law else {
+        return Err(BoardError::NoLaw);
+    };
+    let period = model.sample_period_s;
+    if !(PERIODS[0]..=PERIODS[1]).contains(&period) {
+        return Err(BoardError::Period { period });
+    }
+    let memory = model.memory();
+    if memory.channels.len() > 1 {
+        let names = memory.channels.iter().map(|c| format!("`{}`", c.name));
+        let names = names.collect::<Vec<_>>().join(", ");
+        return Err(BoardError::Channels { names });
+    }
+    let parts = parts(model);
+    let state: usize = parts.iter().map(|(_, _, bytes, _)| bytes).sum();
+    // The law's own model and the one beside it.
+    let bytes = match law {
+        Law::Track(track) => 2 * state + 12 * usize::from(track.look_ahead),
+        Law::Maximise(_) => state + 8 * model.averaging.window as usize,
+    };
+    let most = FREE / COPIES;
+    if bytes <= most {
+        return Ok(());
+    }
+    let largest = parts.into_iter().max_by_key(|(_, _, bytes, _)| *bytes);
+    let (key, kept, _, remedy) = largest.unwrap_or_default();
+    Err(BoardError::Memory {
+        key,
+        kept,
+        bytes,
+        most,
+        remedy,
+    })
+}
+
+fn parts(model: &Model) -> Vec<Part> {
+    let memory = model.memory();
+    let longest = |lags: &[u16]| lags.iter().copied().max().unwrap_or(0);
+    let outputs = if memory.outputs <= model.averaging.window as usize {
+        "structure.window"
+    } else if longest(&model.state_lags) >= longest(&model.product_lags) {
+        "structure.state_lags"
+    } else {
+        "structure.product_lags"
+    };
+    let jets = if memory.graded {
+        8 * memory.jets
+    } else {
+        4 * memory.words()
+    };
+    let shorter = "Identify it again with a shorter `--max-lag`.";
+    let mut parts = vec![
+        (
+            outputs.to_owned(),
+            memory.outputs,
+            8 * memory.outputs,
+            shorter,
+        ),
+        (
+            "delay".to_owned(),
+            memory.jets,
+            jets,
+            "Only a model with a shorter delay, or one at a longer sample period, fits.",
+        ),
+    ];
+    for added in &model.effects {
+        let samples = match model.definition(&added.name) {
+            Some(definition) => {
+                let setting = setting(model, added);
+                let lengths = line_lengths(definition, &added.parameters, &setting);
+                lengths.into_iter().sum()
+            }
+            None => match model.spec(&added.name).map(|spec| spec.rust_type) {
+                Some(RustType::Buffer(time)) => buffer(model, added, time),
+                _ => 0,
+            },
+        };
+        parts.push((
+            format!("effect.{}", added.name),
+            samples,
+            8 * samples,
+            "Only a model without this effect, or with a shorter delay in it, fits.",
+        ));
+    }
+    parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Delay;
+
+    fn full() -> Model {
+        let text = include_str!("../../../firmware/identified/models/full.toml");
+        Model::from_toml(text, "full.toml").expect("a model file")
+    }
+
+    #[test]
+    fn what_a_board_runs_is_let_through() {
+        assert_eq!(check(&full()), Ok(()));
+        let text = include_str!("../../../firmware/identified/models/averaged.toml");
+        let averaged = Model::from_toml(text, "averaged.toml").expect("a model file");
+        assert_eq!(check(&averaged), Ok(()));
+    }
+
+    #[test]
+    fn what_it_cannot_run_is_refused_with_key_and_remedy() {
+        let refused = |change: &dyn Fn(&mut Model), words: [&str; 2]| {
+            let mut model = full();
+            change(&mut model);
+            let error = check(&model).expect_err("refused").to_string();
+            for word in words {
+                assert!(error.contains(word), "{error}");
+            }
+        };
+        refused(&|model| model.law = None, ["`law`", "host-fit design"]);
+        refused(
+            &|model| model.sample_period_s = 1.0,
+            ["`sample_period_s`", "Identify"],
+        );
+        refused(
+            &|model| model.product_lags[9] = 5000,
+            ["`structure.product_lags`", "--max-lag"],
+        );
+        refused(
+            &|model| model.state_lags[4] = 5000,
+            ["`structure.state_lags`", "5000 samples"],
+        );
+        refused(
+            &|model| {
+                let spec = model_core::effects::spec("plenum-droop").expect("in the catalogue");
+                model.add(spec, &[1.0, 1.0], None);
+                model.delay = Delay::Fixed { delays: vec![9000] };
+            },
+            ["`delay`", "shorter delay"],
+        );
+        refused(
+            &|model| {
+                for channel in ["u_inf", "temperature"] {
+                    model.effects.push(crate::model::Added {
+                        name: "free-stream-variation".to_owned(),
+                        parameters: vec![-1.0],
+                        channel: Some(channel.to_owned()),
+                        reference: Some(10.0),
+                    });
+                }
+            },
+            ["`u_inf`, `temperature`", "one"],
+        );
+    }
+}

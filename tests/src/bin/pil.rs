@@ -1,0 +1,154 @@
+//! `cargo xtask pil` calls this: once for the constants that the board is to be
+//! built with, and once, with the board's program, for the run in lockstep.
+
+use anyhow::{Context, Result};
+use clap::Parser;
+use host_fit::model::Model;
+use scenarios::lockstep::{Case, Link, Measured, cases, run_case};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// QEMU's SysTick under `-icount shift=5`: 40 ns a tick, 32 ns an instruction.
+const INSTRUCTIONS_PER_TICK: f64 = 1.25;
+
+/// The processor in the loop.
+#[derive(Parser)]
+enum Task {
+    /// Writes the constants of all cases.
+    Constants {
+        /// Where to.
+        folder: PathBuf,
+        /// This model instead of the usual cases.
+        #[arg(long)]
+        model: Option<PathBuf>,
+    },
+    /// Runs the cases.
+    Run {
+        /// This model instead of the usual cases.
+        #[arg(long)]
+        model: Option<PathBuf>,
+        /// A board at this serial device; else the command behind `--` starts QEMU.
+        #[arg(long)]
+        serial: Option<String>,
+        /// Steps of every case.
+        #[arg(long)]
+        steps: Option<usize>,
+        /// Every so many bytes one is left out, to show that it is noticed; 0 never.
+        #[arg(long, default_value_t = 997)]
+        lose: usize,
+        /// Only this case.
+        #[arg(long)]
+        case: Option<String>,
+        /// Where to write what was measured, for `firmware/budgets.toml`.
+        #[arg(long)]
+        report: PathBuf,
+        /// The command that starts QEMU.
+        #[arg(last = true)]
+        qemu: Vec<String>,
+    },
+}
+
+fn main() -> Result<()> {
+    match Task::parse() {
+        Task::Constants { folder, model } => cases::write(&chosen(model)?, &folder),
+        Task::Run {
+            model,
+            serial,
+            steps,
+            lose,
+            case,
+            report,
+            qemu,
+        } => {
+            let mut cases = chosen(model)?;
+            for case in &mut cases {
+                case.steps = steps.unwrap_or(case.steps);
+            }
+            // A real board counts the cycles of its core.
+            let (link, per_tick, unit) = match &serial {
+                Some(device) => (Link::serial(device, lose)?, 1.0, "cycles"),
+                None => (
+                    Link::qemu(&qemu, lose)?,
+                    INSTRUCTIONS_PER_TICK,
+                    "instructions",
+                ),
+            };
+            let text = run(link, &cases, case.as_deref(), (per_tick, unit))?;
+            std::fs::write(&report, text).with_context(|| report.display().to_string())
+        }
+    }
+}
+
+fn chosen(model: Option<PathBuf>) -> Result<Vec<Case>> {
+    match model {
+        None => cases::all(),
+        Some(path) => Ok(vec![Case::new("on_board", Model::load(&path)?)]),
+    }
+}
+
+/// Runs all cases and prints the table; gives the report.
+fn run(
+    mut link: Link,
+    cases: &[Case],
+    only: Option<&str>,
+    (per_tick, unit): (f64, &str),
+) -> Result<String> {
+    let started = Instant::now();
+    let mut means = BTreeMap::new();
+    let (mut stack, mut base) = (0, None);
+    println!(
+        "{:<30} {:>6} {:>8} {:>6} {:>7} {:>7}  law, effects",
+        "equal bit for bit", "steps", "switches", "y", "mean", "most"
+    );
+    let chosen = |case: &Case| only.is_none_or(|only| only == case.name);
+    for (number, case) in cases.iter().enumerate().filter(|(_, case)| chosen(case)) {
+        let measured = run_case(&mut link, u8::try_from(number)?, case)?;
+        let Measured { report, .. } = &measured;
+        let mean = report.ticks as f64 * per_tick / f64::from(report.steps.max(1));
+        println!(
+            "{:<30} {:>6} {:>8} {:>6.3} {:>7.0} {:>7.0}  {}",
+            case.name,
+            report.steps,
+            measured.switches,
+            measured.friction,
+            mean,
+            f64::from(report.most) * per_tick,
+            words(&case.model),
+        );
+        if base.is_none() || case.name == "base" {
+            base = Some(mean);
+        }
+        stack = report.stack;
+        means.insert(&case.name, mean);
+    }
+    println!(
+        "link: {} bytes lost on purpose, {} requests repeated, none slipped; {:.1} s",
+        link.lost,
+        link.repeated,
+        started.elapsed().as_secs_f64()
+    );
+    println!("{unit}_per_step: {:.0}", base.unwrap_or(f64::NAN));
+    println!("stack_bytes: {stack}");
+    let mut text = format!("stack_bytes = {stack}\n\n[instructions_per_step]\n");
+    for (name, mean) in means {
+        text.push_str(&format!("{name} = {mean:.1}\n"));
+    }
+    Ok(text)
+}
+
+fn words(model: &Model) -> String {
+    use host_fit::model::Law;
+    let law = match &model.law {
+        None => "relay",
+        Some(Law::Track(_)) => "tracking",
+        Some(Law::Maximise(_)) => "pulses",
+    };
+    let averaged = if model.averaging.averaged_model {
+        ", averaged model"
+    } else {
+        ""
+    };
+    let effects = model.effect_names();
+    format!("{law}{averaged}; {}", effects.join(", "))
+}

@@ -1,0 +1,213 @@
+//! The models that a board runs in lockstep: base, averaged, laws, a user's own
+//! effects, and every effect of the catalogue by itself.
+
+use anyhow::{Context, Result};
+use host_fit::codegen::generate;
+use host_fit::design::{TrackRequest, track};
+use host_fit::model::{Law, Model};
+use model_core::effect::{Place, Spec};
+use model_core::effects::SPECS;
+use std::path::Path;
+
+/// Steps of the cases that budgets are for, and of the many others.
+const LONG: usize = 20_000;
+const SHORT: usize = 3_000;
+
+macro_rules! bundled {
+    ($name:literal) => {
+        include_str!(concat!(
+            "../../../firmware/identified/models/",
+            $name,
+            ".toml"
+        ))
+    };
+}
+
+/// A model on the board.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// Name of its module on the board.
+    pub name: String,
+    /// The model, its law with it.
+    pub model: Model,
+    /// Steps to make.
+    pub steps: usize,
+}
+
+impl Case {
+    /// A case that is judged over a long run.
+    #[must_use]
+    pub fn new(name: &str, model: Model) -> Self {
+        Self {
+            name: name.to_owned(),
+            model,
+            steps: LONG,
+        }
+    }
+
+    fn short(self) -> Self {
+        Self {
+            steps: SHORT,
+            ..self
+        }
+    }
+}
+
+/// All cases, in the order of their numbers on the board.
+///
+/// # Errors
+/// A bundled model file that cannot be read, or no law for one.
+pub fn all() -> Result<Vec<Case>> {
+    let read = |text, name| Model::from_toml(text, name).map_err(anyhow::Error::from);
+    let full = read(bundled!("full"), "full.toml")?;
+    let base = Model {
+        law: None,
+        ..full.clone()
+    };
+    let with = |name: &str| {
+        let spec = SPECS.iter().find(|spec| spec.name == name);
+        spec.map(|spec| with_effect(&base, spec))
+            .with_context(|| format!("no effect `{name}`"))
+    };
+    let mut cases = vec![
+        Case::new("base", base.clone()),
+        // The boards' own model has this name.
+        Case::new("full", full),
+        Case::new("averaged", read(bundled!("averaged"), "averaged.toml")?),
+        Case::new(
+            "law_jet_flow_sensor",
+            read(bundled!("effects"), "effects.toml")?,
+        )
+        .short(),
+        Case::new("law_jet", designed(with("plenum-droop")?)?).short(),
+        Case::new("law_sensor", designed(with("hot-film-lag")?)?).short(),
+        Case::new("own_effects", read(bundled!("own"), "own.toml")?).short(),
+    ];
+    for spec in SPECS {
+        let name = format!("effect_{}", spec.name.replace('-', "_"));
+        cases.push(Case::new(&name, with_effect(&base, spec)).short());
+    }
+    // As the board counts them.
+    cases.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(cases)
+}
+
+/// `base` with an effect at the first of its usual values. Its natural flow is a
+/// little below 0, for the effects that tell signs apart.
+fn with_effect(base: &Model, spec: &'static Spec) -> Model {
+    let mut model = slightly_negative(base);
+    let values: Vec<f64> = spec
+        .parameters
+        .iter()
+        .map(|parameter| parameter.starts.first().copied().unwrap_or(parameter.low))
+        .collect();
+    let reference = spec.channel.map(|_| 10.0);
+    model.add(spec, &values, reference);
+    model
+}
+
+fn slightly_negative(base: &Model) -> Model {
+    Model {
+        constant: -6e-4,
+        ..base.clone()
+    }
+}
+
+/// `model` with a law that holds half its friction.
+fn designed(mut model: Model) -> Result<Model> {
+    let request = TrackRequest {
+        target: 0.5,
+        min_on_s: 0.02,
+        min_off_s: 0.02,
+        switches_per_s: None,
+        air: None,
+        ramp_per_s: None,
+        least_air: false,
+    };
+    model.law = Some(Law::Track(track(&model, &request)?.law));
+    Ok(model)
+}
+
+/// Writes the constants of `cases` into `folder`, which must be there, and
+/// removes those of others.
+///
+/// # Errors
+/// A model that has no constants, or a folder that takes no files.
+pub fn write(cases: &[Case], folder: &Path) -> Result<()> {
+    for file in std::fs::read_dir(folder).with_context(|| folder.display().to_string())? {
+        let path = file?.path();
+        let of_case = |case: &Case| path.file_stem() == Some(case.name.as_ref());
+        if path.extension().is_some_and(|kind| kind == "rs") && !cases.iter().any(of_case) {
+            std::fs::remove_file(&path).with_context(|| path.display().to_string())?;
+        }
+    }
+    for case in cases {
+        let text = generate(&case.model).with_context(|| case.name.clone())?;
+        let path = folder.join(&case.name).with_extension("rs");
+        // Only what changed is compiled anew.
+        if std::fs::read_to_string(&path).ok().as_deref() != Some(&text) {
+            std::fs::write(&path, text).with_context(|| path.display().to_string())?;
+        }
+    }
+    Ok(())
+}
+
+/// The effects that a model has, by place.
+#[must_use]
+pub fn places(model: &Model) -> Vec<(String, Option<Place>)> {
+    let names = model.effect_names().into_iter();
+    names
+        .map(|name| {
+            let place = model.spec(&name).map(|spec| spec.place);
+            (name, place)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    /// What a model predicts to readings that make a relay blow most of the time.
+    fn predictions(model: &Model) -> Vec<u32> {
+        let mut step = crate::lockstep::host::steps(model);
+        let readings =
+            (0..3000_u16).map(|k| (if k % 150 < 120 { 900 } else { 2500 }, 2000 + k % 300));
+        readings
+            .map(|(counts, channel)| step(counts, channel).0.to_bits())
+            .collect()
+    }
+
+    /// A lockstep run of an effect that does nothing would show nothing.
+    #[test]
+    fn every_effect_changes_what_its_model_predicts() {
+        let cases = all().expect("cases");
+        let base = cases.iter().find(|case| case.name == "base");
+        let bare = predictions(&slightly_negative(&base.expect("a base").model));
+        for case in cases.iter().filter(|case| case.name.starts_with("effect_")) {
+            assert_ne!(predictions(&case.model), bare, "{}", case.name);
+        }
+    }
+
+    #[test]
+    fn every_effect_and_every_kind_of_law_is_there() {
+        let cases = all().expect("cases");
+        let met: BTreeSet<String> = cases
+            .iter()
+            .flat_map(|case| case.model.effect_names())
+            .collect();
+        for spec in SPECS {
+            assert!(met.contains(spec.name), "{} is in no case", spec.name);
+        }
+        let law_at = |place: Place| {
+            cases.iter().any(|case| {
+                matches!(case.model.law, Some(Law::Track(_)))
+                    && places(&case.model).iter().any(|(_, at)| *at == Some(place))
+            })
+        };
+        assert!(law_at(Place::Jet) && law_at(Place::Sensor));
+        assert!(cases.iter().any(|case| case.model.averaging.averaged_model));
+        assert!(cases.iter().any(|case| !case.model.definitions.is_empty()));
+    }
+}

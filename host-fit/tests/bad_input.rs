@@ -217,6 +217,66 @@ fn the_program_exits_1_on_bad_data_2_on_bad_usage_and_leaves_nothing() {
     }
 }
 
+/// Records that say too little are refused with the file they are in, and a slip of an on/off command with its line.
+#[test]
+fn what_a_fit_cannot_use_is_refused_with_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("poor.csv");
+    let out = folder.path().join("model.toml");
+    let of = |rows: usize, u: &dyn Fn(usize) -> f64, y: &dyn Fn(usize) -> f64| {
+        (0..rows).fold("t,u,y\n".to_owned(), |text, k| {
+            format!("{text}{:.3},{},{}\n", k as f64 * 0.001, u(k), y(k))
+        })
+    };
+    let square = |k: usize| f64::from(u8::from(k % 40 >= 20));
+    let wave = |k: usize| (k as f64 * 0.1).sin();
+    let slip = |k: usize| if k == 30 { 2.0 } else { square(k) };
+    let (file, model) = (path.to_str().unwrap(), out.to_str().unwrap());
+    for (text, options, parts) in [
+        (of(6, &square, &wave), &[][..], ["poor.csv: ", "--"]),
+        (
+            of(60, &square, &wave),
+            &["--max-lag", "60"],
+            ["poor.csv: ", "60 samples"],
+        ),
+        (
+            of(60, &square, &wave),
+            &["--max-lag", "59"],
+            ["poor.csv: ", "60 samples"],
+        ),
+        (
+            of(40, &square, &wave),
+            &["--max-lag", "30", "--n1", "30", "--n2", "30"],
+            ["poor.csv: ", "39 equations for 61"],
+        ),
+        (
+            of(900, &|_| 1.0, &wave),
+            &[],
+            ["poor.csv: ", "the command is constant (1)"],
+        ),
+        (
+            of(900, &square, &|_| 0.25),
+            &[],
+            ["poor.csv: ", "the output is constant (0.25)"],
+        ),
+        (
+            of(900, &slip, &wave),
+            &[],
+            ["poor.csv, line 32, column `u`: u = 2", "graded"],
+        ),
+    ] {
+        fs::write(&path, text).unwrap();
+        let arguments = [&["identify", file, "-o", model], options].concat();
+        let (code, stdout, stderr) = host_fit(&arguments);
+        assert_eq!((code, stdout.as_str()), (Some(1), ""), "{stderr}");
+        assert_eq!(stderr.trim_end().lines().count(), 1, "{stderr}");
+        for part in parts {
+            assert!(stderr.contains(part), "{part}: {stderr}");
+        }
+        assert!(!out.exists());
+    }
+}
+
 #[test]
 fn json_is_one_document_and_nothing_else() {
     let folder = tempfile::tempdir().unwrap();

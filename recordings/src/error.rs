@@ -275,6 +275,11 @@ pub enum Problem {
         "u = {0} is neither 0 nor 1, but an on/off command is needed here; scale the command so that off is 0 and on is 1"
     )]
     NotOnOff(f64),
+    /// A slip in an on/off command.
+    #[error(
+        "u = {0} in a command that is otherwise 0 or 1; correct the value, or, if the input has levels in between, say so with `input = \"graded\"` in the dataset.toml of a folder"
+    )]
+    StrayInput(f64),
     /// A channel that carries the name of a column with a meaning of its own.
     #[error("this name is reserved (t, u, y, y_sd, y_min, y_max); rename the channel")]
     ReservedChannel,
@@ -289,7 +294,7 @@ pub enum Problem {
     NoRecords,
     /// `dataset.toml` does not parse, lacks a key or has one that does not exist.
     #[error(
-        "{0}; a dataset.toml has title (optional), sample_period_s, and per [[record]] name, file and use (\"identify\" or \"validate\")"
+        "{0}; a dataset.toml has title and input (optional), sample_period_s, and per [[record]] name, file and use (\"identify\" or \"validate\")"
     )]
     Manifest(String),
     /// A record's file outside the data set's folder.

@@ -18,8 +18,19 @@ struct Manifest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     title: Option<String>,
     sample_period_s: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    input: Option<Input>,
     #[serde(default)]
     record: Vec<Entry>,
+}
+
+/// What kind of command the records have, where the files say it. Where they do not, each command speaks for itself: one
+/// of 0 and 1 is on/off, any other is graded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Input {
+    OnOff,
+    Graded,
 }
 
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
@@ -48,7 +59,9 @@ impl DataSet {
             .file_stem()
             .map_or_else(|| "record".into(), |s| s.to_string_lossy().into_owned());
         let (record, origin) = Table::load(path, None)?.into_record(&name, Use::Identify)?;
-        DataSet::assemble(None, vec![record], vec![origin], &Place::file(path))
+        let set = DataSet::assemble(None, vec![record], vec![origin], &Place::file(path))?;
+        set.refuse_strays()?;
+        Ok(set)
     }
 
     /// Writes `dataset.toml` and one CSV per record into the folder `dir`, all together or not at all.
@@ -79,6 +92,8 @@ impl DataSet {
         let manifest = Manifest {
             title: self.title.clone(),
             sample_period_s: self.sample_period_s,
+            // What looks like slips was said to be none, or was put together in memory.
+            input: self.refuse_strays().is_err().then_some(Input::Graded),
             record: entries,
         };
         let text = toml::to_string(&manifest).map_err(|e| OutputError::Io {
@@ -128,7 +143,13 @@ fn load_folder(folder: &Path) -> Result<DataSet, DataError> {
         records.push(record);
         origins.push(origin);
     }
-    DataSet::assemble(manifest.title, records, origins, &place)
+    let set = DataSet::assemble(manifest.title, records, origins, &place)?;
+    match manifest.input {
+        Some(Input::OnOff) => set.require_on_off()?,
+        Some(Input::Graded) => {}
+        None => set.refuse_strays()?,
+    }
+    Ok(set)
 }
 
 /// The path of a record's file, which has to be a file inside the folder, also after following links.
@@ -295,6 +316,10 @@ mod tests {
             (entry("none.csv"), "none.csv: cannot be read"),
             (head.to_owned(), "[[record]]"),
             (
+                entry("a.csv").replace(head, &format!("{head}input = \"analog\"\n")),
+                "`analog`",
+            ),
+            (
                 format!("{}{}", entry("a.csv"), entry("a.csv").replace(head, "")),
                 "used twice",
             ),
@@ -307,6 +332,35 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let text = DataSet::load(folder.path()).unwrap_err().to_string();
         assert!(text.contains("no dataset.toml"), "{text}");
+    }
+
+    /// A slip in an on/off command is named; a set may say that it is none, and says so again when it is saved.
+    #[test]
+    fn levels_of_a_graded_input_are_no_slips() {
+        let folder = tempfile::tempdir().unwrap();
+        let slip: String = (0..60).fold("t,u,y\n".to_owned(), |text, k| {
+            let u = if k == 40 { 2 } else { k / 10 % 2 };
+            format!("{text}{:.3},{u},{}\n", f64::from(k) * 0.001, k % 7)
+        });
+        write(folder.path(), "a.csv", &slip);
+        let manifest = |input: &str| {
+            format!(
+                "sample_period_s = 0.001\n{input}[[record]]\nname = \"a\"\nfile = \"a.csv\"\nuse = \"identify\"\n"
+            )
+        };
+        let load = |input: &str| {
+            write(folder.path(), MANIFEST, &manifest(input));
+            DataSet::load(folder.path())
+        };
+        for stated in ["", "input = \"on-off\"\n"] {
+            let text = load(stated).unwrap_err().to_string();
+            assert!(text.contains("a.csv, line 42, column `u`: u = 2"), "{text}");
+        }
+        let graded = load("input = \"graded\"\n").unwrap();
+        assert_eq!(graded.records[0].u[40], 2.0);
+        let copy = folder.path().join("copy");
+        graded.save(&copy).unwrap();
+        assert_eq!(DataSet::load(&copy).unwrap().hash, graded.hash);
     }
 
     #[cfg(unix)]

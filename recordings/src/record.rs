@@ -10,6 +10,10 @@ pub(crate) const RESERVED: [&str; 6] = ["t", "u", "y", "y_sd", "y_min", "y_max"]
 /// Values beyond this are refused: their squares would not be finite.
 const LARGEST: f64 = 1e100;
 
+/// A command of 0 and 1 is on/off: when no more than this share of its samples (or a single one) is something else,
+/// those are mistakes, not levels.
+const STRAY: f64 = 0.05;
+
 /// What a record is used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -110,6 +114,19 @@ impl Record {
     #[must_use]
     pub fn is_on_off(&self) -> bool {
         self.u.iter().all(|&u| u == 0.0 || u == 1.0)
+    }
+
+    /// The first sample of an otherwise on/off command that is neither 0 nor 1. A command with levels of its own has none.
+    pub(crate) fn stray(&self) -> Option<usize> {
+        let takes = |level: f64| self.u.contains(&level);
+        let odd = |u: &f64| *u != 0.0 && *u != 1.0;
+        let count = self.u.iter().filter(|u| odd(u)).count();
+        let few = count <= 1 || count as f64 <= STRAY * self.len() as f64;
+        if takes(0.0) && takes(1.0) && few {
+            self.u.iter().position(odd)
+        } else {
+            None
+        }
     }
 
     /// Every column with its name, in the order of the file.
@@ -246,6 +263,22 @@ mod tests {
         change(&mut r);
         let here = |sample| Origin::default().place("a", sample);
         r.check(&here).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_stray_value_is_told_from_a_level() {
+        let of = |u: Vec<f64>| Record::new("a", Use::Identify, 0.001, u.clone(), u).stray();
+        let mut command: Vec<f64> = (0..200).map(|k| f64::from(k / 50 % 2)).collect();
+        assert_eq!(of(command.clone()), None);
+        command[60] = 2.0;
+        assert_eq!(of(command.clone()), Some(60));
+        command[10] = 0.5;
+        assert_eq!(of(command.clone()), Some(10));
+        // A staircase, a relay between other levels, a short command with one slip.
+        let levels = (0..200).map(|k| f64::from(k / 20) / 9.0).collect();
+        assert_eq!(of(levels), None);
+        assert_eq!(of(vec![0.0, 0.0, 2.0, 0.0]), None);
+        assert_eq!(of(vec![0.0, 1.0, 2.0, 0.0]), Some(2));
     }
 
     #[test]

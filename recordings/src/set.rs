@@ -96,6 +96,23 @@ impl DataSet {
             .map_or_else(Place::default, |origin| origin.place(name, k))
     }
 
+    /// Refuses on/off commands with values that are neither 0 nor 1.
+    ///
+    /// # Errors
+    /// [`DataError`] naming file and line (or record and sample) of the first such value.
+    pub(crate) fn refuse_strays(&self) -> Result<(), DataError> {
+        for (i, record) in self.records.iter().enumerate() {
+            if let Some(k) = record.stray() {
+                let u = record.u.get(k).copied().unwrap_or(f64::NAN);
+                return Err(self
+                    .place(i, Some(k))
+                    .in_column("u")
+                    .error(Problem::StrayInput(u)));
+            }
+        }
+        Ok(())
+    }
+
     /// Refuses data whose command is not on/off.
     ///
     /// # Errors

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use crate::data::{Record, Use};
 use crate::diagnose::ParameterEstimate;
 use crate::fit::{
-    CandidateError, Fit, FitOptions, fit, fit_with_effect, lean_base, pieces, restart_after,
+    CandidateError, Fit, FitOptions, RULES, fit, fit_with_effect, lean_base, pieces, restart_after,
 };
 use crate::model::{Model, Start};
 use crate::simulate::SimulateError;
@@ -18,9 +18,6 @@ use model_core::effect::Spec;
 use serde::Serialize;
 use strsim::levenshtein;
 use thiserror::Error;
-
-/// The lean model is kept when its error is within this factor of the other's.
-const AS_GOOD: f64 = 1.02;
 
 /// Why a model was not extended.
 #[derive(Clone, Debug, Error)]
@@ -197,7 +194,7 @@ pub fn extend(
     };
     let (fitted, structure) = match (given, lean) {
         (Ok(given), Ok(lean)) => {
-            let as_good = given.mean_square() * AS_GOOD * AS_GOOD;
+            let as_good = given.mean_square() * RULES.as_good * RULES.as_good;
             if lean.mean_square() <= as_good {
                 (lean, StructureKept::Lean)
             } else {

@@ -1,4 +1,43 @@
-//! Host side: recordings to models.
+//! From recordings of an on/off actuator and a sensor to a model with delayed inputs, to the physical effect that it
+//! lacks, to a control law and to Rust constants for a microcontroller.
+//!
+//! [`steps`] has the whole way, one function per step; each gives plain data that serialise to what the program prints:
+//!
+//! ```no_run
+//! use host_fit::data::DataSet;
+//! use host_fit::design::TrackRequest;
+//! use host_fit::steps::{self, DelayKind, DesignRequest, IdentifyRequest};
+//!
+//! let set = DataSet::load("data/hidden-ramp".as_ref())?;
+//! let lean = IdentifyRequest { n1: Some(2), n2: Some(2), ..IdentifyRequest::default() };
+//! let request = IdentifyRequest { delay: DelayKind::StateDependent, ..lean };
+//! let model = steps::identify(&set, &request, &())?.model;
+//! let compared = steps::compare(&model, &set)?;
+//! println!("{}", serde_json::to_string_pretty(&compared)?);
+//! let finding = steps::diagnose(&model, &set, &Default::default(), &())?;
+//! println!("{}. {}", finding.headline, finding.meaning);
+//! let extension = steps::extend(&model, &set, &finding.diagnosis.missing, &())?;
+//! let goal = DesignRequest::Track(TrackRequest::holding(0.7));
+//! let design = steps::design(&extension.model, &goal)?;
+//! design.model.save("controlled.toml".as_ref())?;
+//! std::fs::write("identified.rs", steps::constants(&design.model)?.text)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! The rooms, from top to bottom; each knows only those below it:
+//!
+//! | room | does |
+//! |---|---|
+//! | [`steps`] | the way, step by step, with the results as data |
+//! | [`codegen`], [`design`], [`diagnose`], [`extend`] | what is done with a model |
+//! | [`experiment`], [`power`], [`residual`] | what would tell models apart, what would have been seen, where a model fails |
+//! | [`identify`], [`delay`], [`excitation`] | what is done with recordings |
+//! | [`fit`], [`search`] | parameters by Levenberg–Marquardt on the free run, delays by mesh-adaptive direct search |
+//! | [`indicators`], [`simulate`], [`target`] | a model run over records, and judged |
+//! | [`model`], [`user_effect`] | a model and its file; effects that users define |
+//! | [`picture`] | drawings and pages of plain numbers |
+//! | [`rules`] | the thresholds of all rooms, with meaning and origin |
+//! | [`dual`], [`data`], [`output`] | derivatives, recordings, files that appear whole or not at all |
 
 pub mod codegen;
 pub mod delay;

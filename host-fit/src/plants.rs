@@ -263,15 +263,7 @@ mod tests {
     }
 
     fn proof(target: f64, seed: u64) -> Proof {
-        let request = TrackRequest {
-            target,
-            min_on_s: 0.010,
-            min_off_s: 0.010,
-            switches_per_s: None,
-            air: None,
-            ramp_per_s: None,
-            least_air: false,
-        };
+        let request = TrackRequest::holding(target);
         let model = paper();
         let law = track(&model, &request).unwrap().law;
         let plants = Plants::of(&model, seed).unwrap();

@@ -10,6 +10,7 @@ use crate::dual::Dual;
 use crate::linalg::dot;
 use crate::model::{Delay, Model, Rounding};
 use crate::picture::significant;
+use crate::rules::rules;
 use crate::simulate::{Signals, SimulateError, Simulator};
 use model_core::Output;
 use model_core::effect::{Parameter, Spec};
@@ -18,15 +19,20 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::ops::ControlFlow;
 
-/// Two-sided 5 % and 80 % power in standard deviations.
-const DEVIATIONS: f64 = 1.96 + 0.84;
-/// Longest correlation of the error, s.
-const MEMORY_S: f64 = 0.15;
+rules! {
+    /// Which amplitude of an effect would have been seen.
+    pub struct Rules in "power";
+
+    /// What is seen stands this far above its own uncertainty.
+    deviations: f64 = 1.96 + 0.84, "standard deviations", "convention: two-sided 5 % and 80 % power; held by `twice_the_amplitude_is_seen_and_a_third_is_not`";
+    /// Longest correlation of the error that is looked at.
+    memory_s: f64 = 0.15, "s", "judgement: seven correlation times of the simulated hot film";
+    /// An effect that is not linear in its amplitude is probed this often, ever nearer to the amplitude that comes out.
+    probes: usize = 3, "", "judgement";
+}
+
 /// Derivatives carried by one run.
 const CHUNK: usize = 8;
-/// An effect that is not linear in its amplitude is probed this often, ever
-/// nearer to the amplitude that comes out.
-const PROBES: usize = 3;
 
 /// The smallest amplitude that would have been seen.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -107,7 +113,7 @@ impl<'a> Bench<'a> {
             errors.push(e);
         }
         let period = records.first().map_or(1.0, |r| r.sample_period_s);
-        let lags = (MEMORY_S / period).round().clamp(1.0, 1000.0) as usize;
+        let lags = (RULES.memory_s / period).round().clamp(1.0, 1000.0) as usize;
         let n = starts.last().copied().unwrap_or(0).max(1) as f64;
         let covariance = (0..lags)
             .map(|lag| {
@@ -207,7 +213,7 @@ impl<'a> Bench<'a> {
         let first = parameters[index];
         set(&mut parameters, first);
         let mut found = None;
-        for _ in 0..PROBES {
+        for _ in 0..RULES.probes {
             let seen = self.seen(spec, &parameters, parameters[index].abs());
             found = seen;
             let Some(x) = seen else { break };
@@ -282,7 +288,7 @@ impl<'a> Bench<'a> {
                 .sum();
             variance += both * covariance * products / (norm * norm);
         }
-        let x = DEVIATIONS * variance.max(0.0).sqrt() / norm;
+        let x = RULES.deviations * variance.max(0.0).sqrt() / norm;
         x.is_finite().then_some(x)
     }
 }
@@ -365,7 +371,7 @@ mod tests {
                 .for_each(|(z, d)| *z -= along * d);
         }
         let norm = dot(&z, &z).sqrt();
-        dot(&e, &z) / norm / (x * norm / (times * x) / DEVIATIONS)
+        dot(&e, &z) / norm / (x * norm / (times * x) / RULES.deviations)
     }
 
     #[test]

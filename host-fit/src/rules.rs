@@ -1,7 +1,7 @@
 //! Rules: the thresholds by which the tool decides, each with its meaning and where its value comes from.
 //!
 //! Every room keeps its own in one structure, written with the macro [`rules!`]: what a rule means is said once, as
-//! the field's documentation, and the same words are printed by `host-fit rules` and stand in `docs/rules.md`.
+//! the field's documentation, and the same words are printed by `host-fit rules` and stand in `docs/rules.md` ([`crate::steps::rules_page`]).
 //!
 //! A rule decides something a user can see (what counts as significant, as worth saying, as diverged). What only says
 //! how a computation is carried out (block lengths of a loop, memory limits) is no rule and stays where it is used.
@@ -89,18 +89,6 @@ pub struct Rulebook {
     pub rules: Vec<Rule>,
 }
 
-/// The rules of every room, in the order in which the way of the data meets them.
-#[must_use]
-pub fn books() -> Vec<Rulebook> {
-    vec![
-        crate::excitation::RULES.book(),
-        crate::fit::RULES.book(),
-        crate::residual::RULES.book(),
-        crate::terms::RULES.book(),
-        crate::diagnose::RULES.book(),
-    ]
-}
-
 /// Writes a structure of rules, its values in force as the constant `RULES`, and its [`Rulebook`].
 ///
 /// ```ignore
@@ -165,46 +153,10 @@ pub(crate) fn words(lines: &[&str]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use std::collections::BTreeSet;
+    use super::Value;
 
     #[test]
-    fn every_rule_says_what_it_decides_and_where_its_value_comes_from() {
-        for book in books() {
-            let mut names = BTreeSet::new();
-            assert!(book.about.ends_with('.'), "{}", book.room);
-            for rule in &book.rules {
-                assert!(
-                    names.insert(&rule.name),
-                    "{} twice in {}",
-                    rule.name,
-                    book.room
-                );
-                let ends = [".", "…", ":"];
-                assert!(ends.iter().any(|e| rule.meaning.ends_with(e)), "{rule:?}");
-                assert!(!rule.calibrated.is_empty(), "{rule:?}");
-                // The name ends in the unit of a time, so that code reads right.
-                assert_eq!(rule.name.ends_with("-s"), rule.unit == "s", "{rule:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn the_words_of_a_rule_are_its_documentation() {
-        let book = crate::residual::RULES.book();
-        let least = book
-            .rules
-            .iter()
-            .find(|r| r.name == "least-excess")
-            .unwrap();
-        assert_eq!(
-            least.value,
-            Value::Number(crate::residual::RULES.least_excess)
-        );
-        assert_eq!(
-            least.meaning,
-            "… and is at least this share of the noise energy: `y_sd` is not known better."
-        );
+    fn values_read_as_they_are_written() {
         let values = [Value::from(3_usize), 0.5.into(), [0.1, 0.2].into()];
         assert_eq!(values.map(|v| v.to_string()), ["3", "0.5", "0.1, 0.2"]);
     }

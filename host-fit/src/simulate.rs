@@ -2,14 +2,21 @@
 
 use crate::data::Record;
 use crate::model::{Delay, Footprint, Model, Prepared, Rounding, Start};
+use crate::rules::rules;
 use model_core::history::{Memory, Past};
 use model_core::model::{StateOf, observe};
 use model_core::{Input, Output, Parts, Real, State};
 use std::ops::ControlFlow;
 use thiserror::Error;
 
-/// A free run whose flow exceeds this many times the measured range has diverged.
-const DIVERGED: f64 = 1e3;
+rules! {
+    /// When a free run counts as diverged.
+    pub struct Rules in "simulate";
+
+    /// A flow beyond this has diverged.
+    diverged: f64 = 1e3, "times the largest |y|", "judgement: far above any swing from which a stable run returns";
+}
+
 /// A search may move a delay law up to this many samples.
 const ROOM: usize = 1020;
 
@@ -172,7 +179,7 @@ impl<T: Real> Simulator<T> {
         mut sink: impl FnMut(usize, &Output<T>) -> ControlFlow<()>,
     ) -> Option<usize> {
         let mut state = self.state();
-        let bound = DIVERGED * signals.scale();
+        let bound = RULES.diverged * signals.scale();
         let window = self.prepared.averaging().window;
         let mut channels = vec![T::ZERO; signals.channels.len()];
         if self.start == Start::Measured {

@@ -233,7 +233,11 @@ fn what_a_fit_cannot_use_is_refused_with_its_file() {
     let slip = |k: usize| if k == 30 { 2.0 } else { square(k) };
     let (file, model) = (path.to_str().unwrap(), out.to_str().unwrap());
     for (text, options, parts) in [
-        (of(6, &square, &wave), &[][..], ["poor.csv: ", "--"]),
+        (
+            of(2, &|k| k as f64, &wave),
+            &[][..],
+            ["poor.csv: ", "1 equations for 3"],
+        ),
         (
             of(60, &square, &wave),
             &["--max-lag", "60"],

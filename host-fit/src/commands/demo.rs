@@ -97,13 +97,9 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let design = steps::design(
         &model,
         &DesignRequest::Track(TrackRequest {
-            target: TARGET,
             min_on_s: SAMPLE_PERIOD_S * f64::from(TIMES.on),
             min_off_s: SAMPLE_PERIOD_S * f64::from(TIMES.off),
-            switches_per_s: None,
-            air: None,
-            ramp_per_s: None,
-            least_air: false,
+            ..TrackRequest::holding(TARGET)
         }),
     )?;
     design.model.save(&out.join("controlled.toml"))?;

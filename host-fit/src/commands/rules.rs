@@ -1,6 +1,6 @@
 //! `host-fit rules`: every threshold, with its meaning and where it was calibrated.
 
-use host_fit::rules::books;
+use host_fit::steps::rulebooks;
 
 use super::Console;
 use super::words::Words;
@@ -15,7 +15,7 @@ pub(crate) struct Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
-    let mut books = books();
+    let mut books = rulebooks();
     let rooms: Vec<&str> = books.iter().map(|book| book.room).collect();
     if let Some(room) = &args.room {
         anyhow::ensure!(

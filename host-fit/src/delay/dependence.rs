@@ -6,17 +6,8 @@ use rand_chacha::ChaCha8Rng;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::law::{DelayPoint, best_rate, rate_grid};
+use super::rules::RULES;
 use super::spread::{Spread, spread};
-
-/// Shuffles of the permutation tests.
-const SHUFFLES: usize = 1999;
-/// A test below this probability counts.
-const SIGNIFICANT: f64 = 0.01;
-/// A change of the delay by less than this, samples, is none for a model.
-const RELEVANT: f64 = 1.0;
-/// The measured start of a response depends a little on its shape, and rising and falling responses differ in shape: a
-/// difference between the directions below this share of the mean delay says nothing.
-const SHAPE_BIAS: f64 = 0.1;
 
 /// Whether the data bear the law out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -48,7 +39,7 @@ pub(super) struct Tests {
 
 impl Tests {
     pub(super) fn of(points: &[DelayPoint], seed: u64) -> Self {
-        if points.len() < 8 {
+        if points.len() < RULES.tested_edges {
             return Self::default();
         }
         let (direction, offset) = match direction_test(points) {
@@ -71,10 +62,10 @@ impl Tests {
         };
         // What is below one sample is rounded away in a model, and within the bias of any measured delay.
         let counts = |p: Option<f64>, size: f64| {
-            p.is_some_and(|p| p < SIGNIFICANT) && size.abs() >= RELEVANT
+            p.is_some_and(|p| p < RULES.significant) && size.abs() >= RULES.relevant
         };
         let delays: Vec<f64> = points.iter().map(|p| p.delay).collect();
-        let noticeable = (SHAPE_BIAS * spread(&delays).mean).max(RELEVANT);
+        let noticeable = (RULES.shape_bias * spread(&delays).mean).max(RULES.relevant);
         let offset = self.offset.filter(|o| o.abs() >= noticeable);
         let differ = counts(self.direction, offset.unwrap_or(0.0))
             || direction_says_more(points, noticeable);
@@ -124,16 +115,16 @@ fn direction_says_more(points: &[DelayPoint], noticeable: f64) -> bool {
     let Some((_, law)) = best_rate(points, None, false) else {
         return false;
     };
-    up.count >= 3
-        && down.count >= 3
+    up.count >= RULES.tested_each
+        && down.count >= RULES.tested_each
         && (up.mean - down.mean).abs() >= noticeable
-        && n * (rss_direction / law.rss).ln() + (2.0 - 3.0) * n.ln() < -10.0
+        && n * (rss_direction / law.rss).ln() + (2.0 - 3.0) * n.ln() < -RULES.clearly_better
 }
 
 /// Is there an offset between rising and falling edges beside the law? p of its t test, and the offset in samples.
 fn direction_test(points: &[DelayPoint]) -> Option<(f64, f64)> {
     let (_, up, down) = by_direction(points);
-    if up.count < 3 || down.count < 3 {
+    if up.count < RULES.tested_each || down.count < RULES.tested_each {
         return None;
     }
     let (_, with) = best_rate(points, None, true)?;
@@ -203,7 +194,7 @@ fn permutation_test(points: &[DelayPoint], within: bool, seed: u64) -> Option<f6
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut as_good = 0usize;
     let mut hand = Vec::new();
-    for _ in 0..SHUFFLES {
+    for _ in 0..RULES.shuffles {
         for group in &groups {
             hand.clear();
             hand.extend(group.iter().map(|&i| dealt[i]));
@@ -212,7 +203,7 @@ fn permutation_test(points: &[DelayPoint], within: bool, seed: u64) -> Option<f6
         }
         as_good += usize::from(explained(&dealt) >= found * (1.0 - 1e-12));
     }
-    Some((as_good + 1) as f64 / (SHUFFLES + 1) as f64)
+    Some((as_good + 1) as f64 / (RULES.shuffles + 1) as f64)
 }
 
 pub(super) fn words(verdict: DelayVerdict, tests: &Tests, points: &[DelayPoint]) -> String {

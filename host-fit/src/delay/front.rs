@@ -6,12 +6,8 @@
 //! the other sign and do not add up.
 
 use super::edge::Edge;
+use super::rules::RULES;
 use super::spread::mean;
-
-/// Of the peaks at least this high against the highest, the soonest is the front.
-const HIGH: f64 = 0.8;
-/// By this factor the first edges must prefer a later peak.
-const CLEARLY: f64 = 2.0;
 
 /// When a response is expected after an edge of one direction, samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,7 +77,8 @@ pub(crate) fn expect(
         return None;
     }
     let middle = sizes.len() / 2;
-    let bound = 2.0 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 + f64::MIN_POSITIVE;
+    let bound = RULES.front_largest * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
+        + f64::MIN_POSITIVE;
     let gain_sign = gain_sign(series);
     let arrival = |rising: bool| -> Option<Arrival> {
         let direction = if rising { gain_sign } else { -gain_sign };
@@ -154,7 +151,7 @@ fn soonest_peak(votes: &[f64], at_rest: &[f64], half_width: usize) -> Option<usi
                 .skip(d.saturating_sub(half_width));
             votes
                 .get(d)
-                .is_some_and(|&v| v >= HIGH * highest && around.all(|&a| a <= v))
+                .is_some_and(|&v| v >= RULES.front_height * highest && around.all(|&a| a <= v))
         })
         .collect();
     let from_rest = |d: usize| at_rest.get(d).copied().unwrap_or(0.0);
@@ -162,7 +159,7 @@ fn soonest_peak(votes: &[f64], at_rest: &[f64], half_width: usize) -> Option<usi
     peaks
         .iter()
         .copied()
-        .find(|&d| from_rest(d) > CLEARLY * from_rest(soonest).max(0.0))
+        .find(|&d| from_rest(d) > RULES.front_clearly * from_rest(soonest).max(0.0))
         .or(Some(soonest))
 }
 

@@ -7,13 +7,8 @@
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use super::rules::RULES;
 use crate::linalg;
-
-/// Values of p2·(range of ỹ) that the search starts from, logarithmic from the first to the last.
-const RATE_SPAN: (f64, f64) = (0.05, 300.0);
-const RATE_STEPS: usize = 60;
-/// Edges further from the robust fit than this many robust standard deviations are set aside.
-const OUTLIER: f64 = 5.0;
 
 /// One point of the law: averaged output (1) at the response, delay in samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -156,9 +151,10 @@ pub(crate) fn rate_grid(points: &[DelayPoint]) -> Vec<f64> {
     if span.is_nan() || span <= 0.0 {
         return Vec::new();
     }
-    let ratio = (RATE_SPAN.1 / RATE_SPAN.0).ln() / (RATE_STEPS - 1) as f64;
-    (0..RATE_STEPS)
-        .map(|i| RATE_SPAN.0 * (ratio * i as f64).exp() / span)
+    let (slowest, fastest) = (RULES.slowest_rate, RULES.fastest_rate);
+    let ratio = (fastest / slowest).ln() / (RULES.rates - 1) as f64;
+    (0..RULES.rates)
+        .map(|i| slowest * (ratio * i as f64).exp() / span)
         .collect()
 }
 
@@ -237,7 +233,7 @@ fn outliers(points: &[DelayPoint]) -> Vec<usize> {
         found = residual
             .iter()
             .enumerate()
-            .filter(|(_, r)| r.abs() > OUTLIER * scale)
+            .filter(|(_, r)| r.abs() > RULES.outlier * scale)
             .map(|(i, _)| i)
             .collect();
     }
@@ -247,7 +243,7 @@ fn outliers(points: &[DelayPoint]) -> Vec<usize> {
 /// Fits law (2). `None` with fewer than 5 edges, or when all have the same ỹ.
 #[must_use]
 pub fn fit_delay_law(points: &[DelayPoint]) -> Option<DelayLawFit> {
-    if points.len() < 5 {
+    if points.len() < RULES.law_edges {
         return None;
     }
     let outliers = outliers(points);
@@ -257,7 +253,7 @@ pub fn fit_delay_law(points: &[DelayPoint]) -> Option<DelayLawFit> {
         .filter(|(i, _)| !outliers.contains(i))
         .map(|(_, p)| *p)
         .collect();
-    if kept.len() < 5 {
+    if kept.len() < RULES.law_edges {
         return None;
     }
     let (p2, fit) = best_rate(&kept, None, false)?;

@@ -10,6 +10,7 @@ mod edge;
 mod front;
 mod law;
 mod onset;
+mod rules;
 mod spread;
 mod study;
 
@@ -18,6 +19,7 @@ pub use drawing::draw_delays;
 pub use edge::{Edge, edges, mean_output};
 pub use law::{DelayLawFit, DelayPoint, Estimate, fit_delay_law};
 pub use onset::{Onset, Unmeasured};
+pub use rules::{RULES, Rules};
 pub use spread::Spread;
 pub use study::{
     DelayOptions, DelayStatistics, DelayStudy, EdgeDelay, SequenceStatistics, study_delays,

@@ -13,27 +13,13 @@
 //! The standard error comes from the profile of the residual sum of squares over a (where it has risen by the noise
 //! variance), widened for the autocorrelation of the residuals; noise slower than `reach` bends y like a response does and
 //! is not in it. An edge whose response is not 5 standard deviations above the noise, or is cut off, or is located to no
-//! better than [`Onset::WORST_ERROR`] samples, is not measured and says why.
+//! better than the worst error of [`super::Rules`], is not measured and says why.
 
 use super::edge::Edge;
 use super::front::{Expectation, expect, level_filter, own_front};
+use super::rules::RULES;
 use super::spread::mean;
 use crate::linalg::dot;
-
-/// Time constants of the course before and of the response, samples; 0 stands for a straight line.
-const BEFORE_SHAPES: [f64; 9] = [0.0, 8.0, 12.0, 17.0, 25.0, 36.0, 55.0, 90.0, 180.0];
-const RESPONSE_SHAPES: [f64; 17] = [
-    0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 3.0, 6.0, 11.0, 22.0, 45.0, 90.0, 180.0,
-    360.0,
-];
-/// The first search for the start of a response makes do with the first so many shapes.
-const COARSE_SHAPES: usize = 9;
-/// Arrivals are tried this many samples apart.
-const RESOLUTION: f64 = 0.25;
-/// Least number of samples on either side of an arrival.
-const LEAST_SIDE: usize = 6;
-/// Likelihood ratio (in units of the noise variance) that a response must have: five standard deviations.
-const DETECTION: f64 = 25.0;
 
 /// Why the delay of an edge could not be measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -69,11 +55,6 @@ pub struct Onset {
     /// Samples from the edge to half of the response (between y at its start and its level when the next response
     /// arrives, or after 150 samples), if it gets there.
     pub half_response: Option<f64>,
-}
-
-impl Onset {
-    /// A delay with a larger standard error than this, samples, counts as not measured.
-    pub const WORST_ERROR: f64 = 5.0;
 }
 
 /// The stretch of a record in which one response can be seen, and the arrivals that are tried.
@@ -129,14 +110,15 @@ impl<'a> Neighbourhood<'a> {
     ) -> Result<Stretch, Unmeasured> {
         let (from, to) = (from.max(self.earliest), to.min(self.latest));
         // A record that starts with an edge has nothing but the zero history before it.
-        let left = if from == 0 { 0 } else { LEAST_SIDE };
+        let left = if from == 0 { 0 } else { RULES.least_side };
         let stretch = Stretch {
             from,
             to,
             first_arrival: first.max((from + left) as f64).max(self.edge.sample as f64),
-            last_arrival: last.min(to as f64 - 1.0 - LEAST_SIDE as f64),
+            last_arrival: last.min(to as f64 - 1.0 - RULES.least_side as f64),
         };
-        let room = to >= from + 2 * LEAST_SIDE + 4 && stretch.last_arrival > stretch.first_arrival;
+        let room =
+            to >= from + 2 * RULES.least_side + 4 && stretch.last_arrival > stretch.first_arrival;
         room.then_some(stretch).ok_or(Unmeasured::CutOff)
     }
 
@@ -156,7 +138,7 @@ impl<'a> Neighbourhood<'a> {
         if ((expected + 2) as f64) < stretch.first_arrival {
             return Err(Unmeasured::CutOff);
         }
-        let coarse = &RESPONSE_SHAPES[..COARSE_SHAPES];
+        let coarse = &RULES.response_shapes[..RULES.coarse_shapes];
         let direction = self.expected.direction(self.edge);
         profile(self.y, stretch, coarse, 1.0, direction).ok_or(Unmeasured::BelowNoise)
     }
@@ -173,8 +155,14 @@ impl<'a> Neighbourhood<'a> {
             rough.arrival + reach as f64 / 2.0,
         )?;
         let direction = self.expected.direction(self.edge);
-        let best = profile(self.y, stretch, &RESPONSE_SHAPES, RESOLUTION, direction)
-            .ok_or(Unmeasured::BelowNoise)?;
+        let best = profile(
+            self.y,
+            stretch,
+            &RULES.response_shapes,
+            RULES.resolution,
+            direction,
+        )
+        .ok_or(Unmeasured::BelowNoise)?;
         let best = best.checked()?;
         if best.arrival >= stretch.last_arrival - 0.5 {
             return Err(Unmeasured::CutOff);
@@ -241,9 +229,9 @@ struct Located {
 impl Located {
     /// Itself, if it stands out from the noise and is sharp enough.
     fn checked(self) -> Result<Self, Unmeasured> {
-        if self.evidence < DETECTION {
+        if self.evidence < RULES.detection {
             Err(Unmeasured::BelowNoise)
-        } else if self.standard_error > Onset::WORST_ERROR {
+        } else if self.standard_error > RULES.worst_error {
             Err(Unmeasured::Blurred)
         } else {
             Ok(self)
@@ -304,7 +292,8 @@ fn profile(
     let level = mean(raw);
     let data: Vec<f64> = raw.iter().map(|v| v - level).collect();
     let total = dot(&data, &data);
-    let befores: Vec<Column> = BEFORE_SHAPES
+    let befores: Vec<Column> = RULES
+        .before_shapes
         .iter()
         .map(|&tau| {
             let course = (0..n).map(|i| {
@@ -431,7 +420,7 @@ fn widening(residual: &[f64]) -> f64 {
     if square <= 0.0 {
         return 1.0;
     }
-    let rho = (lagged / square).clamp(0.0, 0.82);
+    let rho = (lagged / square).clamp(0.0, RULES.most_correlation);
     (1.0 + rho) / (1.0 - rho)
 }
 
@@ -441,7 +430,7 @@ fn half_response(y: &[f64], at: &Located, latest: usize) -> Option<f64> {
     let start = at.arrival.round().max(0.0) as usize;
     let end = latest.min(start + 150);
     let tail = y.get(start + (end.saturating_sub(start)) * 2 / 3..end)?;
-    if tail.len() < LEAST_SIDE {
+    if tail.len() < RULES.least_side {
         return None;
     }
     let half = (at.level + mean(tail)) / 2.0;

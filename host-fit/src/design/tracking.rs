@@ -31,6 +31,22 @@ pub struct TrackRequest {
     pub least_air: bool,
 }
 
+impl TrackRequest {
+    /// Holds `target` with a valve that needs 10 ms either way, without further limits.
+    #[must_use]
+    pub fn holding(target: f64) -> Self {
+        Self {
+            target,
+            min_on_s: 0.010,
+            min_off_s: 0.010,
+            switches_per_s: None,
+            air: None,
+            ramp_per_s: None,
+            least_air: false,
+        }
+    }
+}
+
 /// A tracking law and what the design rests on. Serialises to the keys under `track` of `design --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrackDesign {
@@ -367,23 +383,11 @@ pub(super) mod tests {
         }
     }
 
-    pub(in super::super) fn request(target: f64) -> TrackRequest {
-        TrackRequest {
-            target,
-            min_on_s: 0.010,
-            min_off_s: 0.010,
-            switches_per_s: None,
-            air: None,
-            ramp_per_s: None,
-            least_air: false,
-        }
-    }
-
     #[test]
     fn the_papers_model_gets_the_law_of_the_theory() {
         let design = track(
             &paper_state_dependent(LagConvention::OneStep),
-            &request(0.8),
+            &TrackRequest::holding(0.8),
         )
         .unwrap();
         assert!((design.equivalent_duty - 0.713).abs() < 0.001);
@@ -397,20 +401,20 @@ pub(super) mod tests {
     fn what_cannot_be_held_is_refused_with_the_interval() {
         let model = paper_state_dependent(LagConvention::OneStep);
         for target in [-0.1, 0.0, 1.2, f64::NAN] {
-            let error = track(&model, &request(target)).unwrap_err();
+            let error = track(&model, &TrackRequest::holding(target)).unwrap_err();
             assert!(error.to_string().contains("(0"), "{error}");
             assert!(matches!(error, DesignError::Unreachable(_)));
         }
         let thirsty = TrackRequest {
             air: Some(0.5),
-            ..request(0.8)
+            ..TrackRequest::holding(0.8)
         };
         assert!(matches!(
             track(&model, &thirsty),
             Err(DesignError::Air { .. })
         ));
         assert_eq!(
-            track(&paper_averaged(), &request(0.8)),
+            track(&paper_averaged(), &TrackRequest::holding(0.8)),
             Err(DesignError::Unusable(Unusable::AveragedModel))
         );
     }
@@ -420,7 +424,7 @@ pub(super) mod tests {
         let model = paper_state_dependent(LagConvention::OneStep);
         let calm = TrackRequest {
             switches_per_s: Some(20.0),
-            ..request(0.8)
+            ..TrackRequest::holding(0.8)
         };
         let design = track(&model, &calm).unwrap();
         // A cycle of 100 ms, 28.7 % of it closed, held for most of that.
@@ -434,7 +438,7 @@ pub(super) mod tests {
         let mut model = paper_state_dependent(LagConvention::OneStep);
         let spec = model_core::effects::spec("valve-lag").unwrap();
         model.add(spec, &[0.010, 0.020], None);
-        let design = track(&model, &request(0.8)).unwrap();
+        let design = track(&model, &TrackRequest::holding(0.8)).unwrap();
         assert!(
             (5..=7).contains(&design.law.opening),
             "{}",
@@ -448,7 +452,7 @@ pub(super) mod tests {
         let spec = model_core::effects::spec("edge-dependent-delay").unwrap();
         let mut model = paper_state_dependent(LagConvention::OneStep);
         model.add(spec, &[0.060, 0.045], None);
-        let design = track(&model, &request(0.8)).unwrap();
+        let design = track(&model, &TrackRequest::holding(0.8)).unwrap();
         assert_eq!(design.law.hold, Hold { on: 18, off: 10 });
         assert!((14..=16).contains(&design.law.opening));
         assert_eq!(design.law.lead, 45);

@@ -1,6 +1,7 @@
 //! A base model refitted, all of it, with one more effect.
 
 use super::lean::{fresh_starts, settle_fixed_delay, with_law_of};
+use super::rules::RULES;
 use super::starts::starts;
 use super::{Fit, FitOptions, fit};
 use crate::data::Record;
@@ -11,13 +12,6 @@ use rayon::prelude::*;
 use std::cmp::Ordering;
 use thiserror::Error;
 
-/// How many starting points are followed to the end, beside the best with each
-/// response to jets of part strength.
-const FOLLOWED: usize = 2;
-/// Steps that every starting point is followed for.
-const BRIEF: usize = 4;
-/// How many of them are tried with each response to jets of part strength.
-const REGRADED: usize = 4;
 /// The responses to jets of part strength.
 const GRADINGS: [Grading; 3] = [
     Grading::Proportional,
@@ -81,7 +75,7 @@ pub fn fit_with_effect(
     let mut tried = tried_briefly(models, records, options);
     if spec.place == Place::Jet {
         // How the flow takes jets of part strength shows only once there are some.
-        let regraded = tried.iter().take(REGRADED).flat_map(|fit| {
+        let regraded = tried.iter().take(RULES.regraded).flat_map(|fit| {
             let others = GRADINGS.into_iter().filter(|g| *g != base.grading);
             others.map(|grading| Model {
                 grading,
@@ -95,7 +89,7 @@ pub fn fit_with_effect(
     let leading = tried.iter().enumerate().filter(|(place, fit)| {
         let first_of_its_grading = !met.contains(&fit.model.grading);
         met.push(fit.model.grading);
-        *place < FOLLOWED || first_of_its_grading
+        *place < RULES.followed || first_of_its_grading
     });
     let leading: Vec<&Fit> = leading.map(|(_, fit)| fit).collect();
     let finished: Vec<Option<Fit>> = leading
@@ -125,7 +119,7 @@ pub fn fit_with_effect(
 /// tell thresholds from each other badly: what acts in steps is slow to show.
 fn tried_briefly(models: Vec<Model>, records: &[&Record], options: &FitOptions) -> Vec<Fit> {
     let brief = FitOptions {
-        iterations: BRIEF,
+        iterations: RULES.brief,
         ..*options
     };
     let fits: Vec<Option<Fit>> = models

@@ -2,15 +2,9 @@
 //! drifted after a whole record knows the drift of that record, not the rig.
 //! Free runs then start anew from the measurement every now and then.
 
+use super::rules::RULES;
 use crate::data::Record;
 use crate::model::{Model, Start};
-
-/// Runs of a drifting rig per record.
-const RUNS: usize = 20;
-/// A run is at least so many times what it takes from the measurement to start.
-const WARM_UPS: usize = 8;
-/// A memory of which more than this share is left after a tenth of a record drifts.
-const LEFT: f64 = 0.1;
 
 /// After how many samples free runs of `model` start anew; none if what happened
 /// at the beginning of a record is forgotten well before its end, or if the model
@@ -21,7 +15,7 @@ pub fn restart_after(model: &Model, records: &[Record]) -> Option<usize> {
     if model.start != Start::Measured || !remembers(model, shortest / 10) {
         return None;
     }
-    let samples = (shortest / RUNS).max(WARM_UPS * model.warm_up());
+    let samples = (shortest / RULES.pieces).max(RULES.warm_ups * model.warm_up());
     (samples < shortest / 2).then_some(samples)
 }
 
@@ -30,7 +24,7 @@ fn remembers(model: &Model, samples: usize) -> bool {
     let left = |pole: f64| pole.powf(samples as f64);
     model
         .largest_pole(false)
-        .is_ok_and(|pole| left(pole) > LEFT)
+        .is_ok_and(|pole| left(pole) > RULES.drifts)
 }
 
 /// A record cut into pieces of so many samples; what is left over after the last

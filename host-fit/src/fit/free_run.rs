@@ -3,6 +3,7 @@
 //! correlated residuals.
 
 use super::levenberg::{LeastSquares, Part, StopReason, minimise};
+use super::rules::RULES;
 use crate::data::Record;
 use crate::dual::Dual;
 use crate::linalg::{self, dot};
@@ -35,8 +36,8 @@ pub struct FitOptions {
 impl Default for FitOptions {
     fn default() -> Self {
         Self {
-            iterations: 30,
-            tolerance: 1e-5,
+            iterations: RULES.iterations,
+            tolerance: RULES.tolerance,
             constant: false,
             linear: true,
             delay: true,
@@ -115,7 +116,7 @@ impl Axis {
                 low: parameter.low,
                 high: parameter.high,
                 secant: (!coordinate.is_smooth())
-                    .then_some(0.01 * (parameter.high - parameter.low)),
+                    .then_some(RULES.secant * (parameter.high - parameter.low)),
                 against: None,
             },
         }
@@ -139,7 +140,11 @@ impl Axis {
     fn reach(&self, value: f64) -> (f64, f64) {
         if self.logarithmic {
             let to = |bound: f64| (bound / value).ln();
-            (to(self.low).clamp(-2.0, 0.0), to(self.high).clamp(0.0, 2.0))
+            let leap = RULES.leap;
+            (
+                to(self.low).clamp(-leap, 0.0),
+                to(self.high).clamp(0.0, leap),
+            )
         } else {
             ((self.low - value).min(0.0), (self.high - value).max(0.0))
         }
@@ -469,7 +474,7 @@ fn sandwich(parts: &[Part], inverse: &[f64], n: usize) -> Vec<f64> {
     let mut middle = vec![0.0; n * n];
     for part in parts {
         let length = part.residual.len();
-        let block = (length / 40).clamp(1, 250);
+        let block = (length / RULES.batches).clamp(1, RULES.longest_batch);
         let mut from = 0;
         while from < length {
             let to = (from + block).min(length);

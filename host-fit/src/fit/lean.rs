@@ -4,6 +4,7 @@
 //! of a plenum's droop behind 18 free coefficients is a twentieth). The leanest
 //! model has nothing to imitate with, so what it lacks stays visible.
 
+use super::rules::RULES;
 use super::starts::starts;
 use super::{Fit, FitOptions, fit};
 use crate::data::Record;
@@ -11,11 +12,6 @@ use crate::model::{Delay, Model, Start, TransportLaw};
 use crate::simulate::SimulateError;
 use model_core::recursion::{Grading, LagConvention};
 use rayon::prelude::*;
-
-/// How many of the starts on a delay law's card are tried, beside the given law.
-const LAW_STARTS: usize = 3;
-/// Time constants from which the search sets out, s.
-const TIME_CONSTANTS: [f64; 3] = [0.02, 0.06, 0.2];
 
 /// y_{k+1} = a·y_k + (b + c·y_k)·u_{k−h}, fitted to the records in free run,
 /// with the kind of delay law that `given` has.
@@ -25,7 +21,7 @@ const TIME_CONSTANTS: [f64; 3] = [0.02, 0.06, 0.2];
 pub fn lean_base(given: &Model, records: &[&Record]) -> Result<Fit, SimulateError> {
     let starts = fresh_starts(given, records);
     let brief = FitOptions {
-        iterations: 4,
+        iterations: RULES.brief,
         ..FitOptions::default()
     };
     let tried: Vec<_> = starts
@@ -82,12 +78,14 @@ pub(super) fn fresh_starts(given: &Model, records: &[&Record]) -> Vec<Model> {
             ..given.clone()
         }
     };
-    let longest = (0.12 / given.sample_period_s).round().clamp(8.0, 400.0) as u16;
+    let longest = (RULES.longest_start_s / given.sample_period_s)
+        .round()
+        .clamp(8.0, 400.0) as u16;
     let mut delays: Vec<u16> = (0..8).map(|i| longest * i / 8 + longest / 16).collect();
     delays.push(given.longest_delay().min(usize::from(u16::MAX)) as u16);
     let pairs = delays
         .iter()
-        .flat_map(|h| TIME_CONSTANTS.iter().map(|time| start(*h, *time)));
+        .flat_map(|h| RULES.time_constants_s.iter().map(|time| start(*h, *time)));
     pairs.collect()
 }
 
@@ -103,11 +101,12 @@ fn steady_level(records: &[&Record]) -> f64 {
     };
     let strongest = samples().fold(0.0, |most: f64, (_, u)| most.max(u));
     let mut ratios: Vec<f64> = samples()
-        .filter(|(_, u)| *u > 0.5 * strongest)
+        .filter(|(_, u)| *u > RULES.strong_input * strongest)
         .map(|(y, u)| (y / u).abs())
         .collect();
     ratios.sort_by(f64::total_cmp);
-    ratios.get(ratios.len() * 95 / 100).copied().unwrap_or(1.0)
+    let at = ratios.len() * RULES.settled_percentile / 100;
+    ratios.get(at).copied().unwrap_or(1.0)
 }
 
 /// Moves a fixed first delay in ever smaller steps as long as the free run gains.
@@ -120,13 +119,13 @@ pub fn settle_fixed_delay(
     options: &FitOptions,
 ) -> Result<Fit, SimulateError> {
     let brief = FitOptions {
-        iterations: 3,
+        iterations: RULES.settling,
         ..*options
     };
     // A record that begins in mid-run is judged after the longest delay only.
     let shortest = records.iter().map(|r| r.len()).min().unwrap_or(0);
     let most = i32::try_from(shortest / 4).unwrap_or(i32::MAX);
-    for step in [8_i32, 4, 2, 1] {
+    for step in RULES.delay_steps.map(|step| step as i32) {
         loop {
             let Delay::Fixed { delays } = &best.model.delay else {
                 return Ok(best);
@@ -177,7 +176,7 @@ pub(super) fn with_law_of(
             let factor = law.factors.first().copied().unwrap_or(1.0);
             let own = with(law.parameters.clone(), factor);
             let others = starts(model, law.spec, records).into_iter();
-            let others = others.take(LAW_STARTS).map(|start| with(start, 1.0));
+            let others = others.take(RULES.law_starts).map(|start| with(start, 1.0));
             std::iter::once(own).chain(others).collect()
         }
     };

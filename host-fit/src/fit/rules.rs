@@ -3,11 +3,56 @@
 use crate::rules::rules;
 
 rules! {
-    /// How models are fitted, and what a fit is good for.
+    /// How models are fitted in free run, and what a fit is good for.
     pub struct Rules in "fit";
 
-    /// A record starts at rest when its first |y| is at most this share of its largest.
-    near_rest: f64 = 0.1, "share of the largest |y|", "judgement";
-    /// A model whose held-out FIT is this much below that of its own records has more lags than they can tell.
-    overfitted_points: f64 = 12.0, "points of FIT", "judgement: on the flow simulation sixteen lags lose 28 to 34, two lags 7 to 11";
+    /// Most iterations of a fit.
+    iterations: usize = 30, "", "judgement";
+    /// A fit ends when an iteration lowers the sum of squares by less than this.
+    tolerance: f64 = 1e-5, "share of the sum of squares", "judgement: far below what a diagnosis can tell";
+    /// Iterations that every starting point is followed for before the best are chosen.
+    brief: usize = 4, "", "campaign, seed 33000: after one iteration a hysteresis lost its thresholds, after four it is found";
+    /// Iterations for a delay that is tried one step further.
+    settling: usize = 3, "", "judgement";
+    /// The steps in which a fixed delay is moved.
+    delay_steps: [f64; 4] = [8.0, 4.0, 2.0, 1.0], "samples", "halving";
+    /// Half width of the secant by which a parameter that acts in steps is differentiated.
+    secant: f64 = 0.01, "share of its range", "judgement";
+    /// Farthest that a logarithmic parameter goes in one iteration.
+    leap: f64 = 2.0, "ln", "judgement: a factor of 7";
+    /// Standard errors are summed over this many blocks of a record …
+    batches: usize = 40, "", "judgement; intervals held by the campaign's parameters within 25 %";
+    /// … that are no longer than this.
+    longest_batch: usize = 250, "samples", "the window of ỹ in eq. (1)";
+
+    /// Starting points that are followed to the end, beside the best with each response to jets of part strength.
+    followed: usize = 2, "", "judgement, on the campaign's rigs";
+    /// Starting points that are tried with each response to jets of part strength.
+    regraded: usize = 4, "", "judgement, on the campaign's rigs";
+    /// Most starting points of an effect.
+    most_starts: usize = 12, "", "judgement, on the campaign's rigs";
+    /// Starting points of a delay law.
+    law_starts: usize = 3, "", "judgement, on the campaign's rigs";
+    /// Time constants from which the leanest model sets out.
+    time_constants_s: [f64; 3] = [0.02, 0.06, 0.2], "s", "judgement, in steps of 3";
+    /// Longest delay from which it sets out; there are eight up to it.
+    longest_start_s: f64 = 0.12, "s", "twice the paper's delay";
+    /// A signal whose largest value lies between this …
+    order_one_low: f64 = 0.3, "", "judgement: friction gains lie between";
+    /// … and this is of order one, as the catalogue's ranges are; others are scaled.
+    order_one_high: f64 = 3.0, "", "judgement: friction gains lie between";
+    /// An input is strong above this share of its largest, and y/u is then near the level that it settles at.
+    strong_input: f64 = 0.5, "share of the largest |u|", "judgement";
+    /// The percentile of y/u under a strong input that is taken for that level.
+    settled_percentile: usize = 95, "%", "judgement: what is above is noise";
+
+    /// A lean model with effects is kept when its error is within this factor of the given structure's.
+    as_good: f64 = 1.02, "times the rms error", "judgement";
+
+    /// Runs that a record of a drifting rig is cut into.
+    pieces: usize = 20, "", "judgement; EMPS in docs/hidden-effects.md";
+    /// A piece is at least so many times what a run takes from the measurement to start.
+    warm_ups: usize = 8, "", "judgement";
+    /// A rig drifts when more than this of what happened is left after a tenth of a record.
+    drifts: f64 = 0.1, "share", "judgement; held by `an_integrator_drifts_and_a_damped_rig_does_not`";
 }

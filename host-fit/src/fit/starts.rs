@@ -1,18 +1,16 @@
 //! Where the search of an effect's parameters sets out: what its card says, for
 //! these records and this model.
 
+use super::rules::RULES;
 use crate::data::Record;
 use crate::model::Model;
 use model_core::effect::{Facts, Parameter, Spec, Start, Starts};
-
-/// Most starting points that are tried.
-const MOST_STARTS: usize = 12;
 
 /// The size of a signal: 1 where it is of order 1, as the catalogue's ranges are.
 fn size_of(records: &[&Record], signal: impl Fn(&Record) -> &[f64]) -> f64 {
     let values = records.iter().flat_map(|record| signal(record));
     let size = values.fold(0.0, |size: f64, value| size.max(value.abs()));
-    if (0.3..3.0).contains(&size) || size == 0.0 {
+    if (RULES.order_one_low..RULES.order_one_high).contains(&size) || size == 0.0 {
         1.0
     } else {
         size
@@ -73,7 +71,7 @@ fn product(parameters: &[Parameter], facts: &Facts<'_>) -> Vec<Vec<f64>> {
         all = extended.collect();
     }
     // Thinned evenly, so that no parameter keeps only its first value.
-    let stride = all.len().div_ceil(MOST_STARTS).max(1);
+    let stride = all.len().div_ceil(RULES.most_starts).max(1);
     all.into_iter().step_by(stride).collect()
 }
 
@@ -108,7 +106,7 @@ mod tests {
         // The usual change of y is 1/1000.
         let level = found("dry-friction", 1.0)[1][0];
         assert!((level - 0.03e-3).abs() < 1e-12);
-        assert!(found("attachment-hysteresis", 1.0).len() <= MOST_STARTS);
+        assert!(found("attachment-hysteresis", 1.0).len() <= RULES.most_starts);
     }
 
     /// In other units of y the same physics is tried.

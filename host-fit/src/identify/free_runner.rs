@@ -13,10 +13,8 @@ use model_core::delay::DelayLaw as _;
 use super::arrival::{CoreLaw, Signals, core_law, factor};
 use super::coefficients::Coefficients;
 use super::layout::Delays;
+use super::rules::RULES;
 use super::structure::{DelayLaw, InputDelay, Structure, WINDOW};
-
-/// A run beyond this many times the measured range has diverged.
-const DIVERGED: f64 = 10.0;
 
 /// Samples computed together at most.
 const BLOCK: usize = 32;
@@ -193,7 +191,7 @@ impl FreeRunner {
             .fold(0.0f64, |m, y| m.max(y.abs()));
         Self {
             structure: structure.clone(),
-            bound: DIVERGED * largest.max(1e-9),
+            bound: RULES.hopeless * largest.max(1e-9),
             samples: signals.y.iter().map(Vec::len).sum(),
         }
     }

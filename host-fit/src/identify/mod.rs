@@ -20,11 +20,13 @@ mod one_step;
 mod options;
 mod refinement;
 mod regression;
+mod rules;
 mod run;
 mod structure;
 
 pub use error::IdentifyError;
 pub use options::{IdentifyOptions, Objective};
 pub use refinement::Refinement;
+pub use rules::{RULES, Rules};
 pub use run::{Identified, identify};
 pub use structure::{DelayLaw, InputDelay, Structure, WINDOW};

@@ -8,9 +8,8 @@ use super::{Onlooker, StepError, finite_fit, trained_in_free_run, training};
 use crate::data::{DataSet, Record};
 use crate::excitation::{Demand, ExcitationError, check_excitation};
 use crate::extend::{effects_for, extend};
-use crate::fit;
 use crate::identify::{
-    DelayLaw, Identified, IdentifyError, IdentifyOptions, InputDelay, Objective, Refinement,
+    DelayLaw, Identified, IdentifyError, IdentifyOptions, InputDelay, Objective, RULES, Refinement,
     Structure, identify as search,
 };
 use crate::indicators::{Scores, one_step_norm, score_new};
@@ -260,7 +259,7 @@ impl IdentifyRequest {
 fn starts_at_rest(records: &[&Record]) -> bool {
     records.iter().all(|record| {
         let largest = record.y.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
-        let near = fit::RULES.near_rest * largest;
+        let near = RULES.near_rest * largest;
         record.y.first().is_some_and(|y| y.abs() <= near)
     })
 }
@@ -283,7 +282,7 @@ fn overfitted(scores: &Scores) -> Option<String> {
         finite_fit(scores.identify.as_ref())?,
         finite_fit(scores.validate.as_ref())?,
     );
-    (held_out < own - fit::RULES.overfitted_points).then(|| {
+    (held_out < own - RULES.overfitted_points).then(|| {
         format!(
             "The model fits what it learned from ({own:.0} % FIT) far better than what was held out ({held_out:.0} %): \
              it has more lags than these records can tell. Use fewer (`--n1 2 --n2 2`), more varied records, or \

@@ -13,7 +13,7 @@
 //! | [`try_out`] | a design and flows | [`Proof`](crate::design::Proof) |
 //! | [`constants`] | a model | [`Constants`] |
 //!
-//! [`catalogue`] lists the effects that can be missing.
+//! [`catalogue`] lists the effects that can be missing, [`rulebooks`] every threshold that decides.
 //!
 //! Every result serialises to the JSON document that the program prints for the step, without the paths of the files
 //! that the program wrote; what only a picture needs is left out of the document. The program itself is these
@@ -31,6 +31,7 @@ mod extend;
 mod identify;
 mod measured_law;
 mod onlooker;
+mod rules;
 mod simulate;
 mod verdict;
 
@@ -45,6 +46,7 @@ pub use error::StepError;
 pub use extend::{Extension, RecordChange, extend};
 pub use identify::{DelayKind, Delays, Identification, IdentifyRequest, identify};
 pub use onlooker::Onlooker;
+pub use rules::{rulebooks, rules_page};
 pub use simulate::{Simulation, simulate};
 
 use crate::data::DataSet;

@@ -127,13 +127,9 @@ impl Bench {
 
     fn designed(&self, target: f64, switches_per_s: Option<f64>, least_air: bool) -> Option<Track> {
         let request = TrackRequest {
-            target,
-            min_on_s: 0.010,
-            min_off_s: 0.010,
             switches_per_s,
-            air: None,
-            ramp_per_s: None,
             least_air,
+            ..TrackRequest::holding(target)
         };
         track(&self.model, &request).ok().map(|design| design.law)
     }

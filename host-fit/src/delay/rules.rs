@@ -1,0 +1,59 @@
+//! The rules of the measured delays.
+
+use crate::rules::rules;
+
+rules! {
+    /// When a response counts as measured, and what the measured delays say about the law.
+    pub struct Rules in "delay";
+
+    /// A response must lower the residual by this many noise variances: five standard deviations.
+    detection: f64 = 25.0, "noise variances", "convention: five standard deviations";
+    /// A delay with a larger standard error counts as not measured.
+    worst_error: f64 = 5.0, "samples", "judgement: a tenth of the paper's delays";
+    /// Fewest samples on either side of an arrival.
+    least_side: usize = 6, "samples", "judgement";
+    /// Arrivals are tried this far apart.
+    resolution: f64 = 0.25, "samples", "judgement: a quarter of what a model rounds to";
+    /// Time constants of the course before a response, of which 0 is a straight line.
+    before_shapes: [f64; 9] = [0.0, 8.0, 12.0, 17.0, 25.0, 36.0, 55.0, 90.0, 180.0], "samples", "a grid in steps of about 1.5";
+    /// Time constants of a response, of which 0 is a straight line.
+    response_shapes: [f64; 17] = [0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 3.0, 6.0, 11.0, 22.0, 45.0, 90.0, 180.0, 360.0], "samples", "a grid in steps of about 1.4, every other one first";
+    /// The first search for the start of a response makes do with the first so many of both.
+    coarse_shapes: usize = 9, "", "every other response";
+    /// The autocorrelation of neighbouring residuals counts up to this value: more is a course that the fit has missed.
+    most_correlation: f64 = 0.82, "", "widens a variance by 10 at most; held by the tests of `onset.rs`";
+
+    /// Of the peaks at least this high against the highest, the soonest is the front.
+    front_height: f64 = 0.8, "share of the highest", "judgement; held by the tests of `front.rs`";
+    /// By this factor the first edges must prefer a later peak.
+    front_clearly: f64 = 2.0, "times", "judgement; held by the tests of `front.rs`";
+    /// A change of level counts for a front up to this many times the usual one.
+    front_largest: f64 = 2.0, "times the median", "judgement: one large response must not outvote all others";
+
+    /// Fewest measured edges of a law.
+    law_edges: usize = 5, "edges", "two more than the law has parameters";
+    /// First value of p2·(range of ỹ) that is tried, on a logarithmic grid …
+    slowest_rate: f64 = 0.05, "", "a law that is straight over the range";
+    /// … the last …
+    fastest_rate: f64 = 300.0, "", "a law that is a step at the lowest ỹ";
+    /// … and how many.
+    rates: usize = 60, "", "steps of 16 %";
+    /// Edges further from the robust fit than this are set aside.
+    outlier: f64 = 5.0, "robust standard deviations", "convention; held by the tests of `law.rs`";
+
+    /// Fewest measured edges of the tests.
+    tested_edges: usize = 8, "edges", "judgement";
+    /// Fewest of them in each direction.
+    tested_each: usize = 3, "edges", "judgement";
+    /// Shuffles of the permutation tests.
+    shuffles: usize = 1999, "", "convention: p is known to 0.002 at 0.01";
+    /// A test below this probability counts.
+    significant: f64 = 0.01, "p-value", "convention; the false-alarm rate is held by the tests of `dependence.rs`";
+    /// A change of the delay by less than this is none for a model.
+    relevant: f64 = 1.0, "samples", "a model rounds delays to whole samples";
+    /// A difference between the directions below this share of the mean delay says nothing: the measured start of a
+    /// response depends a little on its shape, and rising and falling responses differ in shape.
+    shape_bias: f64 = 0.1, "share of the mean delay", "judgement";
+    /// A constant per direction replaces the law when its criterion (BIC) is better by this.
+    clearly_better: f64 = 10.0, "BIC", "convention: very strong evidence (Kass & Raftery 1995)";
+}

@@ -1,0 +1,86 @@
+//! The thresholds of every room.
+
+use std::fmt::Write as _;
+
+use crate::rules::Rulebook;
+use crate::{delay, diagnose, excitation, fit, identify, power, residual, simulate, terms};
+
+/// The rules of every room, in the order in which the way of the data meets them.
+#[must_use]
+pub fn rulebooks() -> Vec<Rulebook> {
+    vec![
+        excitation::RULES.book(),
+        delay::RULES.book(),
+        identify::RULES.book(),
+        simulate::RULES.book(),
+        fit::RULES.book(),
+        residual::RULES.book(),
+        terms::RULES.book(),
+        diagnose::RULES.book(),
+        power::RULES.book(),
+    ]
+}
+
+/// The page `docs/rules.md`.
+#[must_use]
+pub fn rules_page() -> String {
+    let mut page = "# Rules: every threshold, what it decides and where it comes from\n\n\
+         Written by `BLESS=1 cargo test --release -p host-fit --test rules_page` from the code; `host-fit rules` prints the same. A value \
+         is either a convention, was tuned on the data that is named, or is a judgement: nothing was measured for it.\n"
+        .to_owned();
+    for book in rulebooks() {
+        let _ = write!(
+            page,
+            "\n## {}\n\n{}\n\n| rule | value | decides | comes from |\n|---|---|---|---|\n",
+            book.room, book.about
+        );
+        for rule in &book.rules {
+            let value = match rule.unit {
+                "" => rule.value.to_string(),
+                unit => format!("{} {unit}", rule.value),
+            };
+            let cells = [&rule.name, &value, &rule.meaning, rule.calibrated];
+            let cells = cells.map(|cell| cell.replace('|', "\\|"));
+            let _ = writeln!(page, "| {} |", cells.join(" | "));
+        }
+    }
+    page
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rules::Value;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_rule_says_what_it_decides_and_where_its_value_comes_from() {
+        for book in rulebooks() {
+            let mut names = BTreeSet::new();
+            assert!(book.about.ends_with('.'), "{}", book.room);
+            for rule in &book.rules {
+                let twice = !names.insert(&rule.name);
+                assert!(!twice, "{} twice in {}", rule.name, book.room);
+                assert!(
+                    [".", "…"].iter().any(|e| rule.meaning.ends_with(e)),
+                    "{rule:?}"
+                );
+                assert!(!rule.calibrated.is_empty(), "{rule:?}");
+                // The name ends in the unit of a time, so that code reads right.
+                assert_eq!(rule.name.ends_with("-s"), rule.unit == "s", "{rule:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_words_of_a_rule_are_its_documentation() {
+        let book = residual::RULES.book();
+        let least = book.rules.iter().find(|r| r.name == "least-excess");
+        let least = least.expect("the rule");
+        assert_eq!(least.value, Value::Number(residual::RULES.least_excess));
+        assert_eq!(
+            least.meaning,
+            "… and is at least this share of the noise energy: `y_sd` is not known better."
+        );
+    }
+}

@@ -66,7 +66,7 @@ pub fn detectable(model: &Model, records: &[Record]) -> Result<Vec<Detectable>, 
     };
     let runs: Result<Vec<Vec<f64>>, SimulateError> =
         judged.iter().map(|r| model.free_run(r)).collect();
-    let bench = Bench::new(model, &judged, runs?)?;
+    let bench = Detector::new(model, &judged, runs?)?;
     let present = model.effect_names();
     let found: Vec<Option<Detectable>> = SPECS
         .par_iter()
@@ -80,7 +80,7 @@ pub fn detectable(model: &Model, records: &[Record]) -> Result<Vec<Detectable>, 
     Ok(found.into_iter().flatten().collect())
 }
 
-struct Bench<'a> {
+struct Detector<'a> {
     model: &'a Model,
     records: &'a [&'a Record],
     runs: Vec<Vec<f64>>,
@@ -92,7 +92,7 @@ struct Bench<'a> {
     starts: Vec<usize>,
 }
 
-impl<'a> Bench<'a> {
+impl<'a> Detector<'a> {
     fn new(
         model: &'a Model,
         records: &'a [&'a Record],
@@ -352,7 +352,7 @@ mod tests {
             .iter()
             .map(|r| true_model.free_run(r).expect("stable"))
             .collect();
-        let bench = Bench::new(model, &judged, runs.clone()).expect("stable");
+        let bench = Detector::new(model, &judged, runs.clone()).expect("stable");
         let joined = bench.joined(&with);
         let before = bench.joined(&runs);
         let y = bench.joined(&judged.iter().map(|r| r.y.clone()).collect::<Vec<_>>());

@@ -12,7 +12,7 @@ use host_fit::indicators::Indicators;
 use host_fit::model::Model;
 use host_fit::output::{Staging, write_atomic};
 use host_fit::picture::{Column, Report};
-use host_fit::steps::{self, DelayKind, Design, DesignRequest, IdentifyRequest, Outcome};
+use host_fit::steps::{self, DelayKind, Design, DesignOutcome, DesignRequest, IdentifyRequest};
 use model_core::control::HoldTimes;
 
 use super::Console;
@@ -243,7 +243,7 @@ fn the_loop(
     let references = || std::iter::repeat_n(TARGET, SAMPLES);
     let steady = close_the_loop(&mut OpenLoop::steady(), &mut rig()?, references());
     let relay = close_the_loop(&mut Relay::new(TIMES, 0.02), &mut rig()?, references());
-    let Outcome::Track(track) = &design.outcome else {
+    let DesignOutcome::Track(track) = &design.outcome else {
         anyhow::bail!("the demo designs a tracking law");
     };
     let designed = run_law(&design.model, &track.law, &mut rig()?, references());

@@ -5,8 +5,8 @@ use host_fit::data::{DataSet, Record};
 use host_fit::design::Proof;
 use host_fit::diagnose::Diagnosis;
 use host_fit::picture::{
-    ClosedLoop, Ladder, LadderRecord, LadderStep, LoopRun, Overlay, Run, closed_loop, ladder,
-    overlay,
+    ClosedLoop, LabelledRun, Ladder, LadderRecord, LadderStep, LoopRun, Overlay, closed_loop,
+    ladder, overlay,
 };
 
 use super::words::role_name;
@@ -14,11 +14,11 @@ use super::words::role_name;
 /// One picture per record: measurement and free runs, labelled.
 pub(crate) fn overlays(records: &[Record], runs: &[(&str, &[Vec<f64>])]) -> Vec<(String, String)> {
     let picture = |(index, record): (usize, &Record)| {
-        let models: Vec<Run<'_>> = runs
+        let models: Vec<LabelledRun<'_>> = runs
             .iter()
             .filter_map(|(label, runs)| {
                 let y = runs.get(index)?;
-                Some(Run { label, y })
+                Some(LabelledRun { label, y })
             })
             .collect();
         let title = format!("{} ({})", record.name, role_name(record.role));

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use host_fit::data::DataSet;
-use host_fit::identify::{DelayLaw, Objective};
+use host_fit::identify::{ExponentialDelay, Objective};
 use host_fit::steps::{self, DelayKind, IdentifyRequest};
 use model_core::recursion::LagConvention;
 
@@ -125,7 +125,7 @@ enum Aim {
 
 /// `--delay-law P0,P1,P2`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct LawArgument(DelayLaw);
+struct LawArgument(ExponentialDelay);
 
 impl FromStr for LawArgument {
     type Err = String;
@@ -140,7 +140,7 @@ impl FromStr for LawArgument {
             &[floor, rise, rate]
                 if numbers.iter().all(|n| n.is_finite()) && floor >= 0.0 && floor + rise >= 0.0 =>
             {
-                Ok(Self(DelayLaw { floor, rise, rate }))
+                Ok(Self(ExponentialDelay { floor, rise, rate }))
             }
             _ => Err("three finite numbers with P0 and P0 + P1 not below 0 are needed, as in 47.35,12.69,20.18".to_owned()),
         }
@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn a_law_is_three_numbers() {
         let law: LawArgument = "47.35, 12.69,20.18".parse().unwrap();
-        assert_eq!(law.0, DelayLaw::PAPER);
+        assert_eq!(law.0, ExponentialDelay::PAPER);
         for wrong in ["", "1,2", "1,2,3,4", "1,2,x", "-1,2,3", "1,-2,3", "nan,1,1"] {
             assert!(wrong.parse::<LawArgument>().is_err(), "{wrong}");
         }

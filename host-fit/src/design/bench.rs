@@ -5,13 +5,13 @@ use crate::simulate::HostState;
 use model_core::{Input, Output, Parts, Real, step};
 
 /// A prepared model with memories that fit it and channels at their references.
-pub(super) struct Bench<T: Real> {
+pub(super) struct Player<T: Real> {
     pub(super) prepared: Prepared<T>,
     pub(super) channels: Vec<T>,
     memory: Footprint,
 }
 
-impl<T: Real> Bench<T> {
+impl<T: Real> Player<T> {
     pub(super) fn of(model: &Model) -> Self {
         let memory = model.memory();
         Self {

@@ -6,7 +6,7 @@
 //! gives, the best one met is the answer, and what is still in flight counts.
 //! Where the beam never had to drop a command, all were tried: the answer is exact.
 
-use super::bench::Bench;
+use super::bench::Player;
 use crate::model::Hold;
 use crate::simulate::HostState;
 use rayon::prelude::*;
@@ -35,15 +35,15 @@ pub(super) struct Plan {
 
 /// A flow in mid-run: the model's state and the valve's.
 #[derive(Clone)]
-pub(super) struct Flow {
+pub(super) struct FlowState {
     pub(super) state: HostState<f64>,
     pub(super) on: bool,
     /// Samples in this position.
     pub(super) since: u32,
 }
 
-impl Flow {
-    pub(super) fn at_rest(bench: &Bench<f64>) -> Self {
+impl FlowState {
+    pub(super) fn at_rest(bench: &Player<f64>) -> Self {
         Self {
             state: bench.at_rest(),
             on: false,
@@ -52,7 +52,7 @@ impl Flow {
     }
 
     /// Plays `samples` at one position and returns the sum of friction minus price.
-    pub(super) fn play(&mut self, bench: &Bench<f64>, on: bool, samples: u32, price: f64) -> f64 {
+    pub(super) fn play(&mut self, bench: &Player<f64>, on: bool, samples: u32, price: f64) -> f64 {
         self.since = if on == self.on {
             self.since.saturating_add(samples)
         } else {
@@ -71,7 +71,7 @@ impl Flow {
 
 #[derive(Clone)]
 struct Node {
-    flow: Flow,
+    flow: FlowState,
     /// Sum so far.
     gained: f64,
     blocks: Vec<bool>,
@@ -80,16 +80,16 @@ struct Node {
     completed: Vec<bool>,
 }
 
-pub(super) struct Search<'a> {
-    pub(super) bench: &'a Bench<f64>,
+pub(super) struct HorizonSearch<'a> {
+    pub(super) bench: &'a Player<f64>,
     pub(super) hold: Hold,
     pub(super) price: f64,
     pub(super) horizon: Horizon,
 }
 
-impl Search<'_> {
+impl HorizonSearch<'_> {
     /// The best command from `start` on.
-    pub(super) fn plan(&self, start: &Flow) -> Plan {
+    pub(super) fn plan(&self, start: &FlowState) -> Plan {
         let block = self.horizon.block.max(1);
         let blocks = (self.horizon.length / block).max(1) as usize;
         let root = self.promise(
@@ -174,7 +174,7 @@ impl Search<'_> {
     /// `length` samples: what a law with this horizon would do. `None` if the
     /// model grows.
     pub(super) fn recede(&self, apply: u32, length: usize) -> Option<Vec<bool>> {
-        let mut flow = Flow::at_rest(self.bench);
+        let mut flow = FlowState::at_rest(self.bench);
         let mut played = Vec::with_capacity(length);
         while played.len() < length {
             let plan = self.plan(&flow);
@@ -230,8 +230,8 @@ mod tests {
     use super::*;
     use model_core::recursion::LagConvention;
 
-    fn search(bench: &Bench<f64>, hold: u32, price: f64, horizon: Horizon) -> Search<'_> {
-        Search {
+    fn search(bench: &Player<f64>, hold: u32, price: f64, horizon: Horizon) -> HorizonSearch<'_> {
+        HorizonSearch {
             bench,
             hold: Hold {
                 on: hold,
@@ -246,7 +246,7 @@ mod tests {
     #[test]
     fn a_beam_that_drops_nothing_finds_what_trying_all_finds() {
         let model = paper_state_dependent(LagConvention::OneStep);
-        let bench = Bench::<f64>::of(&model);
+        let bench = Player::<f64>::of(&model);
         let horizon = Horizon {
             length: 360,
             block: 30,
@@ -255,7 +255,7 @@ mod tests {
         for (hold, price) in [(30, 0.3), (60, 0.1), (90, 0.5)] {
             let search = search(&bench, hold, price, horizon);
             // From a flow that blowing attached, valve just opened.
-            let mut start = Flow::at_rest(&bench);
+            let mut start = FlowState::at_rest(&bench);
             start.play(&bench, true, 900, 0.0);
             start.play(&bench, false, 300, 0.0);
             let plan = search.plan(&start);
@@ -287,7 +287,7 @@ mod tests {
             block: 50,
             width: 24,
         };
-        let after = |bench: &Bench<f64>, command: &[bool]| {
+        let after = |bench: &Player<f64>, command: &[bool]| {
             let mut state = bench.at_rest();
             let y: Vec<f64> = command
                 .iter()
@@ -296,16 +296,16 @@ mod tests {
             y[500..].iter().sum::<f64>() / 4500.0
         };
         let model = paper_state_dependent(LagConvention::OneStep);
-        let bench = Bench::<f64>::of(&model);
-        let plan = search(&bench, 50, 0.0, horizon).plan(&Flow::at_rest(&bench));
+        let bench = Player::<f64>::of(&model);
+        let plan = search(&bench, 50, 0.0, horizon).plan(&FlowState::at_rest(&bench));
         let mean = after(&bench, &plan.command);
         assert!((mean - 1.00).abs() < 0.02, "{mean}");
         assert!(plan.command.iter().filter(|on| !**on).count() < 250);
 
         let mut model = paper_averaged();
         model.averaging.averaged_model = false;
-        let bench = Bench::<f64>::of(&model);
-        let plan = search(&bench, 50, 0.0, horizon).plan(&Flow::at_rest(&bench));
+        let bench = Player::<f64>::of(&model);
+        let plan = search(&bench, 50, 0.0, horizon).plan(&FlowState::at_rest(&bench));
         let mean = after(&bench, &plan.command);
         assert!((1.05..1.15).contains(&mean), "{mean}");
     }

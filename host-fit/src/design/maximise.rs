@@ -7,8 +7,8 @@
 //! over a finite horizon ([`super::horizon`]) can propose further ones.
 
 use super::DesignError;
-use super::bench::Bench;
-use super::horizon::{self, Flow, Horizon};
+use super::bench::Player;
+use super::horizon::{self, FlowState, Horizon};
 use crate::model::{Hold, Maximise, Model, Start};
 use crate::simulate::HostState;
 use rayon::prelude::*;
@@ -133,8 +133,8 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
     if model.start == Start::Measured {
         return Err(DesignError::NotFromRest);
     }
-    let search = Search {
-        bench: Bench::of(model),
+    let search = TrainSearch {
+        bench: Player::of(model),
         hold: Hold {
             on: samples(request.min_on_s),
             off: samples(request.min_off_s),
@@ -146,11 +146,11 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
     let moduli = [model.largest_pole(false)?, model.largest_pole(true)?];
     let mut candidates = search.grid();
     candidates.push(search.judge(&steady));
-    let best_first = |list: &mut Vec<Judged>| list.sort_by(|a, b| b.value.total_cmp(&a.value));
+    let best_first = |list: &mut Vec<JudgedTrain>| list.sort_by(|a, b| b.value.total_cmp(&a.value));
     best_first(&mut candidates);
     // Refined from the best few, which are rarely neighbours of each other.
-    let starts: Vec<Judged> = distinct(&candidates, 6);
-    let mut refined: Vec<Judged> = starts
+    let starts: Vec<JudgedTrain> = distinct(&candidates, 6);
+    let mut refined: Vec<JudgedTrain> = starts
         .par_iter()
         .map(|start| search.refine(start.clone(), request.pulses.clamp(1, 4)))
         .collect();
@@ -243,14 +243,14 @@ impl Train {
 
 /// A train that lasts, and what it is worth when the flow is 2 % faster or slower.
 struct Lasting {
-    judged: Judged,
+    judged: JudgedTrain,
     after: f64,
     detuned: f64,
     robust_value: f64,
 }
 
 #[derive(Clone, Debug)]
-struct Judged {
+struct JudgedTrain {
     train: Train,
     value: f64,
     mean: f64,
@@ -258,7 +258,7 @@ struct Judged {
     range: [f64; 2],
 }
 
-impl Judged {
+impl JudgedTrain {
     fn worthless(train: &Train) -> Self {
         Self {
             train: train.clone(),
@@ -270,14 +270,14 @@ impl Judged {
     }
 }
 
-struct Search {
-    bench: Bench<f64>,
+struct TrainSearch {
+    bench: Player<f64>,
     hold: Hold,
     price: f64,
     longest: u32,
 }
 
-impl Search {
+impl TrainSearch {
     /// Whether the valve can play it: every pulse and every gap long enough.
     fn playable(&self, train: &Train) -> bool {
         if *train == Train::steady() {
@@ -297,17 +297,17 @@ impl Search {
             })
     }
 
-    fn judge(&self, train: &Train) -> Judged {
+    fn judge(&self, train: &Train) -> JudgedTrain {
         if !self.playable(train) {
-            return Judged::worthless(train);
+            return JudgedTrain::worthless(train);
         }
         let mut played = Played::new(&self.bench, train);
         played.pass(SETTLE);
         let judged = played.judge(JUDGED, self.price);
-        judged.unwrap_or_else(|| Judged::worthless(train))
+        judged.unwrap_or_else(|| JudgedTrain::worthless(train))
     }
 
-    fn grid(&self) -> Vec<Judged> {
+    fn grid(&self) -> Vec<JudgedTrain> {
         let shortest = f64::from((self.hold.on + self.hold.off).max(20));
         let octaves = (f64::from(self.longest) / shortest).max(1.0);
         const PERIODS: u32 = 72;
@@ -334,7 +334,7 @@ impl Search {
             .on
             .max(self.hold.off)
             .max(length.div_ceil(MOST_BLOCKS));
-        let search = horizon::Search {
+        let search = horizon::HorizonSearch {
             bench: &self.bench,
             hold: self.hold,
             price: self.price,
@@ -344,8 +344,8 @@ impl Search {
                 width: WIDTH,
             },
         };
-        let plan = search.plan(&Flow::at_rest(&self.bench));
-        let blown = Flow::at_rest(&self.bench).play(&self.bench, true, length, self.price);
+        let plan = search.plan(&FlowState::at_rest(&self.bench));
+        let blown = FlowState::at_rest(&self.bench).play(&self.bench, true, length, self.price);
         let open = plan.command.iter().filter(|on| **on).count();
         let mut planned = Planned {
             horizon_s: f64::from(length) * 0.001,
@@ -375,7 +375,7 @@ impl Search {
 
     /// Coordinate search with shrinking steps, then with one pulse more as long
     /// as that helps.
-    fn refine(&self, start: Judged, most: usize) -> Judged {
+    fn refine(&self, start: JudgedTrain, most: usize) -> JudgedTrain {
         let mut best = self.descend(start);
         while best.train.pulses.len() < most && best.train.period > 4 * self.hold.on {
             let mut train = best.train.clone();
@@ -401,7 +401,7 @@ impl Search {
         best
     }
 
-    fn descend(&self, start: Judged) -> Judged {
+    fn descend(&self, start: JudgedTrain) -> JudgedTrain {
         let mut best = start;
         if best.train == Train::steady() {
             return best;
@@ -486,7 +486,7 @@ impl Search {
 
     /// What the train gives from 20 s to 40 s, and its mean at the end of four
     /// minutes; `None` if the motion has grown by then.
-    fn long_run(&self, train: &Train) -> Option<(Judged, f64)> {
+    fn long_run(&self, train: &Train) -> Option<(JudgedTrain, f64)> {
         let mut played = Played::new(&self.bench, train);
         played.pass(SETTLED);
         let judged = played.judge(SETTLED, self.price)?;
@@ -502,7 +502,7 @@ impl Search {
 
 /// A train being played to the model.
 struct Played<'a> {
-    bench: &'a Bench<f64>,
+    bench: &'a Player<f64>,
     train: &'a Train,
     on: Vec<bool>,
     state: HostState<f64>,
@@ -511,7 +511,7 @@ struct Played<'a> {
 }
 
 impl<'a> Played<'a> {
-    fn new(bench: &'a Bench<f64>, train: &'a Train) -> Self {
+    fn new(bench: &'a Player<f64>, train: &'a Train) -> Self {
         Self {
             bench,
             train,
@@ -541,7 +541,7 @@ impl<'a> Played<'a> {
     }
 
     /// Judges whole periods, at least `samples` long; `None` if the model has grown.
-    fn judge(&mut self, samples: usize, price: f64) -> Option<Judged> {
+    fn judge(&mut self, samples: usize, price: f64) -> Option<JudgedTrain> {
         let length = samples.div_ceil(self.on.len()) * self.on.len();
         let (mut sum, mut open) = (0.0, 0.0);
         let mut range = [f64::MAX, f64::MIN];
@@ -555,7 +555,7 @@ impl<'a> Played<'a> {
             range = [range[0].min(s), range[1].max(s)];
         }
         let (mean, duty) = (sum / length as f64, open / length as f64);
-        Some(Judged {
+        Some(JudgedTrain {
             train: self.train.clone(),
             value: mean - price * duty,
             mean,
@@ -575,10 +575,10 @@ fn played(train: &Train) -> Vec<bool> {
 
 /// The first `count` of a sorted list, none with a period within 15 % and a
 /// duty within 0.1 of a better one.
-fn distinct(sorted: &[Judged], count: usize) -> Vec<Judged> {
-    let mut kept: Vec<Judged> = Vec::new();
+fn distinct(sorted: &[JudgedTrain], count: usize) -> Vec<JudgedTrain> {
+    let mut kept: Vec<JudgedTrain> = Vec::new();
     for judged in sorted.iter().filter(|j| j.value.is_finite()) {
-        let near = |other: &Judged| {
+        let near = |other: &JudgedTrain| {
             let ratio = f64::from(judged.train.period) / f64::from(other.train.period);
             ratio.ln().abs() < 0.15 && (judged.duty - other.duty).abs() < 0.1
         };
@@ -592,7 +592,7 @@ fn distinct(sorted: &[Judged], count: usize) -> Vec<Judged> {
     kept
 }
 
-fn outside(model: &Model, judged: &Judged) -> Option<Outside> {
+fn outside(model: &Model, judged: &JudgedTrain) -> Option<Outside> {
     let training = &model.training;
     if training.y_range == [0.0; 2] {
         return None;
@@ -682,8 +682,8 @@ mod tests {
             period: 250,
             pulses: vec![(0, 100)],
         };
-        let search = Search {
-            bench: Bench::of(&model),
+        let search = TrainSearch {
+            bench: Player::of(&model),
             hold: Hold { on: 10, off: 10 },
             price: 0.4,
             longest: 3000,
@@ -716,7 +716,7 @@ mod tests {
         model.training.y_range = [0.0, 1.1];
         model.training.duty_range = [0.5, 1.0];
         model.training.on_time_range_s = [0.0625, 8.5];
-        let judged = Judged {
+        let judged = JudgedTrain {
             train: Train {
                 period: 550,
                 pulses: vec![(0, 25)],

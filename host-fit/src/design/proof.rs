@@ -2,7 +2,7 @@
 //! The program brings the nearest physical plant, with effects that the law does not
 //! know of and under worse conditions than designed for.
 
-use super::bench::Bench;
+use super::bench::Player;
 use crate::model::{Maximise, Model, Track};
 use crate::simulate::HostState;
 use closed_loop::{
@@ -121,7 +121,7 @@ pub fn prove<F>(model: &Model, law: &Track, plant: &Trial<F>, others: &[Trial<F>
 where
     F: Controlled + Clone + Sync,
 {
-    let bench = Bench::<f32>::of(model);
+    let bench = Player::<f32>::of(model);
     let (as_it_is, trace) = plant.run(&mut host_law(&bench, law), law.reference);
     let mut cases = vec![on_model(law, &bench), as_it_is];
     cases.par_extend(others.par_iter().map(|trial| {
@@ -168,7 +168,7 @@ pub fn run_law(
     flow: &mut impl Controlled,
     references: impl IntoIterator<Item = f64>,
 ) -> Trace {
-    let bench = Bench::<f32>::of(model);
+    let bench = Player::<f32>::of(model);
     run(&mut host_law(&bench, law), flow, references)
 }
 
@@ -180,7 +180,7 @@ type HostLaw<'a> = TrackingController<
     crate::simulate::Ring<f32>,
 >;
 
-fn host_law<'a>(bench: &'a Bench<f32>, law: &Track) -> HostLaw<'a> {
+fn host_law<'a>(bench: &'a Player<f32>, law: &Track) -> HostLaw<'a> {
     let at_rest: HostState<f32> = bench.at_rest();
     TrackingController::new(
         &bench.prepared,
@@ -190,7 +190,7 @@ fn host_law<'a>(bench: &'a Bench<f32>, law: &Track) -> HostLaw<'a> {
     )
 }
 
-fn on_model(law: &Track, bench: &Bench<f32>) -> Case {
+fn on_model(law: &Track, bench: &Player<f32>) -> Case {
     let itself = Trial {
         group: CaseGroup::Model,
         name: "the model itself, no noise".to_owned(),

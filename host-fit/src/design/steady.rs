@@ -1,7 +1,7 @@
 //! What a model settles at, whether it settles, and how fast.
 
 use super::DesignError;
-use super::bench::Bench;
+use super::bench::Player;
 use crate::model::Model;
 use serde::Serialize;
 
@@ -26,7 +26,7 @@ const LONGEST_S: f64 = 60.0;
 /// [`DesignError::Unsettled`] when it does not within a minute,
 /// [`DesignError::NotConverged`] when the poles cannot be found.
 pub fn steady(model: &Model, on: bool) -> Result<Steady, DesignError> {
-    let bench = Bench::<f64>::of(model);
+    let bench = Player::<f64>::of(model);
     let mut state = bench.at_rest();
     let per_second = (1.0 / model.sample_period_s).round().max(1.0) as usize;
     for _ in 0..2 * per_second {
@@ -69,7 +69,7 @@ pub fn steady(model: &Model, on: bool) -> Result<Steady, DesignError> {
 /// `high`, opening and closing, s (0.001–10).
 #[must_use]
 pub fn time_constants(model: &Model, low: f64, high: f64) -> [f64; 2] {
-    let bench = Bench::<f64>::of(model);
+    let bench = Player::<f64>::of(model);
     let mut state = bench.at_rest();
     let per_second = (1.0 / model.sample_period_s).round() as usize;
     [true, false].map(|on| {

@@ -1,7 +1,7 @@
 //! The constants of the tracking law, from the model and the valve's limits.
 
 use super::DesignError;
-use super::bench::Bench;
+use super::bench::Player;
 use super::steady::{Steady, steady, time_constants};
 use crate::model::{Delay, Hold, Model, Start, Track};
 use closed_loop::{AHEAD, Figures, ModelFlow, TrackingController, run};
@@ -117,7 +117,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         }
     }
 
-    let bench = Bench::<f64>::of(model);
+    let bench = Player::<f64>::of(model);
     let (shortest, longest) = bench.first_arrival(1.2 * blown.friction);
     let (opening, closing) = bench.valve();
     let equivalent_duty = equivalent_duty(model, request.target);
@@ -273,7 +273,7 @@ fn paced(law: &Track, rate: f64, duty: f64) -> Track {
 }
 
 /// The law on the model itself, 5 s after the start and over 10 s, without the air budget.
-fn on_model(bench: &Bench<f64>, tracking: Tracking<f64>) -> Figures {
+fn on_model(bench: &Player<f64>, tracking: Tracking<f64>) -> Figures {
     let free = Tracking {
         budget: Budget {
             air: None,

@@ -11,13 +11,13 @@ const TAIL: f64 = 0.15;
 
 /// A command as openings in time.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Plan {
+pub(super) struct Openings {
     pub(super) description: String,
     /// Dwells in turn, closed first, s.
     dwells: Vec<f64>,
 }
 
-impl Plan {
+impl Openings {
     /// The command per sample.
     pub(super) fn command(&self, period: f64, samples: usize) -> Vec<f64> {
         let mut u = Vec::with_capacity(samples);
@@ -60,7 +60,7 @@ fn geometric(low: f64, high: f64, n: u32) -> impl Iterator<Item = f64> {
 }
 
 /// Square waves, single pulses, pairs with growing pauses, random sequences.
-pub(super) fn families(limits: &Limits, rng: &mut ChaCha8Rng) -> Vec<Plan> {
+pub(super) fn families(limits: &Limits, rng: &mut ChaCha8Rng) -> Vec<Openings> {
     let Limits {
         min_on_s: on,
         min_off_s: off,
@@ -76,13 +76,13 @@ pub(super) fn families(limits: &Limits, rng: &mut ChaCha8Rng) -> Vec<Plan> {
                     1.0 / period,
                     100.0 * duty
                 );
-                plans.push(Plan::repeating(name, limits, &[open, closed]));
+                plans.push(Openings::repeating(name, limits, &[open, closed]));
             }
         }
     }
     for open in geometric(on, 0.5 * duration, 10) {
         let name = format!("a single pulse of {open:.3} s");
-        plans.push(Plan {
+        plans.push(Openings {
             description: name,
             dwells: vec![off.max(0.05 * duration), open],
         });
@@ -96,7 +96,7 @@ pub(super) fn families(limits: &Limits, rng: &mut ChaCha8Rng) -> Vec<Plan> {
             let name = format!(
                 "pairs of pulses of {first:.3} and {second:.3} s with pauses growing from {off:.3} to {rest:.3} s"
             );
-            plans.push(Plan::repeating(name, limits, &dwells));
+            plans.push(Openings::repeating(name, limits, &dwells));
         }
     }
     for i in 0..RANDOM {
@@ -108,13 +108,13 @@ pub(super) fn families(limits: &Limits, rng: &mut ChaCha8Rng) -> Vec<Plan> {
             })
             .collect();
         let name = format!("a random on/off sequence with dwells up to {longest:.3} s");
-        plans.push(Plan::repeating(name, limits, &dwells));
+        plans.push(Openings::repeating(name, limits, &dwells));
     }
     plans
 }
 
 /// The plan with some dwells changed.
-pub(super) fn mutate(plan: &Plan, limits: &Limits, rng: &mut ChaCha8Rng) -> Plan {
+pub(super) fn mutate(plan: &Openings, limits: &Limits, rng: &mut ChaCha8Rng) -> Openings {
     let mut changed = plan.clone();
     let share = rng.random_range(0.05..0.6);
     let size = rng.random_range(0.05..0.8);

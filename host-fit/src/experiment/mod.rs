@@ -10,7 +10,7 @@ use crate::model::Model;
 use crate::model::Rounding;
 use crate::output::{OutputError, write_atomic};
 use crate::simulate::{Signals, Simulator};
-use command::{Plan, families, mutate};
+use command::{Openings, families, mutate};
 use model_core::Output;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -137,7 +137,7 @@ pub fn separating(
     let samples = (limits.duration_s / period).round() as usize;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let plans = families(limits, &mut rng);
-    let score = |plan: &Plan| separation(models, &plan.command(period, samples)) / noise_rmse;
+    let score = |plan: &Openings| separation(models, &plan.command(period, samples)) / noise_rmse;
     let mut best = pick(plans, &score).ok_or(refused)?;
     for _ in 0..ROUNDS {
         let variations = (0..VARIATIONS)
@@ -162,7 +162,10 @@ pub fn separating(
 }
 
 /// The best plan, the first among equals.
-fn pick(plans: Vec<Plan>, score: &(dyn Fn(&Plan) -> f64 + Sync)) -> Option<(Plan, f64)> {
+fn pick(
+    plans: Vec<Openings>,
+    score: &(dyn Fn(&Openings) -> f64 + Sync),
+) -> Option<(Openings, f64)> {
     let scores: Vec<f64> = plans.par_iter().map(score).collect();
     plans
         .into_iter()

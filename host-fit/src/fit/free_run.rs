@@ -2,7 +2,7 @@
 //! by dual numbers, secants for what acts in steps, and standard errors that allow for
 //! correlated residuals.
 
-use super::levenberg::{LeastSquares, Part, StopReason, minimise};
+use super::levenberg::{FitStop, LeastSquares, Part, minimise};
 use super::rules::RULES;
 use crate::data::Record;
 use crate::dual::Dual;
@@ -62,7 +62,7 @@ pub struct Fit {
     /// Iterations made.
     pub iterations: usize,
     /// Why the fit ended.
-    pub stop: StopReason,
+    pub stop: FitStop,
 }
 
 impl Fit {
@@ -88,7 +88,7 @@ impl Fit {
 
 /// How a coordinate is searched.
 #[derive(Clone, Copy, Debug)]
-struct Axis {
+struct Searched {
     index: usize,
     logarithmic: bool,
     low: f64,
@@ -99,7 +99,7 @@ struct Axis {
     against: Option<usize>,
 }
 
-impl Axis {
+impl Searched {
     fn of(index: usize, coordinate: &Coordinate) -> Self {
         match coordinate.parameter() {
             None => Self {
@@ -151,16 +151,16 @@ impl Axis {
     }
 }
 
-struct Problem<'a> {
+struct FreeRunProblem<'a> {
     model: &'a Model,
     signals: Vec<Signals<'a>>,
     measured: Vec<&'a [f64]>,
-    axes: Vec<Axis>,
+    axes: Vec<Searched>,
     warm_up: usize,
     rounding: Rounding,
 }
 
-impl Problem<'_> {
+impl FreeRunProblem<'_> {
     /// y_sim of a record; `None` if it diverges.
     fn run(&self, values: &[f64], record: usize) -> Option<Vec<f64>> {
         let signals = &self.signals[record];
@@ -261,7 +261,7 @@ impl Problem<'_> {
     }
 }
 
-impl LeastSquares for Problem<'_> {
+impl LeastSquares for FreeRunProblem<'_> {
     fn free(&self) -> usize {
         self.axes.len()
     }
@@ -300,7 +300,7 @@ impl LeastSquares for Problem<'_> {
     }
 
     fn reach(&self, values: &[f64]) -> Vec<(f64, f64)> {
-        let reach = |axis: &Axis| axis.reach(values[axis.index]);
+        let reach = |axis: &Searched| axis.reach(values[axis.index]);
         self.axes.iter().map(reach).collect()
     }
 
@@ -397,16 +397,16 @@ fn descend(
         Some(parameter) if parameter.low >= parameter.high => false,
         Some(_) => options.delay || !matches!(coordinate.kind, Kind::Delay(_)),
     };
-    let axes: Vec<Axis> = coordinates
+    let axes: Vec<Searched> = coordinates
         .iter()
         .enumerate()
         .filter(|(index, coordinate)| moves(*index, coordinate))
-        .map(|(index, coordinate)| Axis {
+        .map(|(index, coordinate)| Searched {
             against: held_sum(model, index),
-            ..Axis::of(index, coordinate)
+            ..Searched::of(index, coordinate)
         })
         .collect();
-    let problem = Problem {
+    let problem = FreeRunProblem {
         model,
         signals: signals?,
         measured: records.iter().map(|record| record.y.as_slice()).collect(),
@@ -453,7 +453,7 @@ fn descend(
 fn covariance(
     parts: &[Part],
     information: &[f64],
-    axes: &[Axis],
+    axes: &[Searched],
     values: &[f64],
 ) -> Option<Vec<f64>> {
     let n = axes.len();
@@ -494,7 +494,7 @@ fn sandwich(parts: &[Part], inverse: &[f64], n: usize) -> Vec<f64> {
 }
 
 /// Covariance of the coordinates themselves from that of what is searched.
-fn in_values(searched: &[f64], axes: &[Axis], values: &[f64]) -> Vec<f64> {
+fn in_values(searched: &[f64], axes: &[Searched], values: &[f64]) -> Vec<f64> {
     let n = axes.len();
     // ∂coordinate i/∂searched j.
     let slope = |i: usize, j: usize| match axes[j].against {

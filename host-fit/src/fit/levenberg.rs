@@ -27,7 +27,7 @@ const ORTHOGONAL: f64 = 1e-6;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
-pub enum StopReason {
+pub enum FitStop {
     /// An iteration lowered the sum of squares by less than the tolerance.
     Converged,
     /// The residual is orthogonal to everything that the free coordinates can do.
@@ -43,7 +43,7 @@ pub enum StopReason {
     Diverged,
 }
 
-impl StopReason {
+impl FitStop {
     /// Whether the parameters are those of a minimum.
     #[must_use]
     pub fn was_successful(self) -> bool {
@@ -98,7 +98,7 @@ pub(crate) struct Descent {
     pub(crate) values: Vec<f64>,
     pub(crate) cost: f64,
     pub(crate) iterations: usize,
-    pub(crate) stop: StopReason,
+    pub(crate) stop: FitStop,
     /// The last linearisation and its JᵀJ (row-major); one iteration old where that
     /// lowered the cost.
     pub(crate) linearised: Option<(Vec<Part>, Vec<f64>)>,
@@ -119,13 +119,13 @@ pub(crate) fn minimise(
     let mut linearised = None;
     let stop = loop {
         if n == 0 {
-            break StopReason::NothingToFit;
+            break FitStop::NothingToFit;
         }
         if made == iterations {
-            break StopReason::IterationLimit;
+            break FitStop::IterationLimit;
         }
         let Some(parts) = problem.linearise(&values) else {
-            break StopReason::Diverged;
+            break FitStop::Diverged;
         };
         let (information, gradient) = normal_equations(&parts, n);
         made += 1;
@@ -153,16 +153,16 @@ pub(crate) fn minimise(
         linearised = Some((parts, information));
         let Some((moved_cost, moved)) = lowered else {
             break if stationary {
-                StopReason::Stationary
+                FitStop::Stationary
             } else {
-                StopReason::NoDescent
+                FitStop::NoDescent
             };
         };
         let gain = (cost - moved_cost) / cost.max(f64::MIN_POSITIVE);
         values = moved;
         cost = moved_cost;
         if gain < tolerance {
-            break StopReason::Converged;
+            break FitStop::Converged;
         }
     };
     Descent {
@@ -537,15 +537,15 @@ mod tests {
             assert!(end.iterations <= iterations && !end.stop.words().is_empty());
             end.stop
         };
-        assert_eq!(stop(3, 1e-9), StopReason::IterationLimit);
-        assert_eq!(stop(100, 1e-3), StopReason::Converged);
-        assert_eq!(stop(0, 1e-3), StopReason::IterationLimit);
+        assert_eq!(stop(3, 1e-9), FitStop::IterationLimit);
+        assert_eq!(stop(100, 1e-3), FitStop::Converged);
+        assert_eq!(stop(0, 1e-3), FitStop::IterationLimit);
         let nothing = Curve {
             bounds: Vec::new(),
             ..curve
         };
         let end = minimise(&nothing, vec![1.0, 1.0], 1.0, 5, 1e-3);
-        assert_eq!((end.stop, end.iterations), (StopReason::NothingToFit, 0));
+        assert_eq!((end.stop, end.iterations), (FitStop::NothingToFit, 0));
         assert!(end.stop.was_successful());
     }
 }

@@ -13,5 +13,5 @@ pub(crate) use drift::pieces;
 pub use drift::restart_after;
 pub use free_run::{Fit, FitOptions, fit, sensitivities};
 pub use lean::{lean_base, settle_fixed_delay};
-pub use levenberg::StopReason;
+pub use levenberg::FitStop;
 pub use rules::{RULES, Rules};

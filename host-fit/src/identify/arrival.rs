@@ -4,7 +4,7 @@ use model_core::average::WindowSum;
 use model_core::delay::{DelayLaw as _, ScaledDelay, Tap};
 use model_core::effects::StateDependentDelay;
 
-use super::structure::{DelayLaw, FACTOR_STEP, InputDelay, Series, Structure, WINDOW};
+use super::structure::{ExponentialDelay, FACTOR_STEP, InputDelay, Series, Structure, WINDOW};
 
 /// Strength with which samples enter a sum of products.
 #[derive(Debug, Clone, PartialEq)]
@@ -255,7 +255,7 @@ pub(crate) fn factor(tick: i64) -> f64 {
 pub(crate) type CoreLaw = ScaledDelay<StateDependentDelay<f64>, [f64; 1], true>;
 
 /// The law as the model's core runs it.
-pub(crate) fn core_law(law: &DelayLaw, factor: f64) -> CoreLaw {
+pub(crate) fn core_law(law: &ExponentialDelay, factor: f64) -> CoreLaw {
     ScaledDelay {
         law: StateDependentDelay {
             floor: law.floor,
@@ -336,7 +336,7 @@ mod tests {
     #[test]
     fn the_arriving_command_follows_the_definition() {
         let (u, y) = wave();
-        let law = DelayLaw {
+        let law = ExponentialDelay {
             floor: 20.0,
             rise: 30.0,
             rate: 3.0,

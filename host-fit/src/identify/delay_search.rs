@@ -12,7 +12,7 @@ use super::one_step::{KickStep, OneStep, exchange_pairs, exchange_singles};
 use super::options::{IdentifyOptions, Objective};
 use super::regression::Regression;
 use crate::search::{
-    Evaluation, Point, Progress, Report, SearchStep, Settle, Speculative, Success, minimise,
+    Evaluation, Point, Progress, SearchReport, SearchStep, Settle, Speculative, Success, minimise,
 };
 
 /// Fruitless kicks of a free-run search per unit of patience, and kicks in all.
@@ -24,7 +24,7 @@ pub(crate) fn search(
     options: &IdentifyOptions,
     progress: &dyn Progress,
     interrupt: &AtomicBool,
-) -> (Regression, Report) {
+) -> (Regression, SearchReport) {
     let mut rng = ChaCha8Rng::seed_from_u64(options.search.seed);
     let mut draw = || -> Point {
         regression

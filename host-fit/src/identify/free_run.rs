@@ -2,7 +2,7 @@
 //! a simulation of every record.
 
 use super::coefficients::Coefficients;
-use super::free_runner::{FreeRunner, Outcome, Trajectory};
+use super::free_runner::{FreeRunner, RunOutcome, Trajectory};
 use super::layout::Delays;
 use super::linearised::Linearised;
 use super::regression::Regression;
@@ -28,9 +28,9 @@ impl FreeRun {
             .runner
             .run(&self.regression.signals, delays, &coefficients, limit, None)
         {
-            Outcome::Squared(sum) => Evaluation::Value(sum.sqrt()),
-            Outcome::AtLeast(_) => Evaluation::AtLeast(give_up_at),
-            Outcome::Diverged(done) => Evaluation::Value(DIVERGED_VALUE * (1.0 - 0.5 * done)),
+            RunOutcome::Squared(sum) => Evaluation::Value(sum.sqrt()),
+            RunOutcome::AtLeast(_) => Evaluation::AtLeast(give_up_at),
+            RunOutcome::Diverged(done) => Evaluation::Value(DIVERGED_VALUE * (1.0 - 0.5 * done)),
         }
     }
 
@@ -47,7 +47,7 @@ impl FreeRun {
             f64::INFINITY,
             Some(&mut trajectory),
         );
-        matches!(outcome, Outcome::Squared(_)).then(|| {
+        matches!(outcome, RunOutcome::Squared(_)).then(|| {
             Linearised::new(
                 signals,
                 &self.regression.layout,

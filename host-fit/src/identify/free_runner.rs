@@ -14,14 +14,14 @@ use super::arrival::{CoreLaw, Signals, core_law, factor};
 use super::coefficients::Coefficients;
 use super::layout::Delays;
 use super::rules::RULES;
-use super::structure::{DelayLaw, InputDelay, Structure, WINDOW};
+use super::structure::{ExponentialDelay, InputDelay, Structure, WINDOW};
 
 /// Samples computed together at most.
 const BLOCK: usize = 32;
 
 /// What a simulation came to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Outcome {
+pub(crate) enum RunOutcome {
     /// Σ (y − y_sim)² over all records.
     Squared(f64),
     /// Given up once the sum had reached this.
@@ -146,7 +146,7 @@ struct Arrival {
 }
 
 impl Arrival {
-    fn new(tick: i64, law: Option<&DelayLaw>) -> Self {
+    fn new(tick: i64, law: Option<&ExponentialDelay>) -> Self {
         let law = law.map(|law| core_law(law, factor(tick)));
         let ends = match &law {
             None => [tick.max(0) as usize; 2],
@@ -204,14 +204,14 @@ impl FreeRunner {
         coefficients: &Coefficients,
         give_up_at: f64,
         keep: Option<&mut Trajectory>,
-    ) -> Outcome {
+    ) -> RunOutcome {
         let recursion = Recursion::new(&self.structure, delays, coefficients);
         let law = match &self.structure.delay {
             InputDelay::Fixed { .. } => None,
             InputDelay::StateDependent { law, .. } => Some(law),
         };
         let arrivals: Vec<Arrival> = delays.ticks.iter().map(|t| Arrival::new(*t, law)).collect();
-        pulp::Arch::new().dispatch(Run {
+        pulp::Arch::new().dispatch(BlockRun {
             runner: self,
             signals,
             recursion: &recursion,
@@ -223,7 +223,7 @@ impl FreeRunner {
 }
 
 /// One run over all records, compiled for the vector unit that the machine has.
-struct Run<'a> {
+struct BlockRun<'a> {
     runner: &'a FreeRunner,
     signals: &'a Signals,
     recursion: &'a Recursion,
@@ -235,7 +235,7 @@ struct Run<'a> {
 /// Terms of ỹ's sum, eq. (1).
 const AVERAGED: usize = WINDOW as usize - 1;
 
-impl Run<'_> {
+impl BlockRun<'_> {
     /// What the delay follows at the step that place `at` holds, given ỹ's sum.
     #[inline(always)]
     fn follows(&self, outputs: &[f64], at: usize, sum: f64) -> f64 {
@@ -256,11 +256,11 @@ impl Run<'_> {
     }
 }
 
-impl pulp::NullaryFnOnce for Run<'_> {
-    type Output = Outcome;
+impl pulp::NullaryFnOnce for BlockRun<'_> {
+    type Output = RunOutcome;
 
     #[inline(always)]
-    fn call(mut self) -> Outcome {
+    fn call(mut self) -> RunOutcome {
         let FreeRunner {
             structure,
             bound,
@@ -344,13 +344,13 @@ impl pulp::NullaryFnOnce for Run<'_> {
                 let follow = next.iter_mut().zip(known).take(unjudged);
                 follow.for_each(|(n, y)| *n = *y);
                 if next.iter().any(|y| y.abs() > *bound || y.is_nan()) {
-                    return Outcome::Diverged((done + k) as f64 / *all_samples as f64);
+                    return RunOutcome::Diverged((done + k) as f64 / *all_samples as f64);
                 }
                 for (s, y) in next.iter().zip(known).skip(unjudged) {
                     sum += (y - s) * (y - s);
                 }
                 if sum >= self.give_up_at {
-                    return Outcome::AtLeast(sum);
+                    return RunOutcome::AtLeast(sum);
                 }
                 k += count;
             }
@@ -361,7 +361,7 @@ impl pulp::NullaryFnOnce for Run<'_> {
                     .push(outputs[padding..padding + samples].to_vec());
             }
         }
-        Outcome::Squared(sum)
+        RunOutcome::Squared(sum)
     }
 }
 

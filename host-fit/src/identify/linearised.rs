@@ -24,7 +24,7 @@ const STRIDE: usize = 41;
 const LANES: usize = 16;
 
 /// One record of the run that is linearised.
-struct Run<'a> {
+struct SensitivityRun<'a> {
     padded: &'a [f32],
     arrived: &'a [Vec<f32>],
     state: &'a [(usize, f32)],
@@ -36,7 +36,7 @@ struct Run<'a> {
 /// block on and samples the result. Block 0 are the outputs alone, block l the
 /// outputs times the command that arrives through input l.
 struct Filter<'a> {
-    run: &'a Run<'a>,
+    run: &'a SensitivityRun<'a>,
     lags: usize,
     first_element: usize,
     block: usize,
@@ -53,7 +53,7 @@ impl pulp::NullaryFnOnce for Filter<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Run {
+        let SensitivityRun {
             padded,
             arrived,
             state,
@@ -188,7 +188,7 @@ impl Linearised {
             let mut padded = vec![0.0f32; lags + 1 + LANES];
             padded.extend(simulated.iter().map(|y| *y as f32));
             padded.push(0.0);
-            let run = Run {
+            let run = SensitivityRun {
                 padded: &padded,
                 arrived: &arrived,
                 state: &state,

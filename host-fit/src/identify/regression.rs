@@ -437,7 +437,7 @@ impl Regression {
 
 #[cfg(test)]
 mod tests {
-    use super::super::structure::{DelayLaw, InputDelay};
+    use super::super::structure::{ExponentialDelay, InputDelay};
     use super::*;
 
     fn records(graded: bool) -> Vec<(Vec<f64>, Vec<f64>)> {
@@ -483,7 +483,7 @@ mod tests {
 
     #[test]
     fn tables_corrections_and_direct_sums_agree_with_the_exact_fit() {
-        let law = DelayLaw {
+        let law = ExponentialDelay {
             floor: 20.0,
             rise: 15.0,
             rate: 2.0,

@@ -281,7 +281,7 @@ mod tests {
     /// ε inside the search is that of the model's own free run.
     #[test]
     fn the_search_simulates_what_the_model_simulates() {
-        let law = super::super::DelayLaw {
+        let law = super::super::ExponentialDelay {
             floor: 15.0,
             rise: 12.0,
             rate: 4.0,

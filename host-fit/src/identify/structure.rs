@@ -12,7 +12,7 @@ pub(crate) const FACTOR_STEP: f64 = 1e-4;
 
 /// The three numbers of the delay law h̃(ỹ) = p0 + p1·exp(−p2·ỹ), eq. (2).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DelayLaw {
+pub struct ExponentialDelay {
     /// p0, samples: delay of the attached flow.
     pub floor: f64,
     /// p1, samples: how much longer the delay of the separated flow is.
@@ -21,7 +21,7 @@ pub struct DelayLaw {
     pub rate: f64,
 }
 
-impl DelayLaw {
+impl ExponentialDelay {
     /// The law published in the paper, for its rig.
     pub const PAPER: Self = Self {
         floor: 47.35,
@@ -46,7 +46,7 @@ pub enum InputDelay {
     /// h_l = round(f_l·h̃), eq. (4).
     StateDependent {
         /// The law h̃.
-        law: DelayLaw,
+        law: ExponentialDelay,
         /// Given factors f_l, one per input, or `None` to search them in steps of 10⁻⁴.
         factors: Option<Vec<f64>>,
     },
@@ -87,7 +87,7 @@ impl Default for Structure {
             longest_lag: 500,
             convention: LagConvention::OneStep,
             delay: InputDelay::StateDependent {
-                law: DelayLaw::PAPER,
+                law: ExponentialDelay::PAPER,
                 factors: Some(vec![1.0]),
             },
             averaged: false,

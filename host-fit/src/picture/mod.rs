@@ -29,7 +29,7 @@ pub use closed_loop::{ClosedLoop, LoopRun, closed_loop};
 pub use delay_law::{DelayEdge, DelayLawPlot, LawPoint, MeasuredDelay, delay_law};
 pub use format::significant;
 pub use ladder::{Ladder, LadderRecord, LadderStep, ladder};
-pub use overlay::{Overlay, Run, overlay};
+pub use overlay::{LabelledRun, Overlay, overlay};
 pub use ranking::{Candidate, Ranking, ranking};
 pub use report::{Column, KeyNumber, Report, Tone};
 pub use where_it_fails::{FailureBin, FailureView, WhereItFails, where_it_fails};

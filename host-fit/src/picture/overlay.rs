@@ -11,7 +11,7 @@ use super::strip::{HEIGHT as STRIP, columns, strip};
 
 /// One free-run simulation of a model.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Run<'a> {
+pub struct LabelledRun<'a> {
     /// What the legend says, for example `"fixed delay, FIT 87.6 %"`.
     pub label: &'a str,
     /// Simulated output, one value per sample of the record, in the unit of y.
@@ -40,7 +40,7 @@ pub struct Overlay<'a> {
     /// Largest value over the repeats.
     pub y_max: Option<&'a [f64]>,
     /// Models to compare, the most important last (drawn on top).
-    pub models: &'a [Run<'a>],
+    pub models: &'a [LabelledRun<'a>],
     /// Part to show, from and to, s; the whole record when `None`.
     pub window_s: Option<(f64, f64)>,
 }
@@ -254,7 +254,7 @@ mod tests {
             sample_period_s: 0.001,
             u: &u,
             y: &y,
-            models: &[Run {
+            models: &[LabelledRun {
                 label: "m",
                 y: &model,
             }],
@@ -287,7 +287,7 @@ mod tests {
             .map(|k| y[k] + 0.1 * ((k * 7919 % 1000) as f64 / 1000.0))
             .collect();
         let sd = vec![0.02; y.len()];
-        let models = [Run {
+        let models = [LabelledRun {
             label: "model",
             y: &noisy,
         }; 10];
@@ -316,7 +316,7 @@ mod tests {
                         y_sd: Some(&model),
                         y_min: Some(&y),
                         y_max: Some(&model),
-                        models: &[Run {
+                        models: &[LabelledRun {
                             label: "<m>",
                             y: &model,
                         }],

@@ -39,7 +39,7 @@ pub(super) struct Share {
 }
 
 /// A sample that is judged.
-struct Sample {
+struct JudgedSample {
     fold: usize,
     block: usize,
     bin: Option<usize>,
@@ -69,7 +69,7 @@ impl Errors {
         .sum()
     }
 
-    fn samples(&self, binned: &Binned) -> Vec<Sample> {
+    fn samples(&self, binned: &Binned) -> Vec<JudgedSample> {
         let mut samples = Vec::new();
         let mut blocks = 0;
         for record in 0..self.residual.len() {
@@ -78,7 +78,7 @@ impl Errors {
             for k in self.warm_up..length {
                 let of_record = k / block;
                 let residual = self.residual[record][k];
-                samples.push(Sample {
+                samples.push(JudgedSample {
                     fold: match binned.folds {
                         Folds::Blocks => (of_record + record) % RULES.turns,
                         Folds::Records => record,
@@ -111,7 +111,7 @@ struct Moments {
 }
 
 impl Moments {
-    fn add(&mut self, sample: &Sample, covariate: usize) {
+    fn add(&mut self, sample: &JudgedSample, covariate: usize) {
         let y = sample.covariates[covariate];
         self.count += 1.0;
         self.e += sample.residual;
@@ -180,7 +180,12 @@ pub(super) fn explained(errors: &Errors, binned: &Binned, excess: f64) -> Option
 
 /// Energy that knowing the coordinate takes off the error: by mean, by line in
 /// the covariate, by size.
-fn gains(samples: &[Sample], binned: &Binned, excess: f64, covariate: usize) -> Option<[f64; 3]> {
+fn gains(
+    samples: &[JudgedSample],
+    binned: &Binned,
+    excess: f64,
+    covariate: usize,
+) -> Option<[f64; 3]> {
     let folds = samples.iter().map(|s| s.fold + 1).max()?;
     let bins = binned.ranges.len();
     let mut by_bin = vec![vec![Moments::default(); bins]; folds];
@@ -280,7 +285,7 @@ impl Learned {
 
     /// What knowing the bin of a sample takes off its error, against knowing
     /// nothing of the coordinate: by mean, by line in the covariate, by size.
-    fn gains(&self, sample: &Sample, covariate: usize, density: f64) -> [f64; 3] {
+    fn gains(&self, sample: &JudgedSample, covariate: usize, density: f64) -> [f64; 3] {
         let Some(bin) = sample.bin else {
             return [0.0; 3];
         };

@@ -16,7 +16,7 @@ use super::variable::Point;
 
 /// Result of a search.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Report {
+pub struct SearchReport {
     /// Best point found; `None` only with [`StopReason::NoFiniteValue`] or when
     /// stopped before the first finite value.
     pub best: Option<Success>,
@@ -44,7 +44,7 @@ pub fn minimise<P: Problem>(
     settings: &Settings,
     progress: &dyn Progress,
     interrupt: &AtomicBool,
-) -> Report {
+) -> SearchReport {
     let mesh = Mesh::with_frame_share(problem.variables(), settings.initial_frame);
     let fixed = problem.variables().iter().all(|v| v.range() <= 0);
     let middle: Point = problem
@@ -103,7 +103,7 @@ pub fn minimise<P: Problem>(
     } else {
         stop
     };
-    Report {
+    SearchReport {
         evaluations: evaluator.evaluations(),
         cache_hits: evaluator.cache_hits(),
         screened: steps.iter().map(|s| s.screened()).sum(),
@@ -239,7 +239,7 @@ mod tests {
         }
     }
 
-    fn solve(problem: &mut Function, settings: &Settings, patience: usize) -> Report {
+    fn solve(problem: &mut Function, settings: &Settings, patience: usize) -> SearchReport {
         let mut steps: Vec<Box<dyn SearchStep<Function>>> = vec![
             Box::new(Speculative::default()),
             Box::new(Shake::new(patience)),

@@ -15,14 +15,14 @@ const ANISOTROPY: f64 = 0.1;
 
 /// Mantissa and exponent of one variable's frame size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Axis {
+struct MeshAxis {
     mantissa: i64,
     exponent: u32,
     initial_exponent: u32,
     range: i64,
 }
 
-impl Axis {
+impl MeshAxis {
     fn new(frame: f64, range: i64) -> Self {
         let frame = frame.max(1.0);
         let mut exponent = frame.log10().floor() as u32;
@@ -80,7 +80,7 @@ impl Axis {
 /// The mesh around an incumbent, one axis per variable.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mesh {
-    axes: Vec<Axis>,
+    axes: Vec<MeshAxis>,
 }
 
 impl Mesh {
@@ -93,19 +93,19 @@ impl Mesh {
     pub fn with_frame_share(variables: &[Variable], share: f64) -> Self {
         let axes = variables
             .iter()
-            .map(|v| Axis::new((v.range() as f64 * share).ceil(), v.range()))
+            .map(|v| MeshAxis::new((v.range() as f64 * share).ceil(), v.range()))
             .collect();
         Self { axes }
     }
 
     /// Frame sizes Δ in ticks: how far a poll reaches along each variable.
     pub fn frame_sizes(&self) -> Vec<i64> {
-        self.axes.iter().map(Axis::frame_size).collect()
+        self.axes.iter().map(MeshAxis::frame_size).collect()
     }
 
     /// Mesh sizes δ in ticks: the spacing of the trial points.
     pub fn mesh_sizes(&self) -> Vec<i64> {
-        self.axes.iter().map(Axis::mesh_size).collect()
+        self.axes.iter().map(MeshAxis::mesh_size).collect()
     }
 
     /// Whether every frame has shrunk to one tick, so that no refinement is left.
@@ -115,7 +115,7 @@ impl Mesh {
 
     /// After a failed poll: smaller frames.
     pub fn refine(&mut self) {
-        self.axes.iter_mut().for_each(Axis::refine);
+        self.axes.iter_mut().for_each(MeshAxis::refine);
     }
 
     /// After a success along `step` (ticks): larger frames for the variables that

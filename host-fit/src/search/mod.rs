@@ -39,7 +39,7 @@ mod stop;
 mod variable;
 
 pub use evaluator::{Evaluator, Progress, Snapshot, Success};
-pub use mads::{Report, minimise};
+pub use mads::{SearchReport, minimise};
 pub use mesh::Mesh;
 pub use problem::{Evaluation, Problem};
 pub use settings::{PollKind, SETTINGS, SettingHelp, Settings};

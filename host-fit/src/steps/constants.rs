@@ -8,11 +8,14 @@ use crate::model::{Law, Model};
 
 /// Constants for a board. Serialises to the keys of `codegen --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Constants {
+pub struct BoardConstants {
     /// The Rust file.
     #[serde(skip)]
     pub text: String,
-    /// Its length.
+    /// N1, N2 and N3 of the model.
+    #[serde(skip)]
+    pub sizes: [usize; 3],
+    /// Length of the file.
     pub bytes: usize,
     /// Effects of the model.
     pub effects: Vec<String>,
@@ -24,9 +27,10 @@ pub struct Constants {
 ///
 /// # Errors
 /// [`StepError::Codegen`] with the reason why this model cannot run on a board.
-pub fn constants(model: &Model) -> Result<Constants, StepError> {
+pub fn constants(model: &Model) -> Result<BoardConstants, StepError> {
     let text = generate(model)?;
-    Ok(Constants {
+    Ok(BoardConstants {
+        sizes: [model.a.len(), model.product_lags.len(), model.b.len()],
         bytes: text.len(),
         effects: model.effect_names(),
         law: model.law.clone(),

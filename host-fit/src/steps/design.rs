@@ -29,13 +29,13 @@ pub struct Design {
     pub law: Law,
     /// What the design rests on.
     #[serde(flatten)]
-    pub outcome: Outcome,
+    pub outcome: DesignOutcome,
 }
 
 /// What a design rests on.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Outcome {
+pub enum DesignOutcome {
     /// Of a tracking law.
     Track(TrackDesign),
     /// Of a maximising law.
@@ -50,12 +50,12 @@ pub fn design(model: &Model, request: &DesignRequest) -> Result<Design, StepErro
     let (law, outcome) = match request {
         DesignRequest::Track(request) => {
             let design = track(model, request)?;
-            (Law::Track(design.law.clone()), Outcome::Track(design))
+            (Law::Track(design.law.clone()), DesignOutcome::Track(design))
         }
         DesignRequest::Maximise(request) => {
             let optimum = maximise(model, request)?;
             let law = Law::Maximise(optimum.law.clone());
-            (law, Outcome::Maximise(optimum))
+            (law, DesignOutcome::Maximise(optimum))
         }
     };
     Ok(Design {

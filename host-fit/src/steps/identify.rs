@@ -9,8 +9,8 @@ use crate::data::{DataSet, Record};
 use crate::excitation::{Demand, ExcitationError, check_excitation};
 use crate::extend::{effects_for, extend};
 use crate::identify::{
-    DelayLaw, Identified, IdentifyError, IdentifyOptions, InputDelay, Objective, RULES, Refinement,
-    Structure, identify as search,
+    ExponentialDelay, Identified, IdentifyError, IdentifyOptions, InputDelay, Objective, RULES,
+    Refinement, Structure, identify as search,
 };
 use crate::indicators::{Scores, one_step_norm, score_new};
 use crate::model::{Delay, Model, Start};
@@ -65,7 +65,7 @@ pub enum DelayKind {
     /// Falling with the averaged output, eq. (4); the law is measured on the records.
     StateDependent,
     /// The same with a prescribed law.
-    Prescribed(DelayLaw),
+    Prescribed(ExponentialDelay),
 }
 
 impl Default for IdentifyRequest {

@@ -4,7 +4,7 @@ use super::StepError;
 use crate::data::{DataSet, Record};
 use crate::delay::{DelayOptions, DelayVerdict, study_delays};
 use crate::fit::lean_base;
-use crate::identify::DelayLaw;
+use crate::identify::ExponentialDelay;
 use crate::model::{Delay, Model};
 use model_core::effects::StateDependentDelay;
 
@@ -13,14 +13,14 @@ pub(super) fn measured_law(
     set: &DataSet,
     learning: &[&Record],
     remarks: &mut Vec<String>,
-) -> Result<DelayLaw, StepError> {
+) -> Result<ExponentialDelay, StepError> {
     let study = study_delays(set, &DelayOptions::default())?;
     let borne_out = matches!(
         study.verdict,
         DelayVerdict::StateDependent | DelayVerdict::EdgeAndStateDependent
     );
     if let Some(law) = study.law.as_ref().filter(|_| borne_out) {
-        let measured = DelayLaw {
+        let measured = ExponentialDelay {
             floor: law.p0.value,
             rise: law.p1.value,
             rate: law.p2.value,
@@ -34,9 +34,9 @@ pub(super) fn measured_law(
         sample_period_s: set.sample_period_s,
         delay: Delay::of::<StateDependentDelay<f64>>(
             &[
-                DelayLaw::PAPER.floor,
-                DelayLaw::PAPER.rise,
-                DelayLaw::PAPER.rate,
+                ExponentialDelay::PAPER.floor,
+                ExponentialDelay::PAPER.rise,
+                ExponentialDelay::PAPER.rate,
             ],
             vec![1.0],
             false,
@@ -50,7 +50,7 @@ pub(super) fn measured_law(
     ));
     let law = lean.model.delay.law::<StateDependentDelay<f64>>();
     match law.map(|law| law.parameters.as_slice()) {
-        Some(&[floor, rise, rate]) => Ok(DelayLaw { floor, rise, rate }),
+        Some(&[floor, rise, rate]) => Ok(ExponentialDelay { floor, rise, rate }),
         _ => Err(StepError::NoDelayLaw),
     }
 }

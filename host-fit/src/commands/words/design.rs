@@ -3,13 +3,13 @@
 use super::Words;
 use closed_loop::Figures;
 use host_fit::design::{JUDGED_FROM, Optimum, Proof, TrackDesign};
-use host_fit::steps::{Design, Outcome};
+use host_fit::steps::{Design, DesignOutcome};
 
 impl Words for Design {
     fn words(&self) -> String {
         match &self.outcome {
-            Outcome::Track(design) => track_words(design),
-            Outcome::Maximise(optimum) => optimum_words(optimum),
+            DesignOutcome::Track(design) => track_words(design),
+            DesignOutcome::Maximise(optimum) => optimum_words(optimum),
         }
     }
 }

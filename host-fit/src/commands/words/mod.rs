@@ -18,7 +18,7 @@ use host_fit::model::{Delay, Law, Model, TransportLaw};
 use host_fit::picture::significant;
 use host_fit::rules::Rulebook;
 use host_fit::steps::{
-    Average, Comparison, Constants, EffectEntry, Extension, Identification, Simulation,
+    Average, BoardConstants, Comparison, EffectEntry, Extension, Identification, Simulation,
 };
 
 use model_core::effect::Unit;
@@ -213,11 +213,13 @@ impl Words for Simulation {
     }
 }
 
-impl Words for Constants {
+impl Words for BoardConstants {
     fn words(&self) -> String {
         format!(
-            "{} bytes, effects: {}, law: {}",
-            self.bytes,
+            "N1 = {}, N2 = {}, N3 = {}, effects: {}, law: {}",
+            self.sizes[0],
+            self.sizes[1],
+            self.sizes[2],
             match self.effects.as_slice() {
                 [] => "none".to_owned(),
                 names => names.join(", "),

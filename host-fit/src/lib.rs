@@ -29,7 +29,9 @@
 //! | room | does |
 //! |---|---|
 //! | [`steps`] | the way, step by step, with the results as data |
-//! | [`codegen`], [`design`], [`diagnose`], [`extend`] | what is done with a model |
+//! | [`codegen`], [`design`], [`extend`] | what is done with a model |
+//! | [`diagnose`] | which effect is missing, and how sure that is |
+//! | [`terms`] | one search over lags, the sensor's zero and effects |
 //! | [`experiment`], [`power`], [`residual`] | what would tell models apart, what would have been seen, where a model fails |
 //! | [`identify`], [`delay`], [`excitation`] | what is done with recordings |
 //! | [`fit`], [`search`] | parameters by Levenberg–Marquardt on the free run, delays by mesh-adaptive direct search |
@@ -59,9 +61,8 @@ pub mod search;
 pub mod simulate;
 pub mod steps;
 pub mod target;
-pub mod user_effect;
-
 pub mod terms;
+pub mod user_effect;
 
 mod linalg;
 

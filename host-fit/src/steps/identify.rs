@@ -214,10 +214,10 @@ impl IdentifyRequest {
     /// The delay laws that an automatic structure may have.
     fn laws(&self) -> Vec<Delay> {
         let constant = Delay::Fixed { delays: vec![0] };
-        let exponential = |law: DelayLaw| {
+        let exponential = |law: ExponentialDelay| {
             Delay::of::<StateDependentDelay<f64>>(&[law.floor, law.rise, law.rate], vec![1.0], true)
         };
-        let usual = DelayLaw {
+        let usual = ExponentialDelay {
             floor: 40.0,
             rise: 10.0,
             rate: 8.0,

@@ -9,8 +9,8 @@
 //! use host_fit::steps::{self, DelayKind, DesignRequest, IdentifyRequest};
 //!
 //! let set = DataSet::load("data/hidden-ramp".as_ref())?;
-//! let lean = IdentifyRequest { n1: Some(2), n2: Some(2), ..IdentifyRequest::default() };
-//! let request = IdentifyRequest { delay: DelayKind::StateDependent, ..lean };
+//! let delay = Some(DelayKind::StateDependent);
+//! let request = IdentifyRequest { delay, ..IdentifyRequest::default() };
 //! let model = steps::identify(&set, &request, &())?.model;
 //! let compared = steps::compare(&model, &set)?;
 //! println!("{}", serde_json::to_string_pretty(&compared)?);

@@ -130,7 +130,7 @@ mod tests {
             hold: HoldTimes { on: 2, off: 1 },
         };
         let mut played = Played::new();
-        let mut play = |n: usize, played: &mut Played| {
+        let play = |n: usize, played: &mut Played| {
             let mut on = 0;
             for _ in 0..n {
                 on = on << 1 | u32::from(pulses.step(played));

@@ -213,7 +213,8 @@ fn an_interrupt_keeps_the_best_so_far() {
     let model = folder.path().join("model.toml");
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/paper-like");
     let process = Command::new(program())
-        .args(["--json", "identify"])
+        // Ten lags take a search that is not over by then.
+        .args(["--json", "identify", "--n1", "5"])
         .arg(data)
         .arg("-o")
         .arg(&model)

@@ -19,6 +19,7 @@ use crate::terms::base_model;
 use crate::user_effect::Definition;
 use model_core::effects::StateDependentDelay;
 use model_core::recursion::LagConvention;
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// What to identify and how.
@@ -427,7 +428,11 @@ fn automatic(
         scores,
         delays: Delays::of(&model),
         screened: 0,
-        stop: StopReason::LocallyOptimal,
+        stop: if onlooker.interrupt().load(Ordering::Relaxed) {
+            StopReason::Interrupted
+        } else {
+            StopReason::LocallyOptimal
+        },
         refinement: None,
         poles: [pole(false)?, pole(true)?],
         remarks,

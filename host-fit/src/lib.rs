@@ -56,6 +56,7 @@ pub mod model;
 pub mod picture;
 pub mod power;
 pub mod residual;
+pub mod ring;
 pub mod rules;
 pub mod search;
 pub mod simulate;

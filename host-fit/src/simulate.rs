@@ -2,8 +2,8 @@
 
 use crate::data::Record;
 use crate::model::{Delay, Footprint, Model, Prepared, Rounding, Start};
+use crate::ring::Ring;
 use crate::rules::rules;
-use model_core::history::{Memory, Past};
 use model_core::model::{StateOf, observe};
 use model_core::{Input, Output, Parts, Real, State};
 use std::ops::ControlFlow;
@@ -86,48 +86,6 @@ impl<'a> Signals<'a> {
     fn scale(&self) -> f64 {
         let largest = |y: &[f64]| y.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
         self.y.map_or(1.0, largest).max(1e-9)
-    }
-}
-
-/// A ring buffer with a size chosen at run time: the host's counterpart of
-/// `model_core::history::DelayLine`.
-#[derive(Clone, Debug)]
-pub struct Ring<T> {
-    samples: Vec<T>,
-    newest: usize,
-}
-
-impl<T: Real> Ring<T> {
-    /// A ring that reaches back at least `lag` samples.
-    #[must_use]
-    pub fn reaching(lag: usize) -> Self {
-        Self {
-            samples: vec![T::ZERO; (lag + 1).next_power_of_two()],
-            newest: 0,
-        }
-    }
-}
-
-impl<T: Real> Past<T> for Ring<T> {
-    #[inline]
-    fn back(&self, lag: usize) -> T {
-        let mask = self.samples.len() - 1;
-        if lag > mask {
-            return T::ZERO;
-        }
-        self.samples[self.newest.wrapping_sub(lag) & mask]
-    }
-}
-
-impl<T: Real> Memory<T> for Ring<T> {
-    #[inline]
-    fn push(&mut self, value: T) {
-        self.newest = (self.newest + 1) & (self.samples.len() - 1);
-        self.samples[self.newest] = value;
-    }
-    #[inline]
-    fn capacity(&self) -> usize {
-        self.samples.len()
     }
 }
 

@@ -176,8 +176,8 @@ type HostLaw<'a> = TrackingController<
     'a,
     f32,
     crate::model::Prepared<f32>,
-    crate::simulate::Ring<f32>,
-    crate::simulate::Ring<f32>,
+    crate::ring::Ring<f32>,
+    crate::ring::Ring<f32>,
 >;
 
 fn host_law<'a>(bench: &'a Player<f32>, law: &Track) -> HostLaw<'a> {

@@ -2,7 +2,7 @@
 
 use super::Definition;
 use super::program::{Op, Program, Register, Signal, select};
-use crate::simulate::Ring;
+use crate::ring::Ring;
 use model_core::Real;
 use model_core::clock::Clock;
 use model_core::delay::Tap;

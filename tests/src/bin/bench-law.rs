@@ -9,7 +9,7 @@ use firmware_sim::instrument::{Converter, Noise};
 use firmware_sim::plant::{BasePlant, DelayLaw, PlantSpec, Rig};
 use host_fit::design::{TrackRequest, track};
 use host_fit::model::{Delay, Model, Start, Track, Training};
-use host_fit::simulate::Ring;
+use host_fit::ring::Ring;
 use model_core::State;
 use model_core::control::HoldTimes;
 use model_core::effects::StateDependentDelay;

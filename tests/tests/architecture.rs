@@ -1,0 +1,136 @@
+//! The architecture page and the code agree: crates point one way, and rooms of the library use the rooms below them.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn read(path: impl AsRef<Path>) -> String {
+    std::fs::read_to_string(root().join(path)).expect("a file of the project")
+}
+
+/// The crates of this project that `package` depends on, not counting what its tests use.
+fn dependencies(package: &str) -> BTreeSet<String> {
+    let manifest: toml::Table = read(format!("{package}/Cargo.toml")).parse().expect("TOML");
+    let listed = manifest.get("dependencies").and_then(|d| d.as_table());
+    let names = listed.into_iter().flat_map(|d| d.keys().cloned());
+    let ours = |name: &String| CRATES.iter().any(|(crate_name, _)| crate_name == name);
+    names.filter(ours).collect()
+}
+
+/// From bottom to top, with what each may know.
+const CRATES: [(&str, &[&str]); 5] = [
+    ("model-core", &[]),
+    ("recordings", &[]),
+    ("closed-loop", &["model-core"]),
+    ("firmware-sim", &["closed-loop", "recordings"]),
+    (
+        "host-fit",
+        // The simulator is for the program alone: an optional dependency, see the CI step "library alone".
+        &["closed-loop", "firmware-sim", "model-core", "recordings"],
+    ),
+];
+
+#[test]
+fn crates_know_what_the_picture_says() {
+    for (package, known) in CRATES {
+        let known: BTreeSet<String> = known.iter().map(|name| (*name).to_owned()).collect();
+        assert_eq!(dependencies(package), known, "{package}");
+    }
+    let manifest: toml::Table = read("host-fit/Cargo.toml").parse().expect("TOML");
+    let simulator = &manifest["dependencies"]["firmware-sim"];
+    assert_eq!(simulator.get("optional"), Some(&true.into()));
+}
+
+/// The rooms in the order of the page, from top to bottom.
+fn rooms() -> Vec<String> {
+    let page = read("docs/architecture.md");
+    let (_, table) = page
+        .split_once("## The rooms of the library")
+        .expect("the heading");
+    let (table, _) = table.split_once("\n## ").expect("a next heading");
+    let rows = table.lines().filter_map(|line| line.strip_prefix("| `"));
+    rows.filter_map(|row| Some(row.split_once('`')?.0.to_owned()))
+        .collect()
+}
+
+/// Sources of a room without their unit tests and files that are tests alone.
+fn sources(path: &Path) -> Vec<(PathBuf, String)> {
+    if path.is_dir() {
+        let entries = std::fs::read_dir(path).expect("a folder");
+        return entries
+            .flat_map(|e| sources(&e.expect("an entry").path()))
+            .collect();
+    }
+    let text = std::fs::read_to_string(path).expect("a source");
+    let code = text
+        .find("#[cfg(test)]\n")
+        .map_or(&*text, |at| match &text[at..] {
+            tests if tests.contains("mod tests {") => &text[..at],
+            _ => &text,
+        });
+    let code = code
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("//"));
+    vec![(path.to_owned(), code.collect::<Vec<_>>().join("\n"))]
+}
+
+/// Names that stand behind `crate::`, also those in braces.
+fn used(code: &str) -> Vec<String> {
+    let mut names = Vec::new();
+    for (at, word) in code.match_indices("crate::") {
+        let rest = &code[at + word.len()..];
+        let name = |text: &str| -> String {
+            let kept = text.trim_start().chars();
+            kept.take_while(|c| c.is_alphanumeric() || *c == '_')
+                .collect()
+        };
+        match rest.strip_prefix('{') {
+            // One level is enough: what follows a comma in nested braces is no room's name.
+            Some(list) => names.extend(list.split(';').next().unwrap_or("").split(',').map(name)),
+            None => names.push(name(rest)),
+        }
+    }
+    names
+}
+
+#[test]
+fn rooms_use_the_rooms_below_them() {
+    let rooms = rooms();
+    let library = read("host-fit/src/lib.rs");
+    let declared: BTreeSet<&str> = library
+        .lines()
+        .filter_map(|line| line.trim_start_matches("pub ").strip_prefix("mod "))
+        .filter_map(|rest| rest.strip_suffix(';'))
+        .collect();
+    let listed: BTreeSet<&str> = rooms.iter().map(String::as_str).collect();
+    assert_eq!(listed, declared, "the page lists what lib.rs declares");
+    let mut arrows = 0;
+    for (floor, room) in rooms.iter().enumerate() {
+        let folder = root().join("host-fit/src").join(room);
+        let path = if folder.is_dir() {
+            folder
+        } else {
+            folder.with_extension("rs")
+        };
+        for (file, code) in sources(&path) {
+            // A file of tests alone may use what it likes.
+            if file.ends_with("residual/plants.rs") {
+                continue;
+            }
+            for name in used(&code) {
+                if let Some(other) = rooms.iter().position(|r| *r == name) {
+                    arrows += usize::from(other > floor);
+                    assert!(
+                        other >= floor,
+                        "{} uses {name}, which is above it",
+                        file.display()
+                    );
+                }
+            }
+        }
+    }
+    assert!(arrows > 50, "{arrows} arrows");
+}

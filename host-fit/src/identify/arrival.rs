@@ -98,8 +98,8 @@ pub(crate) struct Signals {
     pub(crate) y: Vec<Vec<f64>>,
     /// h̃_k from the measured output, samples; empty for fixed delays.
     pub(crate) base_delay: Vec<Vec<f64>>,
-    /// Its smallest and largest value.
-    base_range: Vec<(f64, f64)>,
+    /// Its smallest and largest value in each stretch of [`STRETCH`] samples.
+    base_range: Vec<Vec<(f64, f64)>>,
     /// Where the input changes.
     pub(crate) edges: Vec<Vec<usize>>,
     /// Whether every input is 0 or 1.
@@ -138,10 +138,7 @@ impl Signals {
         let binary = u.iter().flatten().all(|u| *u == 0.0 || *u == 1.0);
         let base_range = base_delay
             .iter()
-            .map(|d: &Vec<f64>| {
-                d.iter()
-                    .fold((f64::INFINITY, 0.0f64), |(l, h), x| (l.min(*x), h.max(*x)))
-            })
+            .map(|d: &Vec<f64>| d.chunks(STRETCH).map(range).collect())
             .collect();
         let edges = u
             .iter()
@@ -188,17 +185,13 @@ impl Signals {
         }
         let arrived = |(record, u): (usize, &Vec<f64>)| {
             let rows = u.len().saturating_sub(1);
-            let (shortest, longest) = match self.base_range.get(record) {
-                Some((low, high)) => (delay_samples(factor, *low), delay_samples(factor, *high)),
-                None => (delay(record, 0), delay(record, 0)),
-            };
-            // An edge of u can arrive only this much later: elsewhere nothing changes.
             let mut intervals = Vec::new();
             let mut on_since = None;
             let mut next = 0;
-            for edge in self.edges.get(record).into_iter().flatten() {
-                for k in next.max(edge + shortest)..(edge + longest + 1).min(rows) {
-                    let on = k >= delay(record, k) && u[k - delay(record, k)] != 0.0;
+            for (start, end) in self.undecided(record, factor, tick, rows) {
+                for k in next.max(start)..end {
+                    let delay = delay(record, k);
+                    let on = k >= delay && u[k - delay] != 0.0;
                     match (on, on_since) {
                         (true, None) => on_since = Some(k),
                         (false, Some(start)) => {
@@ -207,13 +200,44 @@ impl Signals {
                         }
                         _ => {}
                     }
-                    next = k + 1;
                 }
+                next = next.max(end);
             }
             intervals.extend(on_since.map(|start| (start, rows)));
             intersection(&intervals, &[(self.skipped, rows)])
         };
         Weights::Intervals(self.u.iter().enumerate().map(arrived).collect())
+    }
+
+    /// For each edge of u the samples, `(first, end)`, at which it may arrive; in
+    /// ascending order. Before them it has not arrived, at the last of them it has:
+    /// elsewhere nothing changes.
+    fn undecided(&self, record: usize, factor: f64, tick: i64, rows: usize) -> Vec<(usize, usize)> {
+        let stretches = self.base_range.get(record).map(Vec::as_slice);
+        let delays = |(low, high)| (delay_samples(factor, low), delay_samples(factor, high));
+        let whole = match stretches {
+            Some(stretches) => delays(joined(stretches)),
+            None => [tick.max(0) as usize; 2].into(),
+        };
+        let window = |edge: &usize| {
+            let (mut first, mut last) = (edge + whole.0, edge + whole.1);
+            // The delays within the window are closer together than those of the record.
+            if let Some(stretches) = stretches {
+                for _ in 0..REFINEMENTS {
+                    if first == last || first >= rows {
+                        break;
+                    }
+                    let end = (last / STRETCH + 1).min(stretches.len());
+                    let (low, high) = delays(joined(&stretches[first / STRETCH..end]));
+                    (first, last) = (first.max(edge + low), last.min(edge + high));
+                }
+            }
+            (first, (last + 1).min(rows))
+        };
+        let edges = self.edges.get(record).into_iter().flatten();
+        let mut windows: Vec<(usize, usize)> = edges.map(window).collect();
+        windows.sort_unstable();
+        windows
     }
 
     /// Ticks of an input delay that move it by one sample.
@@ -264,6 +288,23 @@ pub(crate) fn core_law(law: &ExponentialDelay, factor: f64) -> CoreLaw {
         },
         factors: [factor],
     }
+}
+
+/// Samples that share one smallest and largest delay.
+const STRETCH: usize = 16;
+
+/// How often a window is narrowed; more would rarely find anything.
+const REFINEMENTS: usize = 3;
+
+/// Smallest and largest of some delays.
+fn range(delays: &[f64]) -> (f64, f64) {
+    let wider = |(low, high): (f64, f64), d: &f64| (low.min(*d), high.max(*d));
+    delays.iter().fold((f64::INFINITY, 0.0), wider)
+}
+
+fn joined(ranges: &[(f64, f64)]) -> (f64, f64) {
+    let wider = |(low, high): (f64, f64), r: &(f64, f64)| (low.min(r.0), high.max(r.1));
+    ranges.iter().fold((f64::INFINITY, 0.0), wider)
 }
 
 fn delay_samples(factor: f64, base: f64) -> usize {
@@ -359,6 +400,41 @@ mod tests {
                 expected,
                 "{k}"
             );
+        }
+    }
+
+    /// A law steep enough, and factors large enough, that delays move by several
+    /// samples a sample and an edge arrives more than once.
+    #[test]
+    fn narrowed_windows_miss_no_arrival() {
+        let law = DelayLaw {
+            floor: 5.0,
+            rise: 40.0,
+            rate: 30.0,
+        };
+        let structure = Structure {
+            delay: InputDelay::StateDependent { law, factors: None },
+            ..Structure::default()
+        };
+        let u: Vec<f64> = (0..4000)
+            .map(|k| f64::from(u8::from((k / 37) % 3 == 1 || (k / 11) % 5 == 0)))
+            .collect();
+        let y: Vec<f64> = (0..4000)
+            .map(|k| 0.4 * ((k as f64 * 0.004).sin() + (k as f64 * 0.05).cos()))
+            .collect();
+        let signals = Signals::new(&[Series { u: &u, y: &y }], &structure);
+        for tick in [0, 700, 10_000, 12_345, 60_000] {
+            let Weights::Intervals(on) = signals.arrived(tick) else {
+                panic!("u is on/off")
+            };
+            let mut expected = vec![false; 3999];
+            for (k, arrived) in expected.iter_mut().enumerate() {
+                let delay = delay_samples(factor(tick), signals.base_delay[0][k]);
+                *arrived = k >= delay && u[k - delay] != 0.0;
+            }
+            let mut found = vec![false; 3999];
+            on[0].iter().for_each(|&(s, e)| found[s..e].fill(true));
+            assert_eq!(found, expected, "{tick}");
         }
     }
 

@@ -3,16 +3,13 @@
 //! The regressors of eqs. (3) and (4) are outputs y_{k−m}, alone or times the
 //! arriving command d_k. All inner products between them are
 //! P_w(i, j) = Σ_k w_k y_{k+1−i} y_{k+1−j} with w = 1 or products of d. For w
-//! made of intervals, the products z_p(n) = y_n y_{n−p} of one lag difference p,
-//! summed up once, give an entry by two look-ups per interval: the cost of a
-//! table is O(lags² × edges + lags × samples). Other weights go through a
-//! matrix product. After that a regression costs look-ups, however long the
-//! records are.
-
-use rayon::prelude::*;
+//! made of intervals an entry follows from its neighbour along the diagonal, by what
+//! the ends of the intervals let in and out: the cost of a table is
+//! O(lags² × edges + lags × samples). Other weights go through a matrix product over all
+//! samples. After that a regression costs look-ups, however long the records are.
 
 use super::arrival::Weights;
-use crate::linalg;
+use crate::linalg::{self, dot};
 
 /// Regressor elements: 0 is the constant 1, 1 + i is y_{k+1−i} (1 is the target y_{k+1}).
 pub(crate) type Element = usize;
@@ -108,71 +105,60 @@ impl LaggedOutputs {
         }
     }
 
+    /// Shifting both elements of an entry by a sample shifts the intervals of its sum:
+    /// along a diagonal the entries differ only by what the ends of the intervals let
+    /// in and out. Row 0 is summed directly, and what the ends do is one product of a
+    /// matrix that has a row for each of them.
     fn table_from_intervals(&self, intervals: &[Vec<(usize, usize)>]) -> Table {
+        // Of the elements 1 + i: row i stands for y_{k+1−i}.
         let shifts = self.size - 1;
-        // Diagonal p holds the products of elements 1 + j and 1 + j + p.
-        let diagonals: Vec<Vec<f64>> = (0..shifts)
-            .into_par_iter()
-            .map(|p| {
-                let mut diagonal = vec![0.0; shifts - p];
-                for (padded, intervals) in self.padded.iter().zip(intervals) {
-                    self.add_diagonal(&mut diagonal, padded, intervals, |n| {
-                        if n >= p {
-                            padded[n] * padded[n - p]
-                        } else {
-                            0.0
-                        }
-                    });
+        let (mut first_row, mut first_sum) = (vec![0.0; shifts], 0.0);
+        // Of each end: the outputs y_{n−i} from i = 0 on, newest last, and what it does.
+        let mut ends: Vec<(&[f64], f64)> = Vec::new();
+        for (padded, intervals) in self.padded.iter().zip(intervals) {
+            for &(start, end) in intervals {
+                let from = self.padding() + start + 1;
+                let newest = &padded[from..self.padding() + end + 1];
+                first_sum += newest.iter().sum::<f64>();
+                for (p, entry) in first_row.iter_mut().enumerate() {
+                    *entry += dot(newest, &padded[from - p..][..newest.len()]);
                 }
-                diagonal
-            })
-            .collect();
+                ends.push((&padded[start..from], 1.0));
+                ends.push((&padded[end..][..=self.padding()], -1.0));
+            }
+        }
         let mut table = Table {
             size: self.size,
             values: vec![0.0; self.size * self.size],
         };
-        for (p, diagonal) in diagonals.iter().enumerate() {
-            for (j, value) in diagonal.iter().enumerate() {
-                table.set(1 + j, 1 + j + p, *value);
-            }
+        if ends.is_empty() {
+            return table;
         }
-        let mut sums = vec![0.0; shifts];
-        for (padded, intervals) in self.padded.iter().zip(intervals) {
-            self.add_diagonal(&mut sums, padded, intervals, |n| padded[n]);
-        }
-        for (j, value) in sums.iter().enumerate() {
-            table.set(ONE, 1 + j, *value);
-        }
+        let past = |(i, (outputs, _)): (usize, &(&[f64], f64))| outputs[self.padding() - i];
+        let columns = (0..shifts - 1).flat_map(|i| ends.iter().map(move |end| past((i, end))));
+        let columns: Vec<f64> = columns.collect();
+        let signs: Vec<f64> = ends.iter().map(|(_, sign)| *sign).collect();
+        let change = linalg::signed_products(&columns, &signs);
         let count: usize = intervals.iter().flatten().map(|(s, e)| e - s).sum();
         table.set(ONE, ONE, count as f64);
-        table
-    }
-
-    /// Adds Σ_{k in intervals} z(k+1−j) to entry j, for the product z(n) at place
-    /// n of the padded record.
-    fn add_diagonal(
-        &self,
-        diagonal: &mut [f64],
-        padded: &[f64],
-        intervals: &[(usize, usize)],
-        z: impl Fn(usize) -> f64,
-    ) {
-        let len = padded.len();
-        // Prefix sums backwards, so that entries of growing j are neighbours:
-        // suffix[len − n] = Σ_{m<n} z(m).
-        let mut suffix = vec![0.0; len + 1];
-        let mut sum = 0.0;
-        for n in 0..len {
-            sum += z(n);
-            suffix[len - n - 1] = sum;
-        }
-        for &(start, end) in intervals {
-            let upper = &suffix[len - (self.padding() + end + 1)..];
-            let lower = &suffix[len - (self.padding() + start + 1)..];
-            for ((d, u), l) in diagonal.iter_mut().zip(upper).zip(lower) {
-                *d += u - l;
+        let mut sum = first_sum;
+        for i in 0..shifts {
+            table.set(ONE, 1 + i, sum);
+            if i + 1 < shifts {
+                sum += dot(&columns[i * signs.len()..(i + 1) * signs.len()], &signs);
             }
         }
+        for (p, first) in first_row.iter().enumerate() {
+            let mut entry = *first;
+            for i in 0..shifts - p {
+                table.set(1 + i, 1 + i + p, entry);
+                if i + p + 1 < shifts {
+                    // The lower half is the one that is filled.
+                    entry += change[i * (shifts - 1) + i + p];
+                }
+            }
+        }
+        table
     }
 
     fn table_from_samples(&self, samples: &[Vec<f64>]) -> Table {
@@ -277,6 +263,13 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn what_is_never_on_has_no_products() {
+        let lagged = LaggedOutputs::new(&outputs(), 20);
+        let table = lagged.table(&Weights::Intervals(vec![vec![], vec![]]));
+        assert!(table.values.iter().all(|v| *v == 0.0));
     }
 
     #[test]

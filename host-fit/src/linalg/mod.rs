@@ -6,6 +6,7 @@ mod cholesky;
 pub(crate) use cholesky::{Cholesky, solve_symmetric};
 
 use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
 
 /// Singular values below this share of the largest count as zero.
@@ -125,6 +126,35 @@ pub(crate) fn add_cross_products(out: &mut [f64], a: &[f64], b: &[f64], rows: us
     );
 }
 
+/// AᵀSA for a matrix A, column by column, with as many rows as there are `signs`, the
+/// diagonal of S. The result is column by column; only its lower half is filled.
+pub(crate) fn signed_products(a: &[f64], signs: &[f64]) -> Vec<f64> {
+    let rows = signs.len();
+    if rows == 0 {
+        return Vec::new();
+    }
+    let columns = a.len() / rows;
+    let a = &a[..rows * columns];
+    let signed = a.chunks_exact(rows).flat_map(|column| {
+        let each = column.iter().zip(signs);
+        each.map(|(value, sign)| value * sign)
+    });
+    let signed: Vec<f64> = signed.collect();
+    let mut out = vec![0.0; columns * columns];
+    triangular::matmul(
+        MatMut::from_column_major_slice_mut(&mut out, columns, columns),
+        BlockStructure::TriangularLower,
+        Accum::Replace,
+        MatRef::from_column_major_slice(a, rows, columns).transpose(),
+        BlockStructure::Rectangular,
+        MatRef::from_column_major_slice(&signed, rows, columns),
+        BlockStructure::Rectangular,
+        1.0,
+        Par::Seq,
+    );
+    out
+}
+
 /// AᵀB for A and B of `rows` rows, column by column; the result too. Whole
 /// columns only: what is left over is ignored.
 pub(crate) fn cross_products(a: &[f64], b: &[f64], rows: usize) -> Vec<f64> {
@@ -211,6 +241,13 @@ mod tests {
         let mut out = vec![1.0; 4];
         add_cross_products(&mut out, &a, &b, 2, 2);
         close(&out, &[18.0, 40.0, 24.0, 54.0], 1e-12);
+    }
+
+    #[test]
+    fn signed_products_fill_the_lower_half() {
+        let out = signed_products(&[1.0, 2.0, 3.0, 4.0], &[1.0, -1.0]);
+        close(&[out[0], out[1], out[3]], &[-3.0, -5.0, -7.0], 1e-12);
+        assert!(signed_products(&[], &[]).is_empty());
     }
 
     #[test]

@@ -407,7 +407,7 @@ mod tests {
     /// samples a sample and an edge arrives more than once.
     #[test]
     fn narrowed_windows_miss_no_arrival() {
-        let law = DelayLaw {
+        let law = ExponentialDelay {
             floor: 5.0,
             rise: 40.0,
             rate: 30.0,

@@ -47,31 +47,39 @@ pub(crate) struct FreeRunner {
     samples: usize,
 }
 
-/// Lags behind the newest output and what multiplies them: those shorter than a
-/// block and the others.
+/// Lags behind the newest output and what multiplies them: the newest output itself,
+/// the others shorter than a block, and those that are known before a block begins.
 struct Terms {
+    newest: f64,
     near: Vec<(usize, f64)>,
     far: Vec<(usize, f64)>,
 }
 
 impl Terms {
     fn new(terms: impl Iterator<Item = (usize, f64)>) -> Self {
-        let (near, far) = terms.partition(|(behind, _)| behind + 1 < BLOCK);
-        Self { near, far }
+        let (short, far): (Vec<_>, Vec<_>) = terms.partition(|(behind, _)| behind + 1 < BLOCK);
+        let (newest, near): (Vec<_>, Vec<_>) =
+            short.into_iter().partition(|(behind, _)| *behind == 0);
+        Self {
+            newest: newest.iter().map(|(_, weight)| weight).sum(),
+            near,
+            far,
+        }
     }
 
     /// Adds the long lags' terms to `sums`, the first of which follows place `at`.
     #[inline(always)]
-    fn add_far(&self, past: &[f64], at: usize, sums: &mut [f64]) {
+    fn add_far(&self, past: &[f64], at: usize, sums: &mut [f64; BLOCK]) {
         for &(behind, weight) in &self.far {
-            let from = &past[at - behind..][..sums.len()];
-            sums.iter_mut()
-                .zip(from)
-                .for_each(|(s, y)| *s += weight * y);
+            if let Some(from) = past[at - behind..].first_chunk::<BLOCK>() {
+                for (sum, y) in sums.iter_mut().zip(from) {
+                    *sum += weight * y;
+                }
+            }
         }
     }
 
-    /// The short lags' terms of the value that follows place `at`.
+    /// The short lags' terms of the value that follows place `at`, without the newest.
     #[inline(always)]
     fn near(&self, outputs: &[f64], at: usize) -> f64 {
         self.near.iter().fold(0.0, |sum, (behind, weight)| {
@@ -108,32 +116,41 @@ impl Recursion {
 
     /// Computes the `count` values that follow place `at`, at most [`BLOCK`].
     /// `arrived` are the commands of each input at these steps.
+    ///
+    /// All that does not wait for the value before is summed for the whole block first;
+    /// what is left for each step is one multiplication and one addition, and the few
+    /// terms of lags within the block.
     #[inline(always)]
     fn run(&self, outputs: &mut [f64], at: usize, count: usize, arrived: &[[f64; BLOCK]]) {
-        let (past, next) = outputs.split_at_mut(at + 1);
-        let next = &mut next[..count];
-        next.fill(self.constant);
-        self.state.add_far(past, at, next);
+        let mut known = [self.constant; BLOCK];
+        self.state.add_far(outputs, at, &mut known);
+        let mut newest = [self.state.newest; BLOCK];
+        let mut waits = !self.state.near.is_empty();
         for ((b, products), d) in self.inputs.iter().zip(arrived) {
-            let d = &d[..count];
-            if d.iter().any(|d| *d != 0.0) {
-                let mut gain = [*b; BLOCK];
-                let gain = &mut gain[..count];
-                products.add_far(past, at, gain);
-                next.iter_mut()
-                    .zip(gain)
-                    .zip(d)
-                    .for_each(|((n, g), d)| *n += *g * d);
+            if d[..count].iter().all(|d| *d == 0.0) {
+                continue;
             }
+            let mut gain = [*b; BLOCK];
+            products.add_far(outputs, at, &mut gain);
+            for i in 0..BLOCK {
+                known[i] += gain[i] * d[i];
+                newest[i] += products.newest * d[i];
+            }
+            waits |= !products.near.is_empty();
         }
+        let mut value = outputs[at];
         for step in 0..count {
-            let mut value = self.state.near(outputs, at + step);
-            for ((_, products), d) in self.inputs.iter().zip(arrived) {
-                if d[step] != 0.0 {
-                    value += d[step] * products.near(outputs, at + step);
+            let mut next = known[step];
+            if waits {
+                next += self.state.near(outputs, at + step);
+                for ((_, products), d) in self.inputs.iter().zip(arrived) {
+                    if d[step] != 0.0 {
+                        next += d[step] * products.near(outputs, at + step);
+                    }
                 }
             }
-            outputs[at + 1 + step] += value;
+            value = next + newest[step] * value;
+            outputs[at + 1 + step] = value;
         }
     }
 }
@@ -279,7 +296,7 @@ impl pulp::NullaryFnOnce for BlockRun<'_> {
             let samples = measured.len();
             let mut kept_arrived = vec![Vec::new(); inputs];
             outputs.clear();
-            outputs.resize(padding + samples + 1, 0.0);
+            outputs.resize(padding + samples + BLOCK, 0.0);
             if self.signals.skipped > 0 {
                 outputs[padding] = measured.first().copied().unwrap_or(0.0);
             } else {
@@ -308,7 +325,7 @@ impl pulp::NullaryFnOnce for BlockRun<'_> {
                     if k < singly {
                         count = 1;
                     }
-                    average = outputs[at - AVERAGED..at].iter().sum();
+                    average = sum_of(&outputs[at - AVERAGED..at]);
                     self.delays(self.follows(&outputs, at, average), &mut delays);
                 }
                 for (arrived, delay) in arrived.iter_mut().zip(&delays) {
@@ -343,12 +360,11 @@ impl pulp::NullaryFnOnce for BlockRun<'_> {
                 // Until the past is recorded the run follows the measurement.
                 let follow = next.iter_mut().zip(known).take(unjudged);
                 follow.for_each(|(n, y)| *n = *y);
-                if next.iter().any(|y| y.abs() > *bound || y.is_nan()) {
+                if beyond(next, *bound) {
                     return RunOutcome::Diverged((done + k) as f64 / *all_samples as f64);
                 }
-                for (s, y) in next.iter().zip(known).skip(unjudged) {
-                    sum += (y - s) * (y - s);
-                }
+                let unjudged = unjudged.min(next.len()).min(known.len());
+                sum += squared_distance(&next[unjudged..], &known[unjudged..]);
                 if sum >= self.give_up_at {
                     return RunOutcome::AtLeast(sum);
                 }
@@ -363,6 +379,46 @@ impl pulp::NullaryFnOnce for BlockRun<'_> {
         }
         RunOutcome::Squared(sum)
     }
+}
+
+/// Numbers taken side by side, so that sums do not wait for each other.
+const LANES: usize = 8;
+
+#[inline(always)]
+fn sum_of(values: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let chunks = values.chunks_exact(LANES);
+    let rest: f64 = chunks.remainder().iter().sum();
+    for chunk in chunks {
+        for (sum, value) in sums.iter_mut().zip(chunk) {
+            *sum += value;
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
+/// Σ (a − b)² over the shorter of the two.
+#[inline(always)]
+fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
+    let (a, b) = (&a[..a.len().min(b.len())], &b[..a.len().min(b.len())]);
+    let mut sums = [0.0; LANES];
+    let (chunks_a, chunks_b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest = chunks_a.remainder().iter().zip(chunks_b.remainder());
+    let rest: f64 = rest.map(|(a, b)| (a - b) * (a - b)).sum();
+    for (a, b) in chunks_a.zip(chunks_b) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += (a - b) * (a - b);
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
+/// Whether any value is farther from 0 than `bound`, or none at all.
+#[inline(always)]
+fn beyond(values: &[f64], bound: f64) -> bool {
+    // Without a way out the loop runs on the vector unit.
+    let inside = values.iter().fold(true, |all, y| all & (y.abs() <= bound));
+    !inside
 }
 
 /// The command from step `k` on as it is `delay` samples later; 0 before it begins.

@@ -21,7 +21,7 @@ use crate::linalg;
 const STRIDE: usize = 41;
 
 /// Sensitivities run side by side.
-const LANES: usize = 16;
+const LANES: usize = 32;
 
 /// One record of the run that is linearised.
 struct SensitivityRun<'a> {
@@ -41,19 +41,32 @@ struct Filter<'a> {
     first_element: usize,
     block: usize,
     first: usize,
-    /// What the recursion puts out; zeros for as long as the longest lag go before.
-    outputs: &'a mut [[f32; LANES]],
+    /// What the recursion puts out, `LANES` a step; zeros for as long as the longest lag go before.
+    outputs: &'a mut [f32],
     /// The first of the columns to fill, and the distance to the next.
     sampled: &'a mut [f64],
     spacing: usize,
 }
 
-impl pulp::NullaryFnOnce for Filter<'_> {
+impl pulp::WithSimd for Filter<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn call(self) {
-        let SensitivityRun {
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
+        // Registers that hold the lanes of a step.
+        match LANES / S::F32_LANES {
+            2 => self.filter::<S, 2>(simd),
+            4 => self.filter::<S, 4>(simd),
+            8 => self.filter::<S, 8>(simd),
+            _ => self.filter::<pulp::Scalar, LANES>(pulp::Scalar::new()),
+        }
+    }
+}
+
+impl Filter<'_> {
+    #[inline(always)]
+    fn filter<S: pulp::Simd, const REGISTERS: usize>(self, simd: S) {
+        let &SensitivityRun {
             padded,
             arrived,
             state,
@@ -61,51 +74,73 @@ impl pulp::NullaryFnOnce for Filter<'_> {
             rows,
         } = self.run;
         let reach = self.lags + 1;
-        let samples = self.outputs.len() - reach;
+        let samples = self.outputs.len() / LANES - reach;
         let gate = self.block.checked_sub(1).and_then(|l| arrived.get(l));
         let mut rows = rows.iter().enumerate().peekable();
+        // The recursion's terms, with the products as they are at the arriving commands `at`.
+        let mut terms: Vec<(usize, f32)> = state.to_vec();
+        let mut at: Vec<f32> = vec![0.0; arrived.len()];
         for k in 0..samples {
+            let (past, next) = self.outputs.split_at_mut((reach + k) * LANES);
             // Lane 0 is the constant 1 if it starts the block, then lags ascend.
             if let Some((at, _)) = rows.next_if(|(_, row)| **row == k) {
-                let lanes = self.outputs[reach + k - 1];
-                for (i, value) in lanes.iter().enumerate().take(1 + self.lags - self.first) {
+                let newest = past[past.len() - LANES..].iter();
+                for (i, value) in newest.enumerate().take(1 + self.lags - self.first) {
                     self.sampled[i * self.spacing + at] = f64::from(*value);
                 }
             }
-            let mut next = [0.0f32; LANES];
+            let drive = &mut next[..LANES];
             let gate = gate.map_or(1.0, |gate| gate[k]);
-            if gate != 0.0 {
+            if gate == 0.0 {
+                drive.fill(0.0);
+            } else {
                 // The newest output that a lane reads is the last of these.
                 let newest = LANES + reach + k + 4 - self.first - self.first_element;
-                let past = &padded[newest - LANES..newest];
-                for (n, y) in next.iter_mut().zip(past.iter().rev()) {
-                    *n = gate * y;
+                let regressors = padded[newest - LANES..newest].iter().rev();
+                for (drive, y) in drive.iter_mut().zip(regressors) {
+                    *drive = gate * y;
                 }
                 if self.first == 0 {
-                    next[0] = gate;
+                    drive[0] = gate;
                 }
             }
-            let (past, rest) = self.outputs.split_at_mut(reach + k);
-            for &(m, a) in state.iter() {
-                add_lanes(&mut next, &past[reach + k - 1 - m], a);
-            }
-            for (terms, d) in product.iter().zip(arrived.iter()) {
-                let d = d[k];
-                if d != 0.0 {
-                    for &(m, c) in terms {
-                        add_lanes(&mut next, &past[reach + k - 1 - m], c * d);
+            if at.iter().zip(arrived).any(|(at, d)| *at != d[k]) {
+                terms.truncate(state.len());
+                for ((products, at), d) in product.iter().zip(&mut at).zip(arrived) {
+                    *at = d[k];
+                    if *at != 0.0 {
+                        terms.extend(products.iter().map(|(m, c)| (*m, c * *at)));
                     }
                 }
             }
-            rest[0] = next;
+            let drive = S::as_mut_simd_f32s(drive).0;
+            let past = S::as_simd_f32s(past).0;
+            let steps_back = |m: usize| &past[past.len() - (1 + m) * REGISTERS..][..REGISTERS];
+            // Two sums for each register, so that additions do not wait for each other.
+            let mut sums = [simd.splat_f32s(0.0); REGISTERS];
+            let mut others = sums;
+            let pairs = terms.chunks_exact(2);
+            if let [(m, weight)] = pairs.remainder() {
+                let (weight, past) = (simd.splat_f32s(*weight), steps_back(*m));
+                for i in 0..REGISTERS {
+                    sums[i] = simd.mul_add_e_f32s(weight, past[i], sums[i]);
+                }
+            }
+            for pair in pairs {
+                let &[(m, weight), (n, other)] = pair else {
+                    continue;
+                };
+                let (weight, past_m) = (simd.splat_f32s(weight), steps_back(m));
+                let (other, past_n) = (simd.splat_f32s(other), steps_back(n));
+                for i in 0..REGISTERS {
+                    sums[i] = simd.mul_add_e_f32s(weight, past_m[i], sums[i]);
+                    others[i] = simd.mul_add_e_f32s(other, past_n[i], others[i]);
+                }
+            }
+            for i in 0..REGISTERS {
+                drive[i] = simd.add_f32s(drive[i], simd.add_f32s(sums[i], others[i]));
+            }
         }
-    }
-}
-
-#[inline(always)]
-fn add_lanes(sums: &mut [f32; LANES], past: &[f32; LANES], weight: f32) {
-    for lane in 0..LANES {
-        sums[lane] += weight * past[lane];
     }
 }
 
@@ -195,7 +230,7 @@ impl Linearised {
                 product: &product,
                 rows: &rows,
             };
-            let mut outputs = vec![[0.0f32; LANES]; lags + 1 + measured.len()];
+            let mut outputs = vec![0.0f32; (lags + 1 + measured.len()) * LANES];
             for block in 0..=inputs {
                 for first in (0..=lags).step_by(LANES) {
                     let column = block * (1 + lags) + first;

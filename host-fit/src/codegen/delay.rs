@@ -1,6 +1,6 @@
 //! How the input delays of a model are written.
 
-use super::items::{count, lags, listed, with_units};
+use super::pieces::{count, lags, listed, with_units};
 use crate::model::{Delay, Model, TransportLaw};
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};

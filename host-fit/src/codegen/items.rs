@@ -1,38 +1,15 @@
 //! The items of the generated file that every model has.
 
 use super::delay::Written;
+use super::pieces::{count, lags, listed, with_units};
 use super::{CodegenError, spec_of};
 use crate::model::{Added, Footprint, Model};
 use crate::user_effect::{number, rust_module};
-use model_core::effect::{RustType, Setting, Spec};
+use model_core::effect::{RustType, Setting};
 use model_core::effects;
 use model_core::recursion::{Grading, LagConvention};
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
-
-/// A list of the nearest `f32`s.
-pub(super) fn listed(values: &[f64]) -> TokenStream {
-    let values = values.iter().map(|value| number(*value, ""));
-    quote!([#(#values),*])
-}
-
-/// A list of samples.
-pub(super) fn lags(values: &[u16]) -> TokenStream {
-    let values = values.iter().map(|lag| Literal::u16_unsuffixed(*lag));
-    quote!([#(#values),*])
-}
-
-/// A count without a suffix.
-pub(super) fn count(value: usize) -> Literal {
-    Literal::usize_unsuffixed(value)
-}
-
-/// A word of 32 bits, as it would be compared.
-pub(super) fn word(value: u32) -> Literal {
-    let text = format!("0x{:04x}_{:04x}", value >> 16, value & 0xffff);
-    text.parse()
-        .unwrap_or_else(|_| Literal::u32_unsuffixed(value))
-}
 
 pub(super) fn imports(law: &Written) -> TokenStream {
     let frozen = law.is_constant.then(|| {
@@ -378,16 +355,6 @@ pub(super) fn setting(model: &Model, added: &Added) -> Setting<f32> {
         channel: 0,
         reference: added.reference() as f32,
     }
-}
-
-/// The parameters with their units.
-pub(super) fn with_units(spec: &Spec) -> String {
-    let each = spec.parameters.iter();
-    let units: Vec<String> = each.map(|p| format!("{} ({})", p.name, p.unit)).collect();
-    if units.is_empty() {
-        return "no parameters".to_owned();
-    }
-    units.join(", ")
 }
 
 /// `name` and the number of an effect or input, from 1.

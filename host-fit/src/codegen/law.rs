@@ -1,7 +1,7 @@
 //! The items of the designed law: `[law]` of the model file as constants.
 
 use super::CodegenError;
-use super::items::{count, word};
+use super::pieces::{count, word};
 use crate::model::{Hold, Law, Maximise, Model, Track};
 use crate::user_effect::number;
 use closed_loop::AHEAD;

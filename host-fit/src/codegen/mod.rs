@@ -19,6 +19,7 @@ pub mod board;
 mod delay;
 mod items;
 mod law;
+mod pieces;
 
 use crate::model::{Added, Delay, Footprint, Model};
 use model_core::control::tracking::Unusable;
@@ -222,14 +223,14 @@ fn golden(model: &Model, memory: &Footprint) -> Result<TokenStream, CodegenError
             if !f32::from_bits(bits).is_finite() {
                 unstable.get_or_insert((i as u32 + 1) * every);
             }
-            values.push(items::word(bits));
+            values.push(pieces::word(bits));
         },
     );
     if let Some(samples) = unstable {
         return Err(CodegenError::Unstable { samples });
     }
-    let checksum = items::word(self_test::checksum(&prepared));
-    let (count, every) = (items::count(GOLDEN_VALUES), Literal::u32_unsuffixed(every));
+    let checksum = pieces::word(self_test::checksum(&prepared));
+    let (count, every) = (pieces::count(GOLDEN_VALUES), Literal::u32_unsuffixed(every));
     Ok(quote! {
         /// CRC-32 of structure and coefficients, for the start-up self-test.
         pub const CHECKSUM: u32 = #checksum;

@@ -1,5 +1,6 @@
 //! Parameter vectors over the ranges of an effect's card.
 
+use super::RULES;
 use crate::data::Record;
 use crate::model::Model;
 use model_core::effect::{Facts, Parameter, Spec, Start, Starts, Unit};
@@ -10,6 +11,13 @@ const POINTS: [usize; 3] = [12, 4, 3];
 const FREQUENCIES: usize = 28;
 /// Points along a parameter whose range is not logarithmic, between the outer quantiles of y.
 const LEVELS: [f64; 6] = [0.1, 0.25, 0.4, 0.55, 0.7, 0.88];
+
+/// The longest lag that is tried in records of at least `shortest` samples.
+pub(super) fn longest_lag(period_s: f64, shortest: usize) -> u16 {
+    let longest = (RULES.longest_lag_s / period_s).round();
+    let share = RULES.longest_lag_share * shortest as f64;
+    longest.min(share).clamp(2.0, 4096.0) as u16
+}
 
 /// What the records say, for ranges and starting values.
 #[derive(Clone, Debug)]

@@ -12,7 +12,7 @@
 //! are learned from, what they leave is counted on those that are held out.
 
 use super::RULES;
-use super::grid::{Known, grid};
+use super::grid::{Known, grid, longest_lag};
 use super::judge::Judge;
 use super::term::Term;
 use crate::data::Record;
@@ -279,7 +279,7 @@ impl<'a> Screen<'a> {
 
     fn lags(&self) -> Vec<u16> {
         let shortest = self.records.iter().map(|r| r.len()).min().unwrap_or(0);
-        let longest = super::search::longest_lag(self.model.sample_period_s, shortest);
+        let longest = longest_lag(self.model.sample_period_s, shortest);
         let regular = (26..=longest).step_by(RULES.lag_step);
         let all = SHORT_LAGS.into_iter().chain(regular);
         all.filter(|lag| *lag <= longest && !self.model.state_lags.contains(lag))

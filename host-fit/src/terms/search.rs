@@ -2,7 +2,7 @@
 
 use super::RULES;
 use super::evidence::p_value;
-use super::grid::Known;
+use super::grid::{Known, longest_lag};
 use super::judge::{Judge, Judged};
 use super::screen::{GRADINGS, Proposal, Screen};
 use super::term::Term;
@@ -18,13 +18,6 @@ const LAG_ROUNDS: usize = 4;
 const LAG_STEPS: usize = 5;
 /// What a move of a lag must gain, as a share of the mean square error.
 const LAG_GAIN: f64 = 1e-4;
-
-/// The longest lag that is tried in records of at least `shortest` samples.
-pub(super) fn longest_lag(period_s: f64, shortest: usize) -> u16 {
-    let longest = (RULES.longest_lag_s / period_s).round();
-    let share = RULES.longest_lag_share * shortest as f64;
-    longest.min(share).clamp(2.0, 4096.0) as u16
-}
 
 /// A model with the terms that were added to the leanest one.
 #[derive(Clone, Debug)]

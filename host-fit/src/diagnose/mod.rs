@@ -288,15 +288,17 @@ pub fn diagnose(
         return Ok(diagnosis);
     }
     progress("the leanest model");
-    let root = if mid_run && given.start == Start::Measured {
+    let (root, step) = if mid_run && given.start == Start::Measured {
         // Rigs that are no blown ramp: their dynamics is the user's choice of lags.
         session.root_of_given(&given_inside, &as_given)?
     } else {
-        search.root(&given_inside, mid_run)?
+        let root = search.root(&given_inside, mid_run)?;
+        (root, "refitted with the fewest lags")
     };
     if interrupt.load(Ordering::Relaxed) {
         return Err(DiagnoseError::Interrupted);
     }
+    let root_errors = root.judged.held_out.clone();
     let mut found = search.run(root);
     // Many lags of a given model may hold more than terms that are added one by one.
     if found.best.judged.rmse() > (1.0 - RULES.worthwhile) * as_given.rmse()
@@ -310,7 +312,12 @@ pub fn diagnose(
         }
     }
     let restarted_s = restarted.map(|samples| samples as f64 * given.sample_period_s);
-    Ok(session.conclude(found, first, &as_given, restarted_s))
+    Ok(session.conclude(
+        found,
+        [first, session.rung(&root_errors, &[], step)],
+        &as_given,
+        restarted_s,
+    ))
 }
 
 /// A diagnosis in the making.
@@ -359,7 +366,7 @@ impl Session<'_> {
         &self,
         given: &Model,
         as_given: &HeldOut,
-    ) -> Result<Hypothesis, DiagnoseError> {
+    ) -> Result<(Hypothesis, &'static str), DiagnoseError> {
         let mut model = given.clone();
         model.delay_between_samples();
         let plain = self.judge().refitted(&model)?;
@@ -374,11 +381,14 @@ impl Session<'_> {
                 let gain = 1.0 - bilinear.rmse() / before;
                 let p = p_value(&plain.held_out, &bilinear.held_out);
                 if gain > RULES.worthwhile && p < RULES.level {
-                    return Ok(Hypothesis::new(bilinear));
+                    return Ok((
+                        Hypothesis::new(bilinear),
+                        "refitted with the product of input and output",
+                    ));
                 }
             }
         }
-        Ok(Hypothesis::new(plain))
+        Ok((Hypothesis::new(plain), "refitted in free run"))
     }
 
     /// The answer for a given model that is at the noise floor already, unless a
@@ -525,7 +535,7 @@ impl Session<'_> {
     fn conclude(
         &self,
         found: Found,
-        first: Rung,
+        first: [Rung; 2],
         as_given: &HeldOut,
         restarted_s: Option<f64>,
     ) -> Diagnosis {
@@ -549,14 +559,7 @@ impl Session<'_> {
         // The best single effect leads: the ladder falls as the ranking does.
         let place = |spec: &Spec| others.iter().position(|r| r.name == spec.name);
         order.sort_by_key(|spec| place(spec).unwrap_or(usize::MAX));
-        let mut ladder = vec![
-            first,
-            self.rung(
-                &found.root.judged.held_out,
-                &[],
-                "refitted with the fewest lags",
-            ),
-        ];
+        let mut ladder = first.to_vec();
         if !context.terms.is_empty() {
             let step = format!("with {}", context.words());
             ladder.push(self.rung(&context.judged.held_out, &[], &step));

@@ -34,8 +34,8 @@ rules! {
     head_start: usize = 2, "parameters", "a memory costs three, an effect one to four";
     /// A record begins at rest if the mean of so many first samples …
     beginning: usize = 20, "samples", "judgement: as long as a fast flow takes";
-    /// … is no further from the level of rest than this, or twice this where the command is off.
-    at_rest: f64 = 0.05, "size of y", "the noise of 20 samples is 0.01 at most in any set at hand";
+    /// … is no further from the level of rest than this, and the command is off.
+    at_rest: f64 = 0.1, "size of y", "the noise of 20 samples is 0.01 at most in any set at hand";
     /// Longest lag that is tried …
     longest_lag_s: f64 = 0.5, "s at 1 kHz", "the paper's lags";
     /// … and no more than this share of the shortest record.

@@ -8,7 +8,7 @@ use model_core::effect::{Place, Setting};
 use proc_macro2::{Ident, Literal, Punct, Spacing, TokenStream, TokenTree};
 use quote::{TokenStreamExt as _, format_ident, quote};
 
-/// Name of the module that [`rust_module`] writes: `user_` and the effect's name.
+/// Name of the module that is generated for an effect: `user_` and its name.
 #[must_use]
 pub fn module_name(effect: &str) -> String {
     format!("user_{}", effect.replace('-', "_"))

@@ -480,10 +480,17 @@ impl Session<'_> {
     /// do, or do as well with fewer parameters.
     fn earned(&self, best: &Hypothesis, bare: &Hypothesis) -> bool {
         let (with, without) = (best.judged.rmse(), bare.judged.rmse());
-        // The best of so many alternatives is often good by chance.
-        let p = RULES.alternatives * p_value(&bare.judged.held_out, &best.judged.held_out);
-        let in_the_dark =
-            self.judge().noise_source == NoiseSource::Scatter && self.fits(&bare.judged);
+        let scatter = self.judge().noise_source == NoiseSource::Scatter;
+        let in_the_dark = scatter && self.fits(&bare.judged);
+        // The best of so many alternatives is often good by chance. Where the base
+        // errs far beyond what scatters from sample to sample, records are few and
+        // short as a rule: one test for each effect has to do.
+        let alternatives = if scatter && !in_the_dark {
+            best.judged.model().candidates().count() as f64
+        } else {
+            RULES.alternatives
+        };
+        let p = alternatives * p_value(&bare.judged.held_out, &best.judged.held_out);
         let worthwhile = if in_the_dark {
             RULES.worthwhile_in_the_dark
         } else {
@@ -492,7 +499,7 @@ impl Session<'_> {
         let better = with < (1.0 - worthwhile) * without && p < RULES.level;
         let leaner = with < (1.0 + RULES.alike) * without && best.cost() < bare.cost();
         let drifts = self.judge().drifts_more(&best.judged, &bare.judged);
-        (better || (leaner && !in_the_dark)) && !drifts
+        (better || (leaner && !scatter)) && !drifts
     }
 
     fn conclusion(&self, found: &Found, as_given: &HeldOut) -> Conclusion {

@@ -10,6 +10,7 @@ use crate::linalg::{self, dot};
 use crate::model::{Coordinate, Delay, Kind, Model, Rounding};
 use crate::simulate::{Signals, SimulateError, Simulator};
 use model_core::Output;
+use model_core::effect::Sign;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
@@ -113,7 +114,11 @@ impl Searched {
             Some(parameter) => Self {
                 index,
                 logarithmic: parameter.is_logarithmic(),
-                low: parameter.low,
+                // A sign that is physics is kept.
+                low: match parameter.sign {
+                    Sign::Positive => parameter.low.max(0.0),
+                    Sign::Either => parameter.low,
+                },
                 high: parameter.high,
                 secant: (!coordinate.is_smooth())
                     .then_some(RULES.secant * (parameter.high - parameter.low)),

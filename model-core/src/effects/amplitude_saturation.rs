@@ -33,12 +33,9 @@ impl<T: Real> Physics<T> for AmplitudeSaturation<T> {
         place: Place::Flow,
         summary: "growth saturates (or stiffens) with amplitude",
         equation: "adds −γ·s³ to the drive",
-        parameters: &[Parameter::new(
-            "cubic",
-            Unit::PerYSquared,
-            [-1000.0, 1000.0],
-            &[0.1],
-        )],
+        parameters: &[
+            Parameter::new("cubic", Unit::PerYSquared, [-1000.0, 1000.0], &[0.1]).positive(),
+        ],
         starts: Starts::Grid,
         amplitude: Some(Amplitude::new("cubic", "an amplitude saturation").linear()),
         channel: None,

@@ -502,8 +502,38 @@ impl Session<'_> {
         (better || (leaner && !scatter)) && !drifts
     }
 
+    /// A hypothesis without the effects that the rest of it does as well without, for
+    /// all that chance can do.
+    fn proven(&self, found: &Found) -> Hypothesis {
+        let mut best = found.best.clone();
+        let mut index = 0;
+        while index < best.terms.len() {
+            let lesser = match best.terms[index].effect() {
+                Some(_) => self.search.without(&best, index, &found.root),
+                None => None,
+            };
+            let chance = lesser.filter(|lesser| {
+                let p = p_value(&lesser.judged.held_out, &best.judged.held_out);
+                RULES.alternatives * p >= RULES.level
+            });
+            match chance {
+                Some(lesser) => best = lesser,
+                None => index += 1,
+            }
+        }
+        best
+    }
+
     fn conclusion(&self, found: &Found, as_given: &HeldOut) -> Conclusion {
-        let (best, bare) = (&found.best, &found.bare);
+        let scatter = self.judge().noise_source == NoiseSource::Scatter;
+        let dark = scatter
+            && self.judge().unexplained_share(&found.bare.judged.held_out) <= RULES.too_much;
+        let proven = if dark {
+            self.proven(found)
+        } else {
+            found.best.clone()
+        };
+        let (best, bare) = (&proven, &found.bare);
         let effects: Vec<&'static Spec> = best.terms.iter().filter_map(Term::effect).collect();
         let judge = self.judge();
         let of = |verdict: Verdict, model: &Hypothesis, effects: Vec<&'static Spec>| Conclusion {

@@ -503,7 +503,7 @@ impl Session<'_> {
     }
 
     /// A hypothesis without the effects that the rest of it does as well without, for
-    /// all that chance can do.
+    /// all that one test for each effect says.
     fn proven(&self, found: &Found) -> Hypothesis {
         let mut best = found.best.clone();
         let mut index = 0;
@@ -514,7 +514,8 @@ impl Session<'_> {
             };
             let chance = lesser.filter(|lesser| {
                 let p = p_value(&lesser.judged.held_out, &best.judged.held_out);
-                RULES.alternatives * p >= RULES.level
+                let count = best.judged.model().candidates().count() as f64;
+                count * p >= RULES.level
             });
             match chance {
                 Some(lesser) => best = lesser,

@@ -98,7 +98,7 @@ impl Record {
         self.u.len()
     }
 
-    /// Whether the record has no sample (never true for a record of a [`DataSet`]).
+    /// Whether the record has no sample (never true for a record of a data set).
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.u.is_empty()

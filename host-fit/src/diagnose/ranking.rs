@@ -78,6 +78,16 @@ pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) 
         })
         .collect();
     let mut rated = rated;
+    // What the screening found no use for was tried all the same.
+    let useless = model.candidates().filter(|spec| {
+        screen.pointless(spec).is_none() && !best.iter().any(|(name, _)| name == spec.name)
+    });
+    rated.extend(useless.map(|spec| Rival {
+        name: spec.name.to_owned(),
+        spec: Some(spec),
+        judged: None,
+        promised: before,
+    }));
     rated.sort_by(|a, b| a.rmse().total_cmp(&b.rmse()));
     rated
 }

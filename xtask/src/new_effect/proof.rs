@@ -151,29 +151,42 @@ fn copy_tree(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Two short records of a flow with a cubic term, and a lean model that lacks it.
+/// Short records of a flow whose delay falls in proportion to its mean friction,
+/// down to a shortest, and a lean model that lacks it.
 fn recordings(folder: &Path) -> Result<std::path::PathBuf> {
-    const PERIODS: [(&str, usize); 2] = [("identify", 170), ("validate", 230)];
+    const RECORDS: [(&str, &str, usize); 4] = [
+        ("a", "identify", 170),
+        ("b", "identify", 330),
+        ("c", "validate", 230),
+        ("d", "validate", 410),
+    ];
+    const WINDOW: usize = 250;
     fs::create_dir_all(folder)?;
     let mut set = String::from("sample_period_s = 0.001\n");
     let mut noise = 1_u32;
-    for (role, half_period) in PERIODS {
+    for (name, role, half_period) in RECORDS {
         let mut table = String::from("t,u,y\n");
-        let (mut y, mut commands) = (0.0_f64, Vec::new());
-        for k in 0..2000_usize {
-            let u = u8::from(k / half_period % 2 == 1 && k % 11 != 0);
+        let (mut friction, mut commands) = (vec![0.0_f64], Vec::new());
+        for k in 0..3000_usize {
+            let u = f64::from(u8::from(k / half_period % 2 == 1 && k / 60 % 5 != 3));
             commands.push(u);
+            let y = friction[k];
             // A linear congruence serves as noise.
             noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             let measured = y + (f64::from(noise) / f64::from(u32::MAX) - 0.5) * 0.01;
             writeln!(table, "{},{u},{measured}", k as f64 * 0.001)?;
-            let arrived = k.checked_sub(40).map_or(0, |past| commands[past]);
-            y += 0.02 * (f64::from(arrived) - y - 0.8 * y.powi(3));
+            let recent: f64 = friction.iter().rev().skip(1).take(WINDOW - 1).sum();
+            let delay = f64::max(60.0 - 50.0 * recent / WINDOW as f64, 25.0);
+            let (whole, part) = (delay.floor(), delay.fract());
+            let jet = |back: usize| k.checked_sub(back).map_or(0.0, |past| commands[past]);
+            let whole = whole as usize;
+            let arrived = jet(whole) + part * (jet(whole + 1) - jet(whole));
+            friction.push(y + 0.03 * (arrived - y));
         }
-        fs::write(folder.join(role).with_extension("csv"), table)?;
+        fs::write(folder.join(name).with_extension("csv"), table)?;
         write!(
             set,
-            "[[record]]\nname = \"{role}\"\nfile = \"{role}.csv\"\nuse = \"{role}\"\n"
+            "[[record]]\nname = \"{name}\"\nfile = \"{name}.csv\"\nuse = \"{role}\"\n"
         )?;
     }
     fs::write(folder.join("dataset.toml"), set)?;

@@ -1,6 +1,6 @@
 //! Rules: the thresholds by which the tool decides, each with its meaning and where its value comes from.
 //!
-//! Every room keeps its own in one structure, written with the macro [`rules!`]: what a rule means is said once, as
+//! Every room keeps its own in one structure, written with the macro `rules!`: what a rule means is said once, as
 //! the field's documentation, and the same words are printed by `host-fit rules` and stand in `docs/rules.md` ([`crate::steps::rules_page`]).
 //!
 //! A rule decides something a user can see (what counts as significant, as worth saying, as diverged). What only says

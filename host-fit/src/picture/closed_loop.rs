@@ -21,7 +21,7 @@ pub struct LoopRun<'a> {
     pub air: &'a [f64],
 }
 
-/// What [`closed_loop`] draws.
+/// What [`closed_loop()`] draws.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ClosedLoop<'a> {
     /// Title; empty for none.

@@ -11,7 +11,7 @@
 //! | [`simulate`] | a model and a command | [`Simulation`] |
 //! | [`design`] | a model and a goal | [`Design`] |
 //! | [`try_out`] | a design and flows | [`Proof`](crate::design::Proof) |
-//! | [`constants`] | a model | [`Constants`] |
+//! | [`constants`] | a model | [`BoardConstants`] |
 //!
 //! [`catalogue`] lists the effects that can be missing, [`rulebooks`] every threshold that decides.
 //!

@@ -3,6 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use host_fit::model::Model;
+use host_fit::user_effect::Definition;
+use model_core::recursion::LagConvention;
 use scenarios::program;
 use serde_json::Value;
 
@@ -367,4 +370,37 @@ fn bad_input_is_one_paragraph_and_leaves_no_file() {
     assert!(!out.exists() && !csv.exists());
     let left = std::fs::read_dir(folder.path()).expect("the folder");
     assert_eq!(left.count(), 6, "only what the test wrote");
+}
+
+/// The simulator has no plant for a user's own effect: the law is written all the same, tried on a plant without it.
+#[test]
+fn a_law_is_designed_for_a_model_with_an_effect_of_ones_own() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (own, controlled) = (folder.path().join("own.toml"), folder.path().join("c.toml"));
+    let ringing =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/effects/supply-line-ringing.toml");
+    let mut model = Model::load(&data("paper/table-2-state-dependent.toml")).expect("the model");
+    model.convention = LagConvention::OneStep;
+    let definition = Definition::load(&ringing).expect("the effect");
+    model.define(definition).expect("a new name");
+    model.add(definition.spec(), &[0.3, 10.0, 0.06], None);
+    model.save(&own).expect("saved");
+    let design = json(&[
+        p("design"),
+        &own,
+        p("-o"),
+        &controlled,
+        p("--target"),
+        p("0.6"),
+    ]);
+    let notes = design["not_tried"].to_string();
+    assert!(notes.contains("without supply-line-ringing"), "{notes}");
+    assert!(
+        design["cases"]
+            .as_array()
+            .is_some_and(|cases| cases.len() > 20)
+    );
+    assert!(design["relay"]["mean"].is_number() && design["track"].is_object());
+    let model = Model::load(&controlled).expect("the model with its law");
+    assert!(model.law.is_some() && model.effect_names() == ["supply-line-ringing"]);
 }

@@ -32,10 +32,10 @@ pub type OnBoard = driven!(model::Law, model);
 /// The model's sample period, µs: what the boards' timers are set to.
 pub const PERIOD_US: u32 = (model::SAMPLE_PERIOD_S * 1e6 + 0.5) as u32;
 
-/// RAM of the boards, bytes.
-const RAM: usize = 128 * 1024;
-/// What is left of it for the log, the serial line and the calls, bytes.
-const FREE: usize = 8 * 1024;
+/// What the loop may take of the boards' 128 KiB of RAM, bytes: there may be a copy of
+/// it while it is built, and as much again for the self-test, and 8 KiB are for log,
+/// serial line and calls.
+pub const MOST: usize = (128 - 8) * 1024 / 4;
 
 // `host-fit codegen --board` says the same with the key of the model file.
 const _: () = {
@@ -47,9 +47,8 @@ const _: () = {
         model::CHANNELS.len() <= 1,
         "the model's effects need more measured channels than the one spare input of the board"
     );
-    // The loop itself, a copy while it is built, and as much for the self-test.
     assert!(
-        4 * size_of::<Controller<OnBoard>>() <= RAM - FREE,
+        size_of::<Controller<OnBoard>>() <= MOST,
         "model and law do not fit the board's memory: use shorter lags or delays"
     );
 };

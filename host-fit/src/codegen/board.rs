@@ -6,14 +6,13 @@ use crate::user_effect::line_lengths;
 use model_core::effect::RustType;
 use thiserror::Error;
 
-/// RAM of a board that loop and law may take, bytes: 128 KiB but for log, serial
-/// line and calls. `firmware/src/on_board.rs` has the same numbers.
-const FREE: usize = (128 - 8) * 1024;
-/// How often the loop is in memory at the start: itself, a copy while it is
-/// built, and as much for the self-test.
-const COPIES: usize = 4;
+/// What the loop may take of a board's RAM, bytes. The firmware has the number,
+/// and a test across the crates holds both equal.
+pub const MOST: usize = 30 * 1024;
 /// Sample periods that the boards' timers and watchdogs are good for, s.
 const PERIODS: [f64; 2] = [2e-4, 0.1];
+/// What loop and law take however short a model's memory is, bytes.
+const OVERHEAD: usize = 2 * 1024;
 
 /// Why a board cannot run a model.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -83,26 +82,35 @@ pub fn check(model: &Model) -> Result<(), BoardError> {
         let names = names.collect::<Vec<_>>().join(", ");
         return Err(BoardError::Channels { names });
     }
-    let parts = parts(model);
-    let state: usize = parts.iter().map(|(_, _, bytes, _)| bytes).sum();
-    // The law's own model and the one beside it.
-    let bytes = match law {
-        Law::Track(track) => 2 * state + 12 * usize::from(track.look_ahead),
-        Law::Maximise(_) => state + 8 * model.averaging.window as usize,
-    };
-    let most = FREE / COPIES;
-    if bytes <= most {
+    let bytes = loop_bytes(model, law);
+    if bytes <= MOST {
         return Ok(());
     }
-    let largest = parts.into_iter().max_by_key(|(_, _, bytes, _)| *bytes);
+    let largest = parts(model)
+        .into_iter()
+        .max_by_key(|(_, _, bytes, _)| *bytes);
     let (key, kept, _, remedy) = largest.unwrap_or_default();
     Err(BoardError::Memory {
         key,
         kept,
         bytes,
-        most,
+        most: MOST,
         remedy,
     })
+}
+
+/// What the loop takes of a board's RAM with `model` and `law`, bytes; rather too
+/// much than too little.
+#[must_use]
+pub fn loop_bytes(model: &Model, law: &Law) -> usize {
+    let state: usize = parts(model).iter().map(|(_, _, bytes, _)| bytes).sum();
+    let law = match law {
+        // Its own model, and the samples that it looks ahead.
+        Law::Track(track) => state + 12 * usize::from(track.look_ahead),
+        // The averaged readings.
+        Law::Maximise(_) => 8 * model.averaging.window as usize,
+    };
+    state + law + OVERHEAD
 }
 
 fn parts(model: &Model) -> Vec<Part> {

@@ -6,7 +6,7 @@ use host_fit::codegen::generate;
 use host_fit::design::{TrackRequest, track};
 use host_fit::model::{Law, Model};
 use model_core::effect::{Place, Spec};
-use model_core::effects::SPECS;
+use model_core::effects::{LAWS, SPECS, ZERO_OFFSET};
 use std::path::Path;
 
 /// Steps of the cases that budgets are for, and of the many others.
@@ -83,13 +83,19 @@ pub fn all() -> Result<Vec<Case>> {
         Case::new("law_sensor", designed(with("hot-film-lag")?)?).short(),
         Case::new("own_effects", read(bundled!("own"), "own.toml")?).short(),
     ];
-    for spec in SPECS {
+    for spec in known() {
         let name = format!("effect_{}", spec.name.replace('-', "_"));
         cases.push(Case::new(&name, with_effect(&base, spec)).short());
     }
     // As the board counts them.
     cases.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(cases)
+}
+
+/// Every effect and delay law that a model can have, those of base models among them.
+fn known() -> impl Iterator<Item = &'static Spec> {
+    let effects = SPECS.iter().filter(|spec| spec.place != Place::Delay);
+    LAWS.iter().chain(effects).chain([ZERO_OFFSET])
 }
 
 /// `base` with an effect at the first of its usual values. Its natural flow is a
@@ -99,7 +105,11 @@ fn with_effect(base: &Model, spec: &'static Spec) -> Model {
     let values: Vec<f64> = spec
         .parameters
         .iter()
-        .map(|parameter| parameter.starts.first().copied().unwrap_or(parameter.low))
+        .map(|parameter| {
+            let start = parameter.starts.first().copied();
+            // 0 would do nothing.
+            start.filter(|start| *start != 0.0).unwrap_or(0.05)
+        })
         .collect();
     let reference = spec.channel.map(|_| 10.0);
     model.add(spec, &values, reference);
@@ -188,6 +198,19 @@ mod tests {
         for case in cases.iter().filter(|case| case.name.starts_with("effect_")) {
             assert_ne!(predictions(&case.model), bare, "{}", case.name);
         }
+    }
+
+    /// What is said of a board's memory before a build, against what the build takes.
+    #[test]
+    fn the_boards_memory_is_known_before_it_is_built() {
+        use firmware::on_board::{MOST, OnBoard};
+        use host_fit::codegen::board;
+        assert_eq!(board::MOST, MOST);
+        let model = Model::from_toml(bundled!("full"), "full.toml").expect("a model file");
+        let law = model.law.as_ref().expect("a law");
+        let said = board::loop_bytes(&model, law);
+        let taken = size_of::<firmware::controller::Controller<OnBoard>>();
+        assert!(taken <= said && said < 2 * taken, "{taken} {said}");
     }
 
     #[test]

@@ -7,7 +7,7 @@
 
 use crate::data::{DataSet, Place, Record, Use};
 use crate::linalg::symmetric_eigenvalues;
-use crate::rules::rules;
+use crate::rules;
 
 rules! {
     /// What the commands of a data set can tell, and what deserves a remark.

@@ -38,8 +38,7 @@
 //! | [`indicators`], [`simulate`], [`target`] | a model run over records, and judged |
 //! | [`model`], [`user_effect`] | a model and its file; effects that users define |
 //! | [`picture`] | drawings and pages of plain numbers |
-//! | [`rules`] | the thresholds of all rooms, with meaning and origin |
-//! | [`dual`], [`data`], [`output`] | derivatives, recordings, files that appear whole or not at all |
+//! | [`dual`], [`data`], [`output`], [`rules`] | derivatives, recordings, files that appear whole or not at all, what a threshold is |
 
 pub mod codegen;
 pub mod delay;
@@ -57,7 +56,6 @@ pub mod picture;
 pub mod power;
 pub mod residual;
 pub mod ring;
-pub mod rules;
 pub mod search;
 pub mod simulate;
 pub mod steps;
@@ -69,3 +67,4 @@ mod linalg;
 
 pub use recordings as data;
 pub use recordings::output;
+pub use recordings::rules;

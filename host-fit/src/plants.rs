@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use firmware_sim::bench::{Disturbed, Lost};
 use firmware_sim::instrument::{Converter, Noise};
 use firmware_sim::plant::{BasePlant, DelayLaw, Effect, FreeStream, PlantSpec, RateLaw, Rig};
-use host_fit::design::{CaseGroup, DesignError, TRIAL_SAMPLES, Trial, steady, time_constants};
+use host_fit::design::{CaseGroup, DesignError, RULES, Trial, steady, time_constants};
 use host_fit::model::{Added, Delay, Model, TransportLaw};
 use model_core::effect::Physics;
 use model_core::effects::{EdgeDependentDelay, StateDependentDelay};
@@ -156,7 +156,7 @@ fn trial(
     under: Circumstances,
 ) -> anyhow::Result<Trial<Disturbed<Rig>>> {
     let mut rng = ChaCha8Rng::seed_from_u64(under.seed);
-    let stream = FreeStream::draw(&mut rng, TRIAL_SAMPLES);
+    let stream = FreeStream::draw(&mut rng, RULES.trial);
     let rig = Rig::new(plant, Some(stream)).context(NO_PLANT)?;
     let noise = Noise {
         white: under.noise * Noise::HOT_FILM.white,
@@ -232,7 +232,7 @@ fn others(plant: &PlantSpec, seed: u64) -> anyhow::Result<Vec<Trial<Disturbed<Ri
 mod tests {
     use super::*;
     use closed_loop::Figures;
-    use host_fit::design::{Case, JUDGED_FROM, Proof, TrackRequest, prove, track};
+    use host_fit::design::{Case, Proof, TrackRequest, prove, track};
     use model_core::recursion::LagConvention;
     use std::path::Path;
 
@@ -281,7 +281,7 @@ mod tests {
             "{on_model:?}"
         );
         let on_plant = proof.cases[1].figures;
-        let relay = Figures::of(&proof.compared, JUDGED_FROM);
+        let relay = Figures::of(&proof.compared, RULES.trial_from);
         assert!(on_plant.rms < 0.5 * relay.rms, "{on_plant:?} {relay:?}");
         assert!(on_plant.offset.abs() < 0.01);
         for case in &proof.cases {

@@ -10,7 +10,7 @@ use crate::dual::Dual;
 use crate::linalg::dot;
 use crate::model::{Delay, Model, Rounding};
 use crate::picture::significant;
-use crate::rules::rules;
+use crate::rules;
 use crate::simulate::{Signals, SimulateError, Simulator};
 use model_core::Output;
 use model_core::effect::{Parameter, Spec};

@@ -3,7 +3,7 @@
 use crate::data::Record;
 use crate::model::{Delay, Footprint, Model, Prepared, Rounding, Start};
 use crate::ring::Ring;
-use crate::rules::rules;
+use crate::rules;
 use model_core::model::{StateOf, observe};
 use model_core::{Input, Output, Parts, Real, State};
 use std::ops::ControlFlow;

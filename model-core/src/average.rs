@@ -9,6 +9,9 @@
 use crate::history::{DelayLine, Memory, Past};
 use crate::real::Real;
 
+/// Samples W of the averages in the paper, eqs. (1), (12) and (13).
+pub const WINDOW: u32 = 250;
+
 /// The sum of the last `terms` samples, sample by sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WindowSum<T> {

@@ -11,7 +11,7 @@ use nalgebra::{ArrayStorage, SMatrix, SVector};
 /// How outputs and inputs are averaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Averaging {
-    /// W, samples, at least 2; 250 in the paper.
+    /// W, samples, at least 2; [`WINDOW`](crate::average::WINDOW) in the paper.
     pub window: u32,
     /// Full model, eq. (4): the delay follows ỹ of eq. (1), the input is u.
     /// Averaged model, eq. (15): the delay follows y itself (an average

@@ -6,9 +6,7 @@ use crate::averaging::{Align, AverageError, AverageSummary, Averaging, Defect, D
 use crate::error::Place;
 use crate::raw::RawReader;
 use crate::record::{Record, Use};
-
-/// Command sequences kept side by side until it is known which one is the rule.
-const MOST_SEQUENCES: usize = 4;
+use crate::thresholds::RULES;
 
 /// One sample that waits in the buffer until its period is complete.
 #[derive(Debug, Clone, Copy)]
@@ -301,7 +299,7 @@ impl Folding {
             Some(index) => index,
             None => {
                 let fresh = Sequence::new(self.edges.clone(), first_line, self.length, self.width);
-                if self.sequences.len() < MOST_SEQUENCES {
+                if self.sequences.len() < RULES.sequences {
                     self.sequences.push(fresh);
                     self.sequences.len() - 1
                 } else {

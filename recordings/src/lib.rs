@@ -15,9 +15,11 @@ pub mod output;
 mod raw;
 mod record;
 mod rows;
+pub mod rules;
 mod sampling;
 mod set;
 mod table;
+mod thresholds;
 
 pub use average::average_files;
 pub use averaging::{Align, AverageError, AverageSummary, Averaging, Defect, Dropped};
@@ -25,3 +27,4 @@ pub use error::{DataError, Place, Problem};
 pub use record::{Record, Use};
 pub use set::DataSet;
 pub use table::InputFile;
+pub use thresholds::{RULES, Rules};

@@ -7,11 +7,7 @@ use std::path::Path;
 use crate::error::{DataError, Problem};
 use crate::rows::{RowReader, number};
 use crate::sampling::tidy;
-
-/// Rows at the head of the file from which the sampling period is taken.
-const HEAD_ROWS: usize = 20_000;
-/// A row belongs to the uniform grid if its step is a whole number of periods within this share of one.
-const GRID_TOLERANCE: f64 = 0.25;
+use crate::thresholds::RULES;
 
 /// Samples over which a gap can be told; a longer one is taken for so many.
 const FARTHEST: f64 = 1e15;
@@ -152,9 +148,9 @@ impl<R: BufRead> RawReader<R> {
             (None, Some(_)) => Step::Forward(1),
             (Some(before), Some(now)) => {
                 let steps = (now - before) / self.sample_period_s;
-                if steps <= GRID_TOLERANCE {
+                if steps <= RULES.off_grid {
                     Step::Restart
-                } else if (steps - steps.round()).abs() <= GRID_TOLERANCE && steps >= 0.5 {
+                } else if (steps - steps.round()).abs() <= RULES.off_grid && steps >= 0.5 {
                     Step::Forward(steps.round().min(FARTHEST) as u64)
                 } else {
                     Step::OffGrid
@@ -180,7 +176,7 @@ fn head_period(source: impl BufRead, path: &Path) -> Result<f64, DataError> {
     let mut rows = RowReader::new(source, path)?;
     let column = rows.required("t")?;
     let mut times = Vec::new();
-    while times.len() < HEAD_ROWS && rows.advance()? {
+    while times.len() < RULES.head && rows.advance()? {
         let time = rows.cells().nth(column).and_then(|cell| number(cell).ok());
         times.extend(time.filter(|t| t.is_finite()));
     }
@@ -194,7 +190,7 @@ fn head_period(source: impl BufRead, path: &Path) -> Result<f64, DataError> {
     }
     let middle = steps.len() / 2;
     let median = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
-    steps.retain(|s| (s / median - 1.0).abs() <= 0.6);
+    steps.retain(|s| (s / median - 1.0).abs() <= RULES.most_uneven);
     let mean = steps.iter().sum::<f64>() / steps.len() as f64;
     let spread = steps.iter().fold(0.0, |m: f64, s| m.max((s - mean).abs()));
     Ok(tidy(

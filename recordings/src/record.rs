@@ -3,16 +3,13 @@
 use std::collections::BTreeMap;
 
 use crate::error::{DataError, Place, Problem};
+use crate::thresholds::RULES;
 
 /// Names of columns with a meaning of their own; every other column is a measured channel.
 pub(crate) const RESERVED: [&str; 6] = ["t", "u", "y", "y_sd", "y_min", "y_max"];
 
 /// Values beyond this are refused: their squares would not be finite.
 const LARGEST: f64 = 1e100;
-
-/// A command of 0 and 1 is on/off: when no more than this share of its samples (or a single one) is something else,
-/// those are mistakes, not levels.
-const STRAY: f64 = 0.05;
 
 /// What a record is used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -121,7 +118,7 @@ impl Record {
         let takes = |level: f64| self.u.contains(&level);
         let odd = |u: &f64| *u != 0.0 && *u != 1.0;
         let count = self.u.iter().filter(|u| odd(u)).count();
-        let few = count <= 1 || count as f64 <= STRAY * self.len() as f64;
+        let few = count <= 1 || count as f64 <= RULES.stray * self.len() as f64;
         if takes(0.0) && takes(1.0) && few {
             self.u.iter().position(odd)
         } else {

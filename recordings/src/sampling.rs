@@ -1,13 +1,7 @@
 //! Uniform sampling: what period a printed time column has, and whether it holds throughout.
 
 use crate::error::Problem;
-
-/// A step may differ from the period by this share of it, beside the rounding of the printed times.
-const STEP_TOLERANCE: f64 = 0.1;
-/// Whatever the rounding, a step this far off is a fault (a missing sample is 1.0 off).
-const STEP_LIMIT: f64 = 0.6;
-/// The mean step may differ from a stated period by this share of it (the two clocks of a rig differ by less).
-const CLOCK_TOLERANCE: f64 = 1e-3;
+use crate::thresholds::RULES;
 
 /// Times of a record as printed, with one unit in the last printed place of each.
 #[derive(Debug, Default)]
@@ -49,8 +43,7 @@ impl PrintedTimes {
         let rounding = |row: usize| self.unit[row - 1].max(self.unit[row]);
         // A period that fits no step at all is a wrong statement, not a gap in row 2.
         if let Some(stated) = stated
-            && (median - stated).abs()
-                > (STEP_TOLERANCE * stated + rounding(1)).min(STEP_LIMIT * stated)
+            && (median - stated).abs() > tolerance(stated, rounding(1))
         {
             return Err(fault(
                 1,
@@ -63,8 +56,7 @@ impl PrintedTimes {
         let period = stated.unwrap_or(median);
         for row in 1..n {
             let step = self.time[row] - self.time[row - 1];
-            let tolerance = (STEP_TOLERANCE * period + rounding(row)).min(STEP_LIMIT * period);
-            if (step - period).abs() > tolerance {
+            if (step - period).abs() > tolerance(period, rounding(row)) {
                 let missing = (step / period).round() - 1.0;
                 let (step, period) = (tidy(step, 1e-6), tidy(period, 1e-6));
                 return Err(fault(
@@ -85,19 +77,22 @@ impl PrintedTimes {
         let rounding =
             (self.unit[0].min(period) + self.unit[n - 1].min(period)) / 2.0 / (n - 1) as f64;
         match stated {
-            Some(stated) if (mean - stated).abs() > CLOCK_TOLERANCE * stated + rounding => {
-                Err(fault(
-                    1,
-                    Problem::PeriodMismatch {
-                        found: tidy(mean, 1e-6),
-                        stated,
-                    },
-                ))
-            }
+            Some(stated) if (mean - stated).abs() > RULES.clock * stated + rounding => Err(fault(
+                1,
+                Problem::PeriodMismatch {
+                    found: tidy(mean, 1e-6),
+                    stated,
+                },
+            )),
             Some(stated) => Ok(stated),
             None => Ok(tidy(mean, (rounding / mean).clamp(1e-9, 1e-4))),
         }
     }
+}
+
+/// By how much a step may differ from `period`, s, with times printed to within `rounding`, s.
+fn tolerance(period: f64, rounding: f64) -> f64 {
+    (RULES.uneven * period + rounding).min(RULES.most_uneven * period)
 }
 
 fn fault(row: usize, problem: Problem) -> TimeFault {

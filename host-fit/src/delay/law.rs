@@ -225,10 +225,10 @@ fn outliers(points: &[DelayPoint]) -> Vec<usize> {
         else {
             return Vec::new();
         };
-        // Delays are known to a fraction of a sample at best: closer agreement is chance.
-        let scale = (1.4826 * *median).max(0.2);
+        // The median of |normal deviates| is σ/1.4826.
+        let scale = (1.4826 * *median).max(RULES.known_to);
         for (w, r) in weights.iter_mut().zip(&residual) {
-            *w = (1.345 * scale / r.abs().max(f64::MIN_POSITIVE)).min(1.0);
+            *w = (RULES.robust * scale / r.abs().max(f64::MIN_POSITIVE)).min(1.0);
         }
         found = residual
             .iter()
@@ -285,7 +285,9 @@ pub fn fit_delay_law(points: &[DelayPoint]) -> Option<DelayLawFit> {
             }
         }
     }
-    let quantile = StudentsT::new(0.0, 1.0, free).ok()?.inverse_cdf(0.975);
+    let quantile = StudentsT::new(0.0, 1.0, free)
+        .ok()?
+        .inverse_cdf(0.5 + 0.5 * RULES.confidence);
     let estimate = |value: f64, axis: usize, scale: f64| {
         let variance = covariance
             .get(axis)

@@ -53,7 +53,7 @@ pub struct Onset {
     /// Standard error of `delay`, samples.
     pub standard_error: f64,
     /// Samples from the edge to half of the response (between y at its start and its level when the next response
-    /// arrives, or after 150 samples), if it gets there.
+    /// arrives, or after [`Rules::response`](super::Rules)), if it gets there.
     pub half_response: Option<f64>,
 }
 
@@ -425,10 +425,10 @@ fn widening(residual: &[f64]) -> f64 {
 }
 
 /// Time at which y (mean of 5 samples) first passes half of its way from the level at the arrival to the level it has
-/// when the next response comes, or after 150 samples.
+/// when the next response comes, or after [`Rules::response`](super::Rules).
 fn half_response(y: &[f64], at: &Located, latest: usize) -> Option<f64> {
     let start = at.arrival.round().max(0.0) as usize;
-    let end = latest.min(start + 150);
+    let end = latest.min(start + RULES.response);
     let tail = y.get(start + (end.saturating_sub(start)) * 2 / 3..end)?;
     if tail.len() < RULES.least_side {
         return None;

@@ -1,6 +1,6 @@
 //! The rules of the measured delays.
 
-use crate::rules::rules;
+use crate::rules;
 
 rules! {
     /// When a response counts as measured, and what the measured delays say about the law.
@@ -38,8 +38,17 @@ rules! {
     fastest_rate: f64 = 300.0, "", "a law that is a step at the lowest ỹ";
     /// … and how many.
     rates: usize = 60, "", "steps of 16 %";
+    /// Edges further from the robust fit than this weigh less, in proportion …
+    robust: f64 = 1.345, "robust standard deviations", "convention: 95 % efficiency on normal errors (Huber 1964)";
+    /// … and delays are known no better than this.
+    known_to: f64 = 0.2, "samples", "judgement: closer agreement is chance";
     /// Edges further from the robust fit than this are set aside.
     outlier: f64 = 5.0, "robust standard deviations", "convention; held by the tests of `law.rs`";
+
+    /// Probability that an interval of the law's parameters holds the true one.
+    confidence: f64 = 0.95, "", "convention; held by the tests of `law.rs`";
+    /// A response has its level at the latest after this.
+    response: usize = 150, "samples", "judgement: seven time constants of a fast flow";
 
     /// Fewest measured edges of the tests.
     tested_edges: usize = 8, "edges", "judgement";

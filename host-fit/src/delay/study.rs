@@ -6,6 +6,7 @@ use super::law::{DelayLawFit, DelayPoint, fit_delay_law};
 use super::onset::{Onset, Unmeasured, measure_all};
 use super::spread::{Spread, correlation, spread};
 use crate::data::{DataError, DataSet, Use};
+use model_core::average::WINDOW;
 
 /// How delays are measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,7 +25,7 @@ pub struct DelayOptions {
 impl Default for DelayOptions {
     fn default() -> Self {
         Self {
-            window: 250,
+            window: WINDOW as usize,
             max_delay: 250,
             reach: 30,
             seed: 0,

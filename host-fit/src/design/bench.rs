@@ -4,6 +4,11 @@ use crate::model::{Footprint, Model, Prepared};
 use crate::simulate::HostState;
 use model_core::{Input, Output, Parts, Real, step};
 
+/// Seconds to samples at 1 kHz, rounded up, at least 1.
+pub(super) fn samples(seconds: f64) -> u32 {
+    (seconds * 1000.0 - 1e-6).ceil().clamp(1.0, 1e7) as u32
+}
+
 /// A prepared model with memories that fit it and channels at their references.
 pub(super) struct Player<T: Real> {
     pub(super) prepared: Prepared<T>,

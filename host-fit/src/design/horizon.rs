@@ -7,6 +7,7 @@
 //! Where the beam never had to drop a command, all were tried: the answer is exact.
 
 use super::bench::Player;
+use super::rules::RULES;
 use crate::model::Hold;
 use crate::simulate::HostState;
 use rayon::prelude::*;
@@ -180,7 +181,7 @@ impl HorizonSearch<'_> {
             let plan = self.plan(&flow);
             for on in plan.command.into_iter().take(apply.max(1) as usize) {
                 let y = flow.play(self.bench, on, 1, 0.0);
-                if y.abs() > 20.0 || y.is_nan() {
+                if y.abs() > RULES.grown || y.is_nan() {
                     return None;
                 }
                 played.push(on);

@@ -6,11 +6,13 @@
 //! commands: period, lengths and phases of the pulses. A search of free commands
 //! over a finite horizon ([`super::horizon`]) can propose further ones.
 
-use super::DesignError;
-use super::bench::Player;
+use super::bench::{Player, samples};
+use super::error::{DesignError, check};
 use super::horizon::{self, FlowState, Horizon};
-use crate::model::{Hold, Maximise, Model, Start};
-use crate::simulate::HostState;
+use super::rules::RULES;
+use super::train::{JudgedTrain, Played, Train, distinct};
+use crate::model::{Hold, Maximise, Model};
+use closed_loop::SAMPLE_PERIOD_S;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -100,6 +102,34 @@ pub struct Outside {
 }
 
 impl Outside {
+    /// How far `judged` lies outside the data that `model` comes from.
+    fn of(model: &Model, judged: &JudgedTrain) -> Option<Self> {
+        let training = &model.training;
+        if training.y_range == [0.0; 2] {
+            return None;
+        }
+        let beyond = |x: f64, [low, high]: [f64; 2]| (low - x).max(x - high).max(0.0);
+        let steady = judged.train == Train::steady();
+        let [shortest, longest] = training.on_time_range_s;
+        let on_times = judged
+            .train
+            .pulses
+            .iter()
+            .map(|p| f64::from(p.1) * model.sample_period_s);
+        let factor = on_times.fold(1.0_f64, |factor, on| {
+            if steady || longest <= 0.0 {
+                factor
+            } else {
+                factor.max(on / longest).max(shortest / on)
+            }
+        });
+        Some(Self {
+            friction: (judged.range[1] - training.y_range[1]).max(0.0),
+            duty: beyond(judged.duty, training.duty_range),
+            on_time_factor: factor,
+        })
+    }
+
     /// Whether the optimum stays inside what was recorded.
     #[must_use]
     pub fn is_inside(&self) -> bool {
@@ -107,32 +137,13 @@ impl Outside {
     }
 }
 
-/// While searching: samples before the judged part, and judged.
-const SETTLE: usize = 3000;
-const JUDGED: usize = 5000;
-/// For the best: where the judged part begins, and the long run ends.
-const SETTLED: usize = 20_000;
-const LONG_RUN: usize = 240_000;
-/// A search over a horizon: blocks at most, commands kept, samples of planning
-/// again and again.
-const MOST_BLOCKS: u32 = 60;
-const WIDTH: usize = 16;
-const RECEDED: usize = 8000;
-/// A long-run mean this far from the judged one (share) is another motion.
-const SAME_MEAN: f64 = 0.05;
-
 /// Searches the best pulses for `model`.
 ///
 /// # Errors
 /// [`DesignError::OnlyInstabilities`] when not even steady blowing survives the
 /// long run; [`DesignError::NotFromRest`], [`DesignError::SamplePeriod`].
 pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, DesignError> {
-    if (model.sample_period_s - 0.001).abs() > 1e-9 {
-        return Err(DesignError::SamplePeriod(model.sample_period_s));
-    }
-    if model.start == Start::Measured {
-        return Err(DesignError::NotFromRest);
-    }
+    check(model)?;
     let search = TrainSearch {
         bench: Player::of(model),
         hold: Hold {
@@ -149,12 +160,12 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
     let best_first = |list: &mut Vec<JudgedTrain>| list.sort_by(|a, b| b.value.total_cmp(&a.value));
     best_first(&mut candidates);
     // Refined from the best few, which are rarely neighbours of each other.
-    let starts: Vec<JudgedTrain> = distinct(&candidates, 6);
+    let starts: Vec<JudgedTrain> = distinct(&candidates, RULES.refined);
     let mut refined: Vec<JudgedTrain> = starts
         .par_iter()
         .map(|start| search.refine(start.clone(), request.pulses.clamp(1, 4)))
         .collect();
-    refined.extend(distinct(&candidates, 40));
+    refined.extend(distinct(&candidates, RULES.long_runs));
     refined.push(search.judge(&steady));
     let planned = request.horizon_s.map(|horizon_s| {
         let (planned, train) = search.planned(samples(horizon_s));
@@ -199,7 +210,7 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
             refused: better().count(),
             refused_mean: better().map(|(mean, _)| *mean).reduce(f64::max),
             moduli,
-            outside: outside(model, best),
+            outside: Outside::of(model, best),
             planned,
         });
     }
@@ -209,65 +220,12 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
     })
 }
 
-fn samples(seconds: f64) -> u32 {
-    (seconds * 1000.0 - 1e-6).ceil().clamp(1.0, 1e7) as u32
-}
-
-#[derive(Clone, Debug, PartialEq)]
-struct Train {
-    period: u32,
-    pulses: Vec<(u32, u32)>,
-}
-
-impl Train {
-    fn steady() -> Self {
-        Self {
-            period: 1,
-            pulses: vec![(0, 1)],
-        }
-    }
-
-    fn stretched(&self, period: u32) -> Self {
-        let scale =
-            |x: u32| (f64::from(x) * f64::from(period) / f64::from(self.period)).round() as u32;
-        let pulses = self
-            .pulses
-            .iter()
-            .map(|&(first, length)| (scale(first), scale(length)));
-        Self {
-            period,
-            pulses: pulses.collect(),
-        }
-    }
-}
-
 /// A train that lasts, and what it is worth when the flow is 2 % faster or slower.
 struct Lasting {
     judged: JudgedTrain,
     after: f64,
     detuned: f64,
     robust_value: f64,
-}
-
-#[derive(Clone, Debug)]
-struct JudgedTrain {
-    train: Train,
-    value: f64,
-    mean: f64,
-    duty: f64,
-    range: [f64; 2],
-}
-
-impl JudgedTrain {
-    fn worthless(train: &Train) -> Self {
-        Self {
-            train: train.clone(),
-            value: f64::NEG_INFINITY,
-            mean: f64::NEG_INFINITY,
-            duty: 0.0,
-            range: [0.0; 2],
-        }
-    }
 }
 
 struct TrainSearch {
@@ -302,21 +260,20 @@ impl TrainSearch {
             return JudgedTrain::worthless(train);
         }
         let mut played = Played::new(&self.bench, train);
-        played.pass(SETTLE);
-        let judged = played.judge(JUDGED, self.price);
+        played.pass(RULES.train_from);
+        let judged = played.judge(RULES.train_judged, self.price);
         judged.unwrap_or_else(|| JudgedTrain::worthless(train))
     }
 
     fn grid(&self) -> Vec<JudgedTrain> {
         let shortest = f64::from((self.hold.on + self.hold.off).max(20));
         let octaves = (f64::from(self.longest) / shortest).max(1.0);
-        const PERIODS: u32 = 72;
         let mut trains = Vec::new();
-        for i in 0..PERIODS {
-            let at = f64::from(i) / f64::from(PERIODS - 1);
+        for i in 0..RULES.periods {
+            let at = f64::from(i) / f64::from(RULES.periods - 1);
             let period = (shortest * octaves.powf(at)).round() as u32;
-            for duty in 1..20_u32 {
-                let on = (f64::from(period * duty) / 20.0).round() as u32;
+            for duty in 1..RULES.duties {
+                let on = (f64::from(period * duty) / f64::from(RULES.duties)).round() as u32;
                 trains.push(Train {
                     period,
                     pulses: vec![(0, on)],
@@ -333,7 +290,7 @@ impl TrainSearch {
             .hold
             .on
             .max(self.hold.off)
-            .max(length.div_ceil(MOST_BLOCKS));
+            .max(length.div_ceil(RULES.blocks));
         let search = horizon::HorizonSearch {
             bench: &self.bench,
             hold: self.hold,
@@ -341,15 +298,15 @@ impl TrainSearch {
             horizon: Horizon {
                 length,
                 block,
-                width: WIDTH,
+                width: RULES.beam,
             },
         };
         let plan = search.plan(&FlowState::at_rest(&self.bench));
         let blown = FlowState::at_rest(&self.bench).play(&self.bench, true, length, self.price);
         let open = plan.command.iter().filter(|on| **on).count();
         let mut planned = Planned {
-            horizon_s: f64::from(length) * 0.001,
-            block_s: f64::from(block) * 0.001,
+            horizon_s: f64::from(length) * SAMPLE_PERIOD_S,
+            block_s: f64::from(block) * SAMPLE_PERIOD_S,
             value: plan.value,
             steady_value: blown / f64::from(length),
             duty: open as f64 / plan.command.len() as f64,
@@ -357,13 +314,12 @@ impl TrainSearch {
             cycle_s: None,
             irregular: 0.0,
         };
-        // A third of a plan is played: its end is cut off from what follows.
-        let played = search.recede(length / 3, RECEDED);
+        let played = search.recede(length / RULES.plans, RULES.receding);
         let shortest = self.hold.on + self.hold.off;
         let train = played.and_then(|command| {
             let (period, irregular) = horizon::cycle(&command, shortest as usize)?;
             let pulses = horizon::pulses(&command, period)?;
-            planned.cycle_s = Some(period as f64 * 0.001);
+            planned.cycle_s = Some(period as f64 * SAMPLE_PERIOD_S);
             planned.irregular = irregular;
             Some(Train {
                 period: period as u32,
@@ -468,7 +424,8 @@ impl TrainSearch {
         let (judged, after) = self.long_run(train)?;
         let (mut detuned, mut robust_value) = (judged.mean, judged.value);
         if *train != Train::steady() {
-            for period in [train.period * 49 / 50, (train.period * 51).div_ceil(50)] {
+            let off = train.period.div_ceil(RULES.detuned);
+            for period in [train.period - off, train.period + off] {
                 // The same duty, as the law would be played on a slower or faster flow.
                 let stretched = train.stretched(period);
                 let near = self.long_run(&stretched);
@@ -488,135 +445,17 @@ impl TrainSearch {
     /// minutes; `None` if the motion has grown by then.
     fn long_run(&self, train: &Train) -> Option<(JudgedTrain, f64)> {
         let mut played = Played::new(&self.bench, train);
-        played.pass(SETTLED);
-        let judged = played.judge(SETTLED, self.price)?;
-        played.pass(LONG_RUN - 3 * SETTLED);
-        let late = played.judge(SETTLED, self.price)?;
-        let span = (0.5 * (judged.range[1] - judged.range[0])).max(0.25);
+        played.pass(RULES.long_from);
+        let judged = played.judge(RULES.long_from, self.price)?;
+        played.pass(RULES.long_until - 3 * RULES.long_from);
+        let late = played.judge(RULES.long_from, self.price)?;
+        let span = (0.5 * (judged.range[1] - judged.range[0])).max(RULES.same_range);
         let grown =
             late.range[0] < judged.range[0] - span || late.range[1] > judged.range[1] + span;
-        let same = (late.mean - judged.mean).abs() <= SAME_MEAN * judged.mean.abs().max(0.1);
+        let same = (late.mean - judged.mean).abs()
+            <= RULES.same_mean * judged.mean.abs().max(RULES.least_mean);
         (same && !grown).then_some((judged, late.mean))
     }
-}
-
-/// A train being played to the model.
-struct Played<'a> {
-    bench: &'a Player<f64>,
-    train: &'a Train,
-    on: Vec<bool>,
-    state: HostState<f64>,
-    at: usize,
-    grown: bool,
-}
-
-impl<'a> Played<'a> {
-    fn new(bench: &'a Player<f64>, train: &'a Train) -> Self {
-        Self {
-            bench,
-            train,
-            on: played(train),
-            state: bench.at_rest(),
-            at: 0,
-            grown: false,
-        }
-    }
-
-    fn step(&mut self) -> (f64, bool) {
-        let on = self.on[self.at];
-        self.at = (self.at + 1) % self.on.len();
-        let s = self.bench.step(&mut self.state, on).flow;
-        // Far beyond any friction gain.
-        self.grown |= s.abs() > 20.0 || s.is_nan();
-        (s, on)
-    }
-
-    fn pass(&mut self, samples: usize) {
-        for _ in 0..samples {
-            if self.grown {
-                return;
-            }
-            self.step();
-        }
-    }
-
-    /// Judges whole periods, at least `samples` long; `None` if the model has grown.
-    fn judge(&mut self, samples: usize, price: f64) -> Option<JudgedTrain> {
-        let length = samples.div_ceil(self.on.len()) * self.on.len();
-        let (mut sum, mut open) = (0.0, 0.0);
-        let mut range = [f64::MAX, f64::MIN];
-        for _ in 0..length {
-            let (s, on) = self.step();
-            if self.grown {
-                return None;
-            }
-            sum += s;
-            open += f64::from(u8::from(on));
-            range = [range[0].min(s), range[1].max(s)];
-        }
-        let (mean, duty) = (sum / length as f64, open / length as f64);
-        Some(JudgedTrain {
-            train: self.train.clone(),
-            value: mean - price * duty,
-            mean,
-            duty,
-            range,
-        })
-    }
-}
-
-fn played(train: &Train) -> Vec<bool> {
-    let train = model_core::control::PulseTrain {
-        period: train.period,
-        pulses: &train.pulses,
-    };
-    (0..train.period.max(1)).map(|at| train.is_on(at)).collect()
-}
-
-/// The first `count` of a sorted list, none with a period within 15 % and a
-/// duty within 0.1 of a better one.
-fn distinct(sorted: &[JudgedTrain], count: usize) -> Vec<JudgedTrain> {
-    let mut kept: Vec<JudgedTrain> = Vec::new();
-    for judged in sorted.iter().filter(|j| j.value.is_finite()) {
-        let near = |other: &JudgedTrain| {
-            let ratio = f64::from(judged.train.period) / f64::from(other.train.period);
-            ratio.ln().abs() < 0.15 && (judged.duty - other.duty).abs() < 0.1
-        };
-        if !kept.iter().any(near) {
-            kept.push(judged.clone());
-            if kept.len() == count {
-                break;
-            }
-        }
-    }
-    kept
-}
-
-fn outside(model: &Model, judged: &JudgedTrain) -> Option<Outside> {
-    let training = &model.training;
-    if training.y_range == [0.0; 2] {
-        return None;
-    }
-    let beyond = |x: f64, [low, high]: [f64; 2]| (low - x).max(x - high).max(0.0);
-    let steady = judged.train == Train::steady();
-    let [shortest, longest] = training.on_time_range_s;
-    let on_times = judged
-        .train
-        .pulses
-        .iter()
-        .map(|p| f64::from(p.1) * model.sample_period_s);
-    let factor = on_times.fold(1.0_f64, |factor, on| {
-        if steady || longest <= 0.0 {
-            factor
-        } else {
-            factor.max(on / longest).max(shortest / on)
-        }
-    });
-    Some(Outside {
-        friction: (judged.range[1] - training.y_range[1]).max(0.0),
-        duty: beyond(judged.duty, training.duty_range),
-        on_time_factor: factor,
-    })
 }
 
 #[cfg(test)]
@@ -726,7 +565,7 @@ mod tests {
             duty: 0.4,
             range: [1.05, 1.45],
         };
-        let outside = outside(&model, &judged).unwrap();
+        let outside = Outside::of(&model, &judged).unwrap();
         assert!((outside.friction - 0.35).abs() < 1e-12);
         assert!((outside.duty - 0.1).abs() < 1e-12);
         assert!((outside.on_time_factor - 2.5).abs() < 1e-12);

@@ -3,6 +3,7 @@
 //! know of and under worse conditions than designed for.
 
 use super::bench::Player;
+use super::rules::RULES;
 use crate::model::{Maximise, Model, Track};
 use crate::simulate::HostState;
 use closed_loop::{
@@ -10,13 +11,6 @@ use closed_loop::{
 };
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
-
-/// Samples of a trial.
-pub const TRIAL_SAMPLES: usize = 12_000;
-/// Sample from which a trial is judged.
-pub const JUDGED_FROM: usize = 4000;
-/// Samples over which friction is averaged before attachment is called lost.
-const ATTACHED_MEAN: usize = 250;
 
 /// What a case is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -82,11 +76,11 @@ pub struct Proof {
 }
 
 fn figures<S: Serializer>(trace: &Trace, to: S) -> Result<S::Ok, S::Error> {
-    Figures::of(trace, JUDGED_FROM).serialize(to)
+    Figures::of(trace, RULES.trial_from).serialize(to)
 }
 
 fn steadily(reference: f64) -> impl Iterator<Item = f64> {
-    std::iter::repeat_n(reference, TRIAL_SAMPLES)
+    std::iter::repeat_n(reference, RULES.trial)
 }
 
 impl<F: Controlled + Clone> Trial<F> {
@@ -98,21 +92,21 @@ impl<F: Controlled + Clone> Trial<F> {
         let case = Case {
             group: self.group,
             name: self.name.clone(),
-            figures: Figures::of(&trace, JUDGED_FROM),
-            steady: Figures::of(&blown, JUDGED_FROM).mean,
+            figures: Figures::of(&trace, RULES.trial_from),
+            steady: Figures::of(&blown, RULES.trial_from).mean,
             lowest,
-            kept: lowest >= 0.5 * reference.min(lowest_mean(&blown)),
+            kept: lowest >= RULES.attached * reference.min(lowest_mean(&blown)),
         };
         (case, trace)
     }
 }
 
 fn lowest_mean(trace: &Trace) -> f64 {
-    let judged = trace.samples.get(JUDGED_FROM..).unwrap_or_default();
+    let judged = trace.samples.get(RULES.trial_from..).unwrap_or_default();
     let means = judged
-        .windows(ATTACHED_MEAN)
+        .windows(RULES.attached_mean)
         .step_by(10)
-        .map(|w| w.iter().map(|s| s.friction).sum::<f64>() / ATTACHED_MEAN as f64);
+        .map(|w| w.iter().map(|s| s.friction).sum::<f64>() / RULES.attached_mean as f64);
     means.fold(f64::INFINITY, f64::min)
 }
 
@@ -199,7 +193,7 @@ fn on_model(law: &Track, bench: &Player<f32>) -> Case {
     let (case, _) = itself.run(&mut host_law(bench, law), law.reference);
     // On a model steady blowing may grow; what was asked for is the measure.
     Case {
-        kept: case.lowest >= 0.5 * law.reference,
+        kept: case.lowest >= RULES.attached * law.reference,
         ..case
     }
 }

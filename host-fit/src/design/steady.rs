@@ -2,6 +2,7 @@
 
 use super::DesignError;
 use super::bench::Player;
+use super::rules::RULES;
 use crate::model::Model;
 use serde::Serialize;
 
@@ -15,9 +16,6 @@ pub struct Steady {
     /// Largest modulus of the model's poles under the command; above 1 it grows.
     pub modulus: f64,
 }
-
-/// Longest wait for a steady value, s.
-const LONGEST_S: f64 = 60.0;
 
 /// The value `model` settles at with the valve open or closed throughout; closed
 /// means after two seconds of blowing.
@@ -45,11 +43,11 @@ pub fn steady(model: &Model, on: bool) -> Result<Steady, DesignError> {
     let modulus = model.largest_pole(on)?;
     let mut before = mean_of_two_seconds();
     let mut waited = 4.0;
-    while waited < LONGEST_S {
+    while waited < RULES.longest_wait_s {
         let now = mean_of_two_seconds();
         waited += 2.0;
         let moved = (now.0 - before.0).abs().max((now.1 - before.1).abs());
-        if moved < 1e-4 * now.0.abs().max(0.1) {
+        if moved < RULES.settled * now.0.abs().max(RULES.least_mean) {
             return Ok(Steady {
                 friction: now.0,
                 reading: now.1,
@@ -60,7 +58,7 @@ pub fn steady(model: &Model, on: bool) -> Result<Steady, DesignError> {
     }
     Err(DesignError::Unsettled {
         on,
-        seconds: LONGEST_S,
+        seconds: RULES.longest_wait_s,
         modulus,
     })
 }

@@ -1,10 +1,11 @@
 //! The constants of the tracking law, from the model and the valve's limits.
 
-use super::DesignError;
-use super::bench::Player;
+use super::bench::{Player, samples};
+use super::error::{DesignError, check};
+use super::rules::RULES;
 use super::steady::{Steady, steady, time_constants};
-use crate::model::{Delay, Hold, Model, Start, Track};
-use closed_loop::{AHEAD, Figures, ModelFlow, TrackingController, run};
+use crate::model::{Delay, Hold, Model, Track};
+use closed_loop::{AHEAD, Figures, ModelFlow, SAMPLE_PERIOD_S, TrackingController, run};
 use model_core::control::budget::Budget;
 use model_core::control::tracking::Unusable;
 use model_core::control::{Reachable, Tracking};
@@ -71,22 +72,13 @@ fn reachable<S: Serializer>(law: &Track, to: S) -> Result<S::Ok, S::Error> {
     law.reachable.serialize(to)
 }
 
-/// Samples by which a pulse can be cut at its arrival when the delay changes
-/// with the flow (theory 3.2: k − h advances by 0 to 2 a sample).
-const SHORTEST_SURE_PULSE: u32 = 3;
-
 /// Designs the law that holds `request.target` on `model`.
 ///
 /// # Errors
 /// [`DesignError`]: a reference out of reach (with the interval), a model that
 /// does not settle, is averaged or starts in mid-run, an air budget that is too small.
 pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, DesignError> {
-    if (model.sample_period_s - 0.001).abs() > 1e-9 {
-        return Err(DesignError::SamplePeriod(model.sample_period_s));
-    }
-    if model.start == Start::Measured {
-        return Err(DesignError::NotFromRest);
-    }
+    check(model)?;
     if model.averaging.averaged_model {
         return Err(Unusable::AveragedModel.into());
     }
@@ -99,7 +91,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     }
     let reachable = Reachable {
         // What is left of the start after some seconds is no natural friction.
-        low: if natural.friction.abs() < 1e-4 * blown.friction {
+        low: if natural.friction.abs() < RULES.no_natural * blown.friction {
             0.0
         } else {
             natural.friction
@@ -109,7 +101,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     reachable.check(request.target)?;
     let mut remarks = Vec::new();
     for (modulus, valve) in [(natural.modulus, "closed"), (blown.modulus, "open")] {
-        if modulus > 1.0 + 3e-5 {
+        if modulus > 1.0 + RULES.grows {
             remarks.push(format!(
                 "with the valve {valve} the model grows slowly (largest pole modulus {modulus:.5}); \
                  the loop holds it, but a long free run of it means nothing"
@@ -118,7 +110,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     }
 
     let bench = Player::<f64>::of(model);
-    let (shortest, longest) = bench.first_arrival(1.2 * blown.friction);
+    let (shortest, longest) = bench.first_arrival(RULES.swing * blown.friction);
     let (opening, closing) = bench.valve();
     let equivalent_duty = equivalent_duty(model, request.target);
     let mut hold = Hold {
@@ -132,7 +124,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         let varies = transport.bounds().is_none_or(|[low, high]| low < high);
         if varies || law.shapes_command() {
             // A pulse (or gap) shorter than its edge is held back never arrives.
-            let sure = |held: f64| held.ceil() as u32 + SHORTEST_SURE_PULSE;
+            let sure = |held: f64| held.ceil() as u32 + RULES.sure_pulse;
             hold.on = hold.on.max(sure(rising));
             hold.off = hold.off.max(sure(falling));
         }
@@ -157,7 +149,6 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     }
 
     let lead = shortest.max(1);
-    let half_hold = hold.on.max(hold.off).div_ceil(2).min(10_000) as u16;
     let range = reachable.high - reachable.low;
     let observer = observer(&time_constants(model, natural.friction, blown.friction));
     let mut law = Track {
@@ -174,14 +165,12 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         closing,
         look_ahead: longest
             .saturating_add(opening.max(closing))
-            .saturating_add(half_hold)
+            .saturating_add(half(hold))
             .saturating_add(3),
         observer,
-        // Slow against the delay, so that neither noise nor a wrong delay turns
-        // the corrections into an oscillation.
-        bias_rate: 0.03 / f64::from(lead.max(10)),
-        integral_rate: 0.04 / f64::from(lead.max(20)),
-        correction_limit: 0.3 * range,
+        bias_rate: RULES.bias_in_a_delay / f64::from(lead.max(RULES.bias_delay)),
+        integral_rate: RULES.integral_in_a_delay / f64::from(lead.max(RULES.integral_delay)),
+        correction_limit: RULES.correction * range,
         // A wild reading moves the estimate by the observer's share of the whole range.
         residual_limit: range,
     };
@@ -198,17 +187,19 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     }
     if request.least_air {
         let fastest = request.switches_per_s.unwrap_or(f64::INFINITY);
-        for rate in PACES.into_iter().filter(|rate| *rate < fastest) {
+        for rate in RULES.paces.into_iter().filter(|rate| *rate < fastest) {
             let slower = paced(&law, rate, duty);
             // What the look-ahead cannot hold or the model cannot follow is no choice.
             let Ok(figures) = duty_of(&slower) else { break };
-            if figures.air < 0.99 * duty && figures.offset.abs() < 0.005 * range {
+            if figures.air < (1.0 - RULES.worthwhile_saving) * duty
+                && figures.offset.abs() < RULES.paced_offset * range
+            {
                 (law, duty) = (slower, figures.air);
             }
         }
     }
     if let Some(allowed) = request.air
-        && duty > allowed + 0.02
+        && duty > allowed + RULES.air_margin
     {
         return Err(DesignError::Air {
             reference: request.target,
@@ -233,20 +224,10 @@ fn equivalent_duty(model: &Model, reference: f64) -> f64 {
     (alpha * reference - model.constant) / gain
 }
 
-/// Switches that may be saved up: with less than two pulses' worth a valve that has
-/// been open for long would have to wait closed for leave to open again.
-const SAVED_SWITCHES: u32 = 10;
-
-/// Paces that a law may choose to save air, switches per second.
-const PACES: [f64; 6] = [40.0, 20.0, 10.0, 6.0, 4.0, 3.0];
-
-/// The share of each residual that corrects the estimate: the observer is to be
-/// twice as fast as the flow itself. Slower, and the estimate is the model's alone;
-/// faster, and it follows the sensor's noise instead of the flow, which cannot
-/// move so fast.
+/// The share of each residual that corrects the estimate.
 fn observer(time_constants_s: &[f64; 2]) -> f64 {
     let fastest = time_constants_s[0].min(time_constants_s[1]);
-    (2.0 * 0.001 / fastest).min(0.1)
+    (RULES.observer_speed * SAMPLE_PERIOD_S / fastest).min(RULES.observer_most)
 }
 
 /// `law` with no more than `rate` switches per second, for a flow that takes `duty`.
@@ -258,21 +239,25 @@ fn paced(law: &Track, rate: f64, duty: f64) -> Track {
     let cycle = 2000.0 / rate;
     let duty = duty.clamp(0.02, 0.98);
     let mut paced = law.clone();
-    let share = |of: f64| (0.8 * of * cycle).round() as u32;
+    let share = |of: f64| (RULES.paced_hold * of * cycle).round() as u32;
     if duty > 0.5 {
         paced.hold.off = law.hold.off.max(share(1.0 - duty));
     } else {
         paced.hold.on = law.hold.on.max(share(duty));
     }
-    let half = |hold: Hold| hold.on.max(hold.off).div_ceil(2).min(10_000) as u16;
     paced.look_ahead = law
         .look_ahead
         .saturating_add(half(paced.hold) - half(law.hold));
-    paced.switches = Some([(1000.0 / rate).ceil() as u32, SAVED_SWITCHES]);
+    paced.switches = Some([(1000.0 / rate).ceil() as u32, RULES.saved_switches]);
     paced
 }
 
-/// The law on the model itself, 5 s after the start and over 10 s, without the air budget.
+/// Half of the longer time that a valve is held for, samples.
+fn half(hold: Hold) -> u16 {
+    hold.on.max(hold.off).div_ceil(2).min(10_000) as u16
+}
+
+/// The law on the model itself, once it has started, without the air budget.
 fn on_model(bench: &Player<f64>, tracking: Tracking<f64>) -> Figures {
     let free = Tracking {
         budget: Budget {
@@ -291,20 +276,15 @@ fn on_model(bench: &Player<f64>, tracking: Tracking<f64>) -> Figures {
     let trace = run(
         &mut law,
         &mut flow,
-        std::iter::repeat_n(tracking.reference, 15_000),
+        std::iter::repeat_n(tracking.reference, RULES.model_run),
     );
-    Figures::of(&trace, 5000)
-}
-
-/// Seconds to samples at 1 kHz, rounded up, at least 1.
-fn samples(seconds: f64) -> u32 {
-    (seconds * 1000.0 - 1e-6).ceil().clamp(1.0, 1e9) as u32
+    Figures::of(&trace, RULES.model_run_from)
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::model::Training;
+    use crate::model::{Start, Training};
     use model_core::effects::StateDependentDelay;
     use model_core::model::Averaging;
     use model_core::recursion::{Grading, LagConvention};

@@ -1,6 +1,6 @@
 //! The rules of the verdict.
 
-use crate::rules::rules;
+use crate::rules;
 
 rules! {
     /// When a misfit counts, when an effect is named, and when it only stands in for something else.

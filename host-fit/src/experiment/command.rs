@@ -1,13 +1,8 @@
 //! Commands that a valve can play.
 
-use super::Limits;
+use super::{Limits, RULES};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-
-/// Random sequences that are tried.
-const RANDOM: usize = 24;
-/// Rest at the end of a run as a share of it, so that runs can follow one another.
-const TAIL: f64 = 0.15;
 
 /// A command as openings in time.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +31,7 @@ impl Openings {
     fn repeating(description: String, limits: &Limits, dwells: &[f64]) -> Self {
         let mut all = vec![limits.min_off_s];
         let mut at = limits.min_off_s;
-        let end = (1.0 - TAIL) * limits.duration_s;
+        let end = (1.0 - RULES.rest) * limits.duration_s;
         for pair in dwells.chunks(2).cycle() {
             let [on, off] = pair else { break };
             if at + on > end {
@@ -67,8 +62,8 @@ pub(super) fn families(limits: &Limits, rng: &mut ChaCha8Rng) -> Vec<Openings> {
         duration_s: duration,
     } = *limits;
     let mut plans = Vec::new();
-    for period in geometric(on + off, 0.4 * duration, 14) {
-        for duty in [0.15, 0.3, 0.5, 0.7, 0.85] {
+    for period in geometric(on + off, RULES.longest_period * duration, RULES.periods) {
+        for duty in RULES.duties {
             let (open, closed) = (duty * period, (1.0 - duty) * period);
             if open >= on && closed >= off {
                 let name = format!(
@@ -80,17 +75,20 @@ pub(super) fn families(limits: &Limits, rng: &mut ChaCha8Rng) -> Vec<Openings> {
             }
         }
     }
-    for open in geometric(on, 0.5 * duration, 10) {
+    for open in geometric(on, RULES.longest_pulse * duration, RULES.pulses) {
         let name = format!("a single pulse of {open:.3} s");
         plans.push(Openings {
             description: name,
             dwells: vec![off.max(0.05 * duration), open],
         });
     }
-    let rest = (0.1 * duration).max(off);
-    for first in geometric(on, (0.1 * duration).max(1.01 * on), 4) {
-        for second in geometric(on, (0.1 * duration).max(1.01 * on), 3) {
-            let dwells: Vec<f64> = geometric(off, rest.max(1.01 * off), 6)
+    let long = RULES.longest_of_pair * duration;
+    let rest = long.max(off);
+    let [firsts, seconds, pauses] = RULES.pairs;
+    // A range of its own even where the shortest times are long.
+    for first in geometric(on, long.max(1.01 * on), firsts) {
+        for second in geometric(on, long.max(1.01 * on), seconds) {
+            let dwells: Vec<f64> = geometric(off, rest.max(1.01 * off), pauses)
                 .flat_map(|pause| [first, pause, second, rest])
                 .collect();
             let name = format!(
@@ -99,7 +97,7 @@ pub(super) fn families(limits: &Limits, rng: &mut ChaCha8Rng) -> Vec<Openings> {
             plans.push(Openings::repeating(name, limits, &dwells));
         }
     }
-    for i in 0..RANDOM {
+    for i in 0..RULES.sequences {
         let longest = on.max(off) * 2.0_f64.powi(1 + (i % 5) as i32);
         let dwells: Vec<f64> = (0..2 * (duration / (on + off)) as usize + 2)
             .map(|k| {
@@ -129,7 +127,7 @@ pub(super) fn mutate(plan: &Openings, limits: &Limits, rng: &mut ChaCha8Rng) -> 
         }
     }
     // What would run into the tail is left out; a plan ends with an opening.
-    let end = (1.0 - TAIL) * limits.duration_s;
+    let end = (1.0 - RULES.rest) * limits.duration_s;
     let mut at = 0.0;
     let kept = changed.dwells.iter().take_while(|dwell| {
         at += **dwell;

@@ -5,6 +5,9 @@
 //! valve can do.
 
 mod command;
+mod rules;
+
+pub use rules::{RULES, Rules};
 
 use crate::model::Model;
 use crate::model::Rounding;
@@ -18,11 +21,6 @@ use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::path::Path;
 use thiserror::Error;
-
-/// Variations of the best command that are tried, in rounds of this many …
-const VARIATIONS: usize = 16;
-/// … and so many rounds.
-const ROUNDS: usize = 8;
 
 /// What the valve can do and how long a run may last.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,8 +137,8 @@ pub fn separating(
     let plans = families(limits, &mut rng);
     let score = |plan: &Openings| separation(models, &plan.command(period, samples)) / noise_rmse;
     let mut best = pick(plans, &score).ok_or(refused)?;
-    for _ in 0..ROUNDS {
-        let variations = (0..VARIATIONS)
+    for _ in 0..RULES.rounds {
+        let variations = (0..RULES.variations)
             .map(|_| mutate(&best.0, limits, &mut rng))
             .collect();
         if let Some(better) = pick(variations, &score).filter(|new| new.1 > best.1) {

@@ -5,7 +5,10 @@
 //! linearises itself one part (one record) at a time, so that parts can be run side by
 //! side and a cost that is too high is given up early.
 
+use super::rules::RULES;
 use crate::linalg::{dot, solve_symmetric};
+
+// The way to a minimum, and no rules: other values take more iterations and end in the same place.
 
 /// First damping, as a share of the diagonal of JᵀJ.
 const FIRST_DAMPING: f64 = 1e-3;
@@ -20,8 +23,6 @@ const LARGEST_DAMPING: f64 = 1e8;
 const TRIES: usize = 10;
 /// Added to the diagonal, so that a coordinate without influence stays where it is.
 const FLOOR: f64 = 1e-12;
-/// The residual is orthogonal to a column of J when the cosine between them is below this.
-const ORTHOGONAL: f64 = 1e-6;
 
 /// Why a fit ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -180,7 +181,7 @@ fn is_stationary(a: &[f64], g: &[f64], reach: &[(f64, f64)], cost: f64) -> bool 
     (0..n).all(|i| {
         let (low, high) = reach[i];
         let blocked = if g[i] > 0.0 { high <= 0.0 } else { low >= 0.0 };
-        blocked || g[i].abs() <= ORTHOGONAL * (a[i * n + i] * cost).sqrt()
+        blocked || g[i].abs() <= RULES.stationary * (a[i * n + i] * cost).sqrt()
     })
 }
 

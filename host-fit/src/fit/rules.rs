@@ -1,11 +1,14 @@
 //! The rules of fitting.
 
-use crate::rules::rules;
+use crate::rules;
+use model_core::average::WINDOW;
 
 rules! {
     /// How models are fitted in free run, and what a fit is good for.
     pub struct Rules in "fit";
 
+    /// A fit without a better step has a minimum when the cosines between the residual and all derivatives are below this.
+    stationary: f64 = 1e-6, "cosine", "NIST's problems, started at their certified values";
     /// Most iterations of a fit.
     iterations: usize = 30, "", "judgement";
     /// A fit ends when an iteration lowers the sum of squares by less than this.
@@ -23,7 +26,7 @@ rules! {
     /// Standard errors are summed over this many blocks of a record …
     batches: usize = 40, "", "judgement; intervals held by the campaign's parameters within 25 %";
     /// … that are no longer than this.
-    longest_batch: usize = 250, "samples", "the window of ỹ in eq. (1)";
+    longest_batch: usize = WINDOW as usize, "samples", "the window of ỹ in eq. (1)";
 
     /// Starting points that are followed to the end, beside the best with each response to jets of part strength.
     followed: usize = 2, "", "judgement, on the campaign's rigs";

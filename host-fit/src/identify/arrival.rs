@@ -4,7 +4,8 @@ use model_core::average::WindowSum;
 use model_core::delay::{DelayLaw as _, ScaledDelay, Tap};
 use model_core::effects::StateDependentDelay;
 
-use super::structure::{ExponentialDelay, FACTOR_STEP, InputDelay, Series, Structure, WINDOW};
+use super::structure::{ExponentialDelay, FACTOR_STEP, InputDelay, Series, Structure};
+use model_core::average::WINDOW;
 
 /// Strength with which samples enter a sum of products.
 #[derive(Debug, Clone, PartialEq)]

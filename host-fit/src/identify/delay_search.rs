@@ -11,12 +11,10 @@ use super::free_runner::FreeRunner;
 use super::one_step::{KickStep, OneStep, exchange_pairs, exchange_singles};
 use super::options::{IdentifyOptions, Objective};
 use super::regression::Regression;
+use super::rules::RULES;
 use crate::search::{
     Evaluation, Point, Progress, SearchReport, SearchStep, Settle, Speculative, Success, minimise,
 };
-
-/// Fruitless kicks of a free-run search per unit of patience, and kicks in all.
-const FREE_KICKS: (usize, usize) = (8, 12);
 
 /// Runs the search that the options ask for.
 pub(crate) fn search(
@@ -37,7 +35,7 @@ pub(crate) fn search(
     let starts: Vec<Point> = vec![draw()];
     let mut one_step = OneStep { regression };
     let kicks = match options.objective {
-        Objective::OneStep => 6 * options.patience,
+        Objective::OneStep => RULES.kicks * options.patience,
         // Only a starting point is needed.
         Objective::FreeRun => options.patience,
     };
@@ -72,8 +70,8 @@ pub(crate) fn search(
         Box::new(Settle::new(move_inputs)),
         Box::new(Speculative::default()),
         Box::new(FreeKickStep::new(
-            FREE_KICKS.0 * options.patience,
-            FREE_KICKS.1 * options.patience,
+            RULES.free_kicks * options.patience,
+            RULES.most_free_kicks * options.patience,
         )),
     ];
     let mut free = minimise(

@@ -6,16 +6,10 @@ use super::exchange::{Exchange, List, Slot, set};
 use super::free_run::{DIVERGED_VALUE, FreeRun};
 use super::layout::Delays;
 use super::linearised::Linearised;
+use super::rules::RULES;
 use crate::search::{Around, Evaluator, Point, SearchStep, StopReason, Success};
 
-/// Exchanges of one slot that are simulated first: the deepest minima of the
-/// prediction over the lag.
-const MINIMA: usize = 7;
-
-/// Only those are simulated whose prediction is below this share of the best ε.
-const PROMISING: f64 = 1.01;
-
-/// Then these far around the best of them.
+/// From the best of the predicted lags on, these steps are tried.
 const AROUND: [i32; 6] = [-1, 1, -2, 2, -4, 4];
 
 /// Search step: exchanges lags where the linearised free run predicts the best.
@@ -72,7 +66,7 @@ fn descend(
                 &mut linearised,
                 &delays,
                 slot,
-                best.value * PROMISING,
+                best.value * RULES.promising,
             );
             *screened += usize::from(evaluator.problem().regression.layout.longest_lag);
             let trials: Vec<Point> = minima
@@ -105,15 +99,12 @@ fn descend(
                 }
             }
         }
-        if best.value >= before * (1.0 - SMALL_GAIN) || hopeless(sweep, best.value) {
+        if best.value >= before * (1.0 - RULES.small_gain) || hopeless(sweep, best.value) {
             break;
         }
     }
     Ok(best)
 }
-
-/// A sweep that gains less than this share ends a descent.
-const SMALL_GAIN: f64 = 1e-3;
 
 /// Evaluates all points and keeps the best; gives the place of a better one.
 fn best_of(
@@ -184,13 +175,10 @@ fn predicted_minima(
     minima.sort_by(|a, b| a.0.total_cmp(&b.0));
     minima
         .into_iter()
-        .take(MINIMA)
+        .take(RULES.minima)
         .map(|(_, lag)| lag)
         .collect()
 }
-
-/// How far an input delay is moved in one step, samples.
-const INPUT_MOVES: [f64; 9] = [0.02, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0, 6.0, 12.0];
 
 /// Walks the input delays as long as that helps, with everything else as it is.
 fn walk_inputs(
@@ -205,7 +193,7 @@ fn walk_inputs(
     while moved && !bounds.is_empty() {
         let mut trials: Vec<Point> = Vec::new();
         for (input, (low, high)) in bounds.iter().enumerate() {
-            for shift in INPUT_MOVES.iter().flat_map(|m| [-m, *m]) {
+            for shift in RULES.input_moves.iter().flat_map(|m| [-m, *m]) {
                 let mut trial = best.point.clone();
                 let ticks = (shift * per_sample).round() as i64;
                 trial[first + input] = (trial[first + input] + ticks).clamp(*low, *high);
@@ -216,23 +204,6 @@ fn walk_inputs(
     }
     Ok(best)
 }
-
-/// Lags that a kick replaces.
-const KICKED_LAGS: usize = 2;
-
-/// A lag is kicked further than this, samples: less is the descent's own reach.
-const KICK_DISTANCE: u16 = 4;
-
-/// Share of the kicks that move the input delays too, and how far at most, samples.
-const INPUT_KICKS: f64 = 0.3;
-const INPUT_KICK_REACH: f64 = 5.0;
-
-/// The input delays are walked where a descent comes this close to the incumbent.
-const CLOSE: f64 = 1.01;
-
-/// A descent after a kick is given up when its n-th sweep ends more than this
-/// share over n above the incumbent.
-const HOPELESS: f64 = 0.05;
 
 /// Search step: a variable neighbourhood search whose kicks are informed. From a
 /// local optimum a few lags go to other minima of the prediction, so that most
@@ -280,23 +251,24 @@ impl FreeKickStep {
         let (_, linearised) = self.linearised.as_mut()?;
         let problem = evaluator.problem();
         let slots = Exchange::new(&problem.regression, &delays.ticks).slots(&delays);
-        for _ in 0..KICKED_LAGS.min(slots.len()) {
+        for _ in 0..RULES.kicked_lags.min(slots.len()) {
             let slot = slots[around.rng.random_range(0..slots.len())];
             let now = lag_in(&delays, slot);
             let mut others = predicted_minima(problem, linearised, &delays, slot, f64::INFINITY);
             self.screened += usize::from(problem.regression.layout.longest_lag);
-            others.retain(|lag| lag.abs_diff(now) > KICK_DISTANCE);
+            others.retain(|lag| lag.abs_diff(now) > RULES.kick_distance);
             if !others.is_empty() {
                 let lag = others[around.rng.random_range(0..others.len())];
                 set(&mut delays, slot, lag);
             }
         }
         // Without on/off edges every new input delay costs new tables.
-        if problem.regression.is_binary() && around.rng.random_bool(INPUT_KICKS) {
+        if problem.regression.is_binary() && around.rng.random_bool(RULES.kicked_inputs) {
             let per_sample = problem.regression.signals.ticks_per_sample();
             let bounds = problem.regression.layout.input_bounds();
             for (tick, (low, high)) in delays.ticks.iter_mut().zip(bounds) {
-                let shift = around.rng.random_range(-INPUT_KICK_REACH..INPUT_KICK_REACH);
+                let reach = RULES.free_kick_reach;
+                let shift = around.rng.random_range(-reach..reach);
                 *tick = (*tick + (shift * per_sample).round() as i64).clamp(low, high);
             }
         }
@@ -323,10 +295,11 @@ impl SearchStep<FreeRun> for FreeKickStep {
             return Ok(None);
         }
         let start = Success { point, value };
-        let hopeless =
-            |sweep: usize, value: f64| value > around.value * (1.0 + HOPELESS / sweep as f64);
+        let hopeless = |sweep: usize, value: f64| {
+            value > around.value * (1.0 + RULES.falling_behind / sweep as f64)
+        };
         let mut end = descend(evaluator, start, &mut self.screened, hopeless)?;
-        if end.value < CLOSE * around.value {
+        if end.value < RULES.close * around.value {
             end = walk_inputs(evaluator, end)?;
         }
         if end.value < around.value {

@@ -14,7 +14,8 @@ use super::arrival::{CoreLaw, Signals, core_law, factor};
 use super::coefficients::Coefficients;
 use super::layout::Delays;
 use super::rules::RULES;
-use super::structure::{ExponentialDelay, InputDelay, Structure, WINDOW};
+use super::structure::{ExponentialDelay, InputDelay, Structure};
+use model_core::average::WINDOW;
 
 /// Samples computed together at most.
 const BLOCK: usize = 32;

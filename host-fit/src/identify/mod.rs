@@ -29,4 +29,4 @@ pub use options::{IdentifyOptions, Objective};
 pub use refinement::Refinement;
 pub use rules::{RULES, Rules};
 pub use run::{Identified, identify};
-pub use structure::{ExponentialDelay, InputDelay, Structure, WINDOW};
+pub use structure::{ExponentialDelay, InputDelay, Structure};

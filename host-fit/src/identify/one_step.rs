@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use super::exchange::{Exchange, best_input, set};
 use super::layout::Delays;
 use super::regression::Regression;
+use super::rules::RULES;
 use crate::search::{
     Around, Evaluation, Evaluator, Point, Problem, SearchStep, StopReason, Success, Variable,
 };
@@ -117,9 +118,6 @@ pub(crate) fn exchange_pairs(
     Ok((point, success))
 }
 
-/// How far input delays are searched after a kick, samples.
-const KICK_REACH: f64 = 12.0;
-
 /// Search step: from a local optimum, replaces a few lags at random, settles
 /// again, and gives up after `patience` fruitless kicks.
 pub(crate) struct KickStep {
@@ -158,7 +156,7 @@ impl SearchStep<OneStep> for KickStep {
         settle(
             regression,
             &mut delays,
-            Some(KICK_REACH),
+            Some(RULES.kick_reach),
             &mut self.screened,
         );
         let point = regression.layout.point(&delays);
@@ -196,7 +194,7 @@ pub(crate) fn kick(
     }
     for (input, (low, high)) in regression.layout.input_bounds().into_iter().enumerate() {
         // Without on/off edges every new input delay costs new tables.
-        if regression.is_binary() && rng.random_bool(0.3) {
+        if regression.is_binary() && rng.random_bool(RULES.kicked_inputs) {
             delays.ticks[input] = rng.random_range(low..=high);
         }
     }

@@ -16,10 +16,11 @@ use super::layout::Delays;
 use super::options::{IdentifyOptions, Objective};
 use super::refinement::{Refinement, refine};
 use super::regression::Regression;
-use super::structure::{InputDelay, Series, WINDOW};
+use super::structure::{InputDelay, Series};
 use crate::data::{Record, Use};
 use crate::model::{Delay, Model, Training};
 use crate::search::{Progress, StopReason};
+use model_core::average::WINDOW;
 
 /// Result of an identification.
 #[derive(Debug, Clone)]

@@ -4,9 +4,6 @@ use model_core::recursion::LagConvention;
 
 use crate::model::Start;
 
-/// Samples W of the averages, eqs. (1), (12) and (13).
-pub const WINDOW: u32 = 250;
-
 /// Step in which factors f are searched.
 pub(crate) const FACTOR_STEP: f64 = 1e-4;
 

@@ -1,6 +1,6 @@
 //! What a model was trained on, and when it is asked for more.
 
-use super::{Model, Training};
+use super::{Model, RULES, Training};
 use crate::data::Record;
 
 impl Training {
@@ -58,7 +58,7 @@ impl Model {
         let mut said = Vec::new();
         let [low, high] = training.y_range;
         if low < high {
-            let margin = 0.05 * (high - low);
+            let margin = RULES.outside * (high - low);
             let (least, most) = y.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |m, y| {
                 (m.0.min(*y), m.1.max(*y))
             });

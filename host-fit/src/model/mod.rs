@@ -10,6 +10,7 @@ mod memory;
 mod parameters;
 mod poles;
 mod prepared;
+mod rules;
 
 pub use chain::{Chain, HostEffect, HostState};
 pub use delay::{Delay, TransportLaw};
@@ -18,8 +19,10 @@ pub use law::{Hold, Law, Maximise, Track};
 pub use memory::{Channel, Footprint};
 pub use parameters::{Coordinate, Kind};
 pub use prepared::{AnyDelay, Prepared, Rounding};
+pub use rules::{RULES, Rules};
 
 use crate::user_effect::Definition;
+use model_core::average::WINDOW;
 use model_core::effect::{Place, Spec};
 use model_core::effects::{ConstantDelay, SPECS, ZERO_OFFSET};
 use model_core::model::Averaging;
@@ -152,7 +155,7 @@ impl Default for Model {
             sample_period_s: 0.001,
             convention: LagConvention::OneStep,
             averaging: Averaging {
-                window: 250,
+                window: WINDOW,
                 averaged_model: false,
             },
             start: Start::Rest,
@@ -241,6 +244,12 @@ impl Model {
         self.definitions.retain(|known| known.spec().name != name);
         self.definitions.push(definition);
         Ok(())
+    }
+
+    /// Whether data with this sample period, s, are sampled as the model is.
+    #[must_use]
+    pub fn is_sampled_at(&self, period_s: f64) -> bool {
+        (period_s / self.sample_period_s - 1.0).abs() <= RULES.same_period
     }
 
     /// N3.

@@ -1,6 +1,6 @@
 //! The rules of the residual analysis.
 
-use crate::rules::rules;
+use crate::rules;
 
 rules! {
     /// Where a model fails: what counts as more than noise, along which coordinates the error is split, and what is

@@ -53,12 +53,9 @@ use crate::data::DataSet;
 use crate::indicators::{Indicators, Scores};
 use crate::model::{Model, Training};
 
-/// Sampling periods that differ by less than this share are the same, printed with different digits.
-const SAME_PERIOD: f64 = 1e-6;
-
 /// Refuses data that were sampled otherwise than the model.
 fn check_period(model: &Model, set: &DataSet) -> Result<(), StepError> {
-    if (set.sample_period_s / model.sample_period_s - 1.0).abs() <= SAME_PERIOD {
+    if model.is_sampled_at(set.sample_period_s) {
         return Ok(());
     }
     Err(StepError::SamplePeriod {

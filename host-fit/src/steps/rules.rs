@@ -3,21 +3,28 @@
 use std::fmt::Write as _;
 
 use crate::rules::Rulebook;
-use crate::{delay, diagnose, excitation, fit, identify, power, residual, simulate, terms};
+use crate::{
+    data, delay, design, diagnose, excitation, experiment, fit, identify, model, power, residual,
+    simulate, terms,
+};
 
 /// The rules of every room, in the order in which the way of the data meets them.
 #[must_use]
 pub fn rulebooks() -> Vec<Rulebook> {
     vec![
+        data::RULES.book(),
         excitation::RULES.book(),
         delay::RULES.book(),
         identify::RULES.book(),
+        model::RULES.book(),
         simulate::RULES.book(),
         fit::RULES.book(),
         residual::RULES.book(),
         terms::RULES.book(),
         diagnose::RULES.book(),
         power::RULES.book(),
+        experiment::RULES.book(),
+        design::RULES.book(),
     ]
 }
 

@@ -4,7 +4,7 @@ use std::io;
 
 use serde::Serialize;
 
-use super::{SAME_PERIOD, StepError};
+use super::StepError;
 use crate::data::InputFile;
 use crate::model::{Model, Start};
 use crate::simulate::Signals;
@@ -61,7 +61,7 @@ impl Simulation {
 pub fn simulate(model: &Model, input: &InputFile) -> Result<Simulation, StepError> {
     let place = || Box::new(input.place(None));
     let period = model.sample_period_s;
-    if (input.sample_period_s / period - 1.0).abs() > SAME_PERIOD {
+    if !model.is_sampled_at(input.sample_period_s) {
         return Err(StepError::InputPeriod {
             place: place(),
             input: input.sample_period_s,

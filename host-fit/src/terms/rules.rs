@@ -1,6 +1,6 @@
 //! The rules of the search over terms.
 
-use crate::rules::rules;
+use crate::rules;
 
 rules! {
     /// Which terms a model needs: what a term must earn to stay, and when the search ends.

@@ -2,7 +2,7 @@
 
 use super::Words;
 use closed_loop::Figures;
-use host_fit::design::{JUDGED_FROM, Optimum, Proof, TrackDesign};
+use host_fit::design::{Optimum, Proof, RULES, TrackDesign};
 use host_fit::steps::{Design, DesignOutcome};
 
 impl Words for Design {
@@ -146,7 +146,7 @@ fn case_table(proof: &Proof) -> String {
     }
     line(
         proof.compared_name,
-        &Figures::of(&proof.compared, JUDGED_FROM),
+        &Figures::of(&proof.compared, RULES.trial_from),
         None,
         None,
     );

@@ -1,7 +1,8 @@
 //! Rules: the thresholds by which the tool decides, each with its meaning and where its value comes from.
 //!
-//! Every room keeps its own in one structure, written with the macro `rules!`: what a rule means is said once, as
-//! the field's documentation, and the same words are printed by `host-fit rules` and stand in `docs/rules.md` ([`crate::steps::rules_page`]).
+//! Every room keeps its own in one structure, written with the macro [`rules!`](crate::rules!): what a rule means is said
+//! once, as the field's documentation, and the same words are printed by `host-fit rules` and stand in `docs/rules.md`. It is
+//! at home here because this is the lowest crate that has thresholds.
 //!
 //! A rule decides something a user can see (what counts as significant, as worth saying, as diverged). What only says
 //! how a computation is carried out (block lengths of a loop, memory limits) is no rule and stays where it is used.
@@ -59,6 +60,12 @@ impl From<u16> for Value {
     }
 }
 
+impl<const N: usize> From<[u32; N]> for Value {
+    fn from(values: [u32; N]) -> Self {
+        Self::List(values.map(f64::from).to_vec())
+    }
+}
+
 impl<const N: usize> From<[f64; N]> for Value {
     fn from(values: [f64; N]) -> Self {
         Self::List(values.to_vec())
@@ -91,15 +98,21 @@ pub struct Rulebook {
 
 /// Writes a structure of rules, its values in force as the constant `RULES`, and its [`Rulebook`].
 ///
-/// ```ignore
-/// rules! {
+/// ```
+/// recordings::rules! {
 ///     /// When a residual counts as more than noise.
 ///     pub struct Rules in "residual";
 ///
 ///     /// An excess counts when it stands this many standard errors above 0.
 ///     standard_errors: f64 = 3.0, "standard errors", "convention: one false alarm in 700";
 /// }
+///
+/// assert_eq!(RULES.standard_errors, 3.0);
+/// let book = RULES.book();
+/// assert_eq!(book.about, "When a residual counts as more than noise.");
+/// assert_eq!(book.rules[0].name, "standard-errors");
 /// ```
+#[macro_export]
 macro_rules! rules {
     (
         $(#[doc = $about:literal])+
@@ -128,13 +141,13 @@ macro_rules! rules {
             pub fn book(&self) -> $crate::rules::Rulebook {
                 $crate::rules::Rulebook {
                     room: $room,
-                    about: $crate::rules::words(&[$($about),+]),
+                    about: $crate::rules::paragraph(&[$($about),+]),
                     rules: vec![
                         $($crate::rules::Rule {
                             name: stringify!($rule).replace('_', "-"),
                             value: self.$rule.into(),
                             unit: $unit,
-                            meaning: $crate::rules::words(&[$($meaning),+]),
+                            meaning: $crate::rules::paragraph(&[$($meaning),+]),
                             calibrated: $calibrated,
                         },)+
                     ],
@@ -143,10 +156,10 @@ macro_rules! rules {
         }
     };
 }
-pub(crate) use rules;
 
 /// The lines of a documentation comment as one paragraph.
-pub(crate) fn words(lines: &[&str]) -> String {
+#[must_use]
+pub fn paragraph(lines: &[&str]) -> String {
     let lines: Vec<&str> = lines.iter().map(|line| line.trim()).collect();
     lines.join(" ")
 }

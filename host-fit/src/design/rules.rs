@@ -1,0 +1,105 @@
+//! The rules of design.
+
+use crate::rules;
+use model_core::average::WINDOW;
+
+rules! {
+    /// What a law is given beside its model, and what a trial in the loop says of it.
+    pub struct Rules in "design";
+
+    /// A model is settled when its mean over two seconds moves by less than this from one to the next …
+    settled: f64 = 1e-4, "share of the mean", "judgement";
+    /// … and is waited for no longer than this.
+    longest_wait_s: f64 = 60.0, "s", "judgement: four times the slowest wall";
+    /// Shares of a mean are shares of this where it is smaller.
+    least_mean: f64 = 0.1, "y", "judgement: friction gains are of order one";
+    /// A natural friction below this is what is left of the start, and none.
+    no_natural: f64 = 1e-4, "share of the friction under steady blowing", "as settled as a mean is";
+    /// A model whose largest pole modulus is further above 1 than this grows, and that is remarked.
+    grows: f64 = 3e-5, "", "e-folding in half a minute";
+    /// A flow beyond this has grown without bound.
+    grown: f64 = 20.0, "y", "judgement: far beyond any friction gain";
+
+    /// Delays are looked up for flows up to this.
+    swing: f64 = 1.2, "times the friction under steady blowing", "judgement";
+    /// A pulse must be longer than its edge is held back by this to arrive in any case.
+    sure_pulse: u32 = 3, "samples", "theory 3.2: k − h advances by 0 to 2 a sample";
+    /// The observer is so many times as fast as the flow: slower, the estimate is the model's alone; faster, it follows the
+    /// sensor's noise …
+    observer_speed: f64 = 2.0, "times the faster time constant", "judgement; held by the table of docs/law.md";
+    /// … and corrects no more than this at once.
+    observer_most: f64 = 0.1, "share of the residual", "judgement";
+    /// The bias of the estimate follows so much of a residual in a delay: slow, so that neither noise nor a wrong delay
+    /// turns corrections into an oscillation …
+    bias_in_a_delay: f64 = 0.03, "share of the residual", "judgement; held by the table of docs/law.md";
+    /// … in a delay of at least this.
+    bias_delay: u16 = 10, "samples", "judgement";
+    /// The integral correction follows so much of an offset in a delay …
+    integral_in_a_delay: f64 = 0.04, "share of the offset", "judgement; held by the table of docs/law.md";
+    /// … of at least this.
+    integral_delay: u16 = 20, "samples", "judgement";
+    /// Corrections go no further than this.
+    correction: f64 = 0.3, "share of what can be reached", "judgement";
+    /// Switches that may be saved up: with less than two pulses' worth a valve that has been open for long would have to
+    /// wait closed for leave to open again.
+    saved_switches: u32 = 10, "switches", "five pulses";
+    /// The shorter part of a paced cycle is held for this much of its share, so that the budget binds and not the hold.
+    paced_hold: f64 = 0.8, "share of its time", "judgement";
+    /// Paces that a law may choose to save air.
+    paces: [f64; 6] = [40.0, 20.0, 10.0, 6.0, 4.0, 3.0], "switches per second", "a grid";
+    /// A slower pace is chosen for a saving of at least this …
+    worthwhile_saving: f64 = 0.01, "share of the air", "judgement";
+    /// … if the mean stays within this of the reference.
+    paced_offset: f64 = 0.005, "share of what can be reached", "judgement";
+    /// The air budget may be exceeded on the model by this.
+    air_margin: f64 = 0.02, "share of the air of steady blowing", "judgement: the duty is known no better from 10 s";
+
+    /// Length of the run on the model that says what air a law takes …
+    model_run: usize = 15_000, "samples", "judgement";
+    /// … and from where it counts.
+    model_run_from: usize = 5000, "samples", "judgement: the slowest flow of the plants has settled";
+    /// Length of a trial in the loop …
+    trial: usize = 12_000, "samples", "judgement";
+    /// … and from where it counts.
+    trial_from: usize = 4000, "samples", "judgement: the start is over";
+    /// Friction is averaged over this before attachment is called lost …
+    attached_mean: usize = WINDOW as usize, "samples", "the window of ỹ in eq. (1)";
+    /// … which it is below this share of what was asked for, or of what steady blowing gives.
+    attached: f64 = 0.5, "share", "judgement: half";
+
+    /// Pulse trains are played for this while they are compared …
+    train_from: usize = 3000, "samples", "judgement";
+    /// … and judged over this at least.
+    train_judged: usize = 5000, "samples", "judgement";
+    /// The best ones are judged from here on, for as long …
+    long_from: usize = 20_000, "samples", "20 s to 40 s";
+    /// … and must do the same until here.
+    long_until: usize = 240_000, "samples", "four minutes";
+    /// A mean further than this from the judged one is another motion …
+    same_mean: f64 = 0.05, "share of the mean", "judgement";
+    /// … and so is one whose range goes further than half of itself beyond the judged one, or than this.
+    same_range: f64 = 0.25, "y", "judgement";
+    /// An optimum is worth what is left of it on a flow that is slower or faster by one in so many samples.
+    detuned: u32 = 50, "samples", "judgement: a resonance sharper than 2 % does not survive on a rig";
+    /// Periods of the first grid of pulse trains …
+    periods: u32 = 72, "", "a grid in steps of 7 % over two decades";
+    /// … with so many steps of the duty.
+    duties: u32 = 20, "", "a grid in steps of 5 %";
+    /// The best of the grid that are refined.
+    refined: usize = 6, "", "judgement";
+    /// The best of the grid that are judged in the long run.
+    long_runs: usize = 40, "", "judgement";
+    /// Two of these differ by at least this in the logarithm of the period …
+    distinct_period: f64 = 0.15, "ln", "judgement";
+    /// … or by this in the duty.
+    distinct_duty: f64 = 0.1, "", "judgement";
+
+    /// Most chances to switch in a horizon.
+    blocks: u32 = 60, "", "judgement: seconds of computing";
+    /// Commands kept at each of them.
+    beam: usize = 16, "", "judgement: seconds of computing";
+    /// A law that plans again and again does so this often in a horizon: the end of a plan is cut off from what follows.
+    plans: u32 = 3, "plans", "judgement";
+    /// For this long a law plans again and again to show its cycle.
+    receding: usize = 8000, "samples", "judgement";
+}

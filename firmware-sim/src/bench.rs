@@ -1,6 +1,6 @@
 //! A plant in the loop: seen through noise and a converter, over a line that loses readings.
 
-use crate::instrument::{Converter, Noise, NoiseSource};
+use crate::instrument::{Converter, Noise, NoiseSignal};
 use crate::plant::{Plant, Rig};
 use closed_loop::Controlled;
 use rand::{RngExt, SeedableRng};
@@ -28,7 +28,7 @@ pub struct Lost {
 #[derive(Clone, Debug)]
 pub struct Disturbed<F> {
     flow: F,
-    noise: Option<NoiseSource>,
+    noise: Option<NoiseSignal>,
     converter: Option<Converter>,
     lost: Lost,
     rng: ChaCha8Rng,
@@ -48,7 +48,7 @@ impl<F: Controlled> Disturbed<F> {
         rng.set_stream(1);
         Self {
             flow,
-            noise: noise.map(|n| NoiseSource::new(n, ChaCha8Rng::seed_from_u64(seed))),
+            noise: noise.map(|n| NoiseSignal::new(n, ChaCha8Rng::seed_from_u64(seed))),
             converter,
             lost,
             rng,
@@ -60,7 +60,7 @@ impl<F: Controlled> Disturbed<F> {
 impl<F: Controlled> Controlled for Disturbed<F> {
     fn step(&mut self, command: bool) -> Option<f64> {
         let clean = self.flow.step(command);
-        let noise = self.noise.as_mut().map_or(0.0, NoiseSource::sample);
+        let noise = self.noise.as_mut().map_or(0.0, NoiseSignal::sample);
         let dropped = self.rng.random_bool(self.lost.share.clamp(0.0, 1.0));
         self.sample += 1;
         let in_stretch = self

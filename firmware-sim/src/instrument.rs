@@ -76,14 +76,14 @@ impl Noise {
 
 /// A running noise signal at 1 kHz, stationary from its first sample.
 #[derive(Debug, Clone)]
-pub struct NoiseSource {
+pub struct NoiseSignal {
     noise: Noise,
     memory: f64,
     coloured: f64,
     rng: ChaCha8Rng,
 }
 
-impl NoiseSource {
+impl NoiseSignal {
     /// Starts the noise.
     pub fn new(noise: Noise, mut rng: ChaCha8Rng) -> Self {
         let first: f64 = StandardNormal.sample(&mut rng);
@@ -134,7 +134,7 @@ impl Unrest {
 #[derive(Debug, Clone)]
 struct UnrestSource {
     size: Unrest,
-    slow: NoiseSource,
+    slow: NoiseSignal,
     tails: StudentT<f64>,
     rng: ChaCha8Rng,
 }
@@ -150,7 +150,7 @@ impl UnrestSource {
             coloured: size.wander,
             correlation_s: size.wander_s.max(SAMPLE_PERIOD_S),
         };
-        let slow = NoiseSource::new(slow, ChaCha8Rng::seed_from_u64(rng.random()));
+        let slow = NoiseSignal::new(slow, ChaCha8Rng::seed_from_u64(rng.random()));
         Some(Self {
             size,
             slow,
@@ -243,7 +243,7 @@ impl Instrument {
             rng.set_stream(repeat as u64);
             let scatter: f64 = StandardNormal.sample(&mut rng);
             let level = 1.0 + self.level_scatter * scatter;
-            let mut noise = NoiseSource::new(self.noise, rng);
+            let mut noise = NoiseSignal::new(self.noise, rng);
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             rng.set_stream(UNREST_STREAMS + repeat as u64);
             let mut unrest = UnrestSource::new(self.unrest, rng);
@@ -289,7 +289,7 @@ mod tests {
 
     #[test]
     fn noise_has_the_stated_size_and_correlation() {
-        let mut source = NoiseSource::new(Noise::HOT_FILM, ChaCha8Rng::seed_from_u64(4));
+        let mut source = NoiseSignal::new(Noise::HOT_FILM, ChaCha8Rng::seed_from_u64(4));
         let x: Vec<f64> = (0..2_000_000).map(|_| source.sample()).collect();
         let expected = Noise::HOT_FILM.standard_deviation().powi(2);
         assert!((variance(&x) / expected - 1.0).abs() < 0.02);

@@ -5,7 +5,7 @@
 //! single step they are d per edge and no more. Beside the pairs, the whole span of delays is judged at once: the
 //! eigenvalues of the covariance of lagged inputs tell how many of them are free of the others.
 
-use crate::data::{DataSet, Place, Record, Use};
+use crate::data::{DataSet, FilePlace, Record, Use};
 use crate::linalg::symmetric_eigenvalues;
 use crate::rules;
 
@@ -49,7 +49,7 @@ pub enum ExcitationError {
     )]
     ConstantInput {
         /// The first identify record.
-        place: Box<Place>,
+        place: Box<FilePlace>,
         /// Its command.
         level: f64,
     },
@@ -59,7 +59,7 @@ pub enum ExcitationError {
     )]
     ConstantOutput {
         /// The first identify record.
-        place: Box<Place>,
+        place: Box<FilePlace>,
         /// Its output.
         level: f64,
     },
@@ -69,7 +69,7 @@ pub enum ExcitationError {
     )]
     TooShort {
         /// The longest identify record.
-        place: Box<Place>,
+        place: Box<FilePlace>,
         /// Its samples.
         longest: usize,
         /// The longest lag asked for.
@@ -81,7 +81,7 @@ pub enum ExcitationError {
     )]
     TooFewSamples {
         /// The longest identify record.
-        place: Box<Place>,
+        place: Box<FilePlace>,
         /// Number of one-step equations.
         equations: usize,
         /// Number of unknowns.

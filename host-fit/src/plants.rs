@@ -6,7 +6,7 @@
 use anyhow::{Context, bail};
 use firmware_sim::bench::{Disturbed, Lost};
 use firmware_sim::instrument::{Converter, Noise};
-use firmware_sim::plant::{BasePlant, DelayLaw, Effect, FreeStream, PlantSpec, RateLaw, Rig};
+use firmware_sim::plant::{BasePlant, Effect, FlowDelay, FreeStream, PlantSpec, RateLaw, Rig};
 use host_fit::design::{CaseGroup, DesignError, RULES, Trial, steady, time_constants};
 use host_fit::model::{Added, Delay, Model, TransportLaw};
 use model_core::effect::Physics;
@@ -70,7 +70,7 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
     let [attach_s, separate_s] = time_constants(&bare, low, high);
     let period = model.sample_period_s;
     let delay = match &model.delay {
-        Delay::Fixed { delays } => DelayLaw::Fixed {
+        Delay::Fixed { delays } => FlowDelay::Fixed {
             delay_s: f64::from(delays.iter().copied().min().unwrap_or(0)) * period,
         },
         Delay::Law(law) => transport(law, period),
@@ -97,22 +97,22 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
 
 /// The law in continuous time; where the plants have no such law, the longest of
 /// its delays.
-fn transport(law: &TransportLaw, period: f64) -> DelayLaw {
+fn transport(law: &TransportLaw, period: f64) -> FlowDelay {
     let factor = law.factors.iter().copied().fold(f64::INFINITY, f64::min);
     let is = |name: &str| law.spec.name == name;
     match law.parameters.as_slice() {
         [floor, rise, rate] if is(StateDependentDelay::<f64>::SPEC.name) => {
-            DelayLaw::StateDependent {
+            FlowDelay::StateDependent {
                 floor_s: factor * floor * period,
                 rise_s: factor * rise * period,
                 rate: *rate,
             }
         }
-        [rise, fall] if is(EdgeDependentDelay::<f64>::SPEC.name) => DelayLaw::EdgeDependent {
+        [rise, fall] if is(EdgeDependentDelay::<f64>::SPEC.name) => FlowDelay::EdgeDependent {
             rise_s: *rise,
             fall_s: *fall,
         },
-        _ => DelayLaw::Fixed {
+        _ => FlowDelay::Fixed {
             delay_s: factor * period * law.range(period)[1],
         },
     }

@@ -13,7 +13,7 @@
 use std::path::Path;
 
 use crate::averaging::{AverageError, AverageSummary, Averaging, Defect};
-use crate::error::Place;
+use crate::error::FilePlace;
 use crate::folding::Folding;
 use crate::raw::{RawReader, Step};
 use crate::record::{Record, Use};
@@ -59,7 +59,7 @@ pub fn average_files(
             &name,
             role,
             averaging,
-            Place::file(path),
+            FilePlace::file(path),
             &mut |bytes| {
                 progress(i, bytes);
             },
@@ -75,7 +75,7 @@ fn average<R: std::io::BufRead>(
     name: &str,
     role: Use,
     averaging: &Averaging,
-    place: Place,
+    place: FilePlace,
     progress: &mut dyn FnMut(u64),
 ) -> Result<(Record, AverageSummary), AverageError> {
     let sample_period_s = raw.sample_period_s();

@@ -1,6 +1,6 @@
 //! How recordings are to be averaged, and what became of them.
 
-use crate::error::{DataError, Place};
+use crate::error::{DataError, FilePlace};
 
 /// On what the repeats are laid over each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -134,7 +134,7 @@ pub enum AverageError {
     )]
     NothingLeft {
         /// The recording.
-        place: Box<Place>,
+        place: Box<FilePlace>,
         /// What was found instead.
         found: String,
     },

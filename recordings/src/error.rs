@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Where in the user's data a fault lies: every part that is known is printed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Place {
+pub struct FilePlace {
     /// The file (or folder) as the caller named it.
     pub file: Option<PathBuf>,
     /// The name of the record, where the data were not read from a file of their own.
@@ -20,7 +20,7 @@ pub struct Place {
     pub key: Option<String>,
 }
 
-impl Place {
+impl FilePlace {
     /// A place that names a file only.
     #[must_use]
     pub fn file(path: &Path) -> Self {
@@ -53,7 +53,7 @@ impl Place {
 
     /// The error at this place.
     #[must_use]
-    pub fn error(self, problem: Problem) -> DataError {
+    pub fn error(self, problem: DataProblem) -> DataError {
         DataError {
             place: Box::new(self),
             problem: Box::new(problem),
@@ -61,7 +61,7 @@ impl Place {
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for FilePlace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut separator = "";
         if let Some(file) = &self.file {
@@ -115,23 +115,23 @@ pub(crate) fn printable(text: &str) -> String {
 #[error("{place}: {problem}")]
 pub struct DataError {
     /// Where.
-    pub place: Box<Place>,
+    pub place: Box<FilePlace>,
     /// What, with the remedy.
-    pub problem: Box<Problem>,
+    pub problem: Box<DataProblem>,
 }
 
 impl DataError {
     /// A file could not be opened or read.
     #[must_use]
     pub fn unreadable(path: &Path, cause: std::io::Error) -> Self {
-        Place::file(path).error(Problem::Unreadable(cause))
+        FilePlace::file(path).error(DataProblem::Unreadable(cause))
     }
 }
 
 /// The kinds of fault; each message ends with the remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum Problem {
+pub enum DataProblem {
     /// The operating system refused to open or read it.
     #[error("cannot be read ({0}); check the path and its permissions")]
     Unreadable(std::io::Error),

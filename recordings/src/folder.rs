@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
 
-use crate::error::{DataError, Place, Problem, printable};
+use crate::error::{DataError, DataProblem, FilePlace, printable};
 use crate::output::{OutputError, Staging};
 use crate::record::{Origin, Record, Use};
 use crate::set::DataSet;
@@ -59,7 +59,7 @@ impl DataSet {
             .file_stem()
             .map_or_else(|| "record".into(), |s| s.to_string_lossy().into_owned());
         let (record, origin) = Table::load(path, None)?.into_record(&name, Use::Identify)?;
-        let set = DataSet::assemble(None, vec![record], vec![origin], &Place::file(path))?;
+        let set = DataSet::assemble(None, vec![record], vec![origin], &FilePlace::file(path))?;
         set.refuse_strays()?;
         Ok(set)
     }
@@ -117,25 +117,25 @@ fn load_folder(folder: &Path) -> Result<DataSet, DataError> {
     let bytes = match fs::read(&path) {
         Ok(bytes) => bytes,
         Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            return Err(Place::file(folder).error(Problem::NoManifest));
+            return Err(FilePlace::file(folder).error(DataProblem::NoManifest));
         }
         Err(e) => return Err(DataError::unreadable(&path, e)),
     };
-    let place = Place::file(&path);
-    let text = String::from_utf8(bytes).map_err(|_| place.clone().error(Problem::NotText))?;
+    let place = FilePlace::file(&path);
+    let text = String::from_utf8(bytes).map_err(|_| place.clone().error(DataProblem::NotText))?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let manifest: Manifest = toml::from_str(text).map_err(|e| manifest_error(&path, text, &e))?;
     if !(manifest.sample_period_s.is_finite() && manifest.sample_period_s > 0.0) {
         return Err(place
             .at_key("sample_period_s")
-            .error(Problem::BadPeriod(manifest.sample_period_s)));
+            .error(DataProblem::BadPeriod(manifest.sample_period_s)));
     }
     let mut records = Vec::with_capacity(manifest.record.len());
     let mut origins = Vec::with_capacity(manifest.record.len());
     for entry in &manifest.record {
         let bad_name = entry.name.trim().is_empty() || entry.name.chars().any(char::is_control);
         if bad_name {
-            return Err(place.at_key("name").error(Problem::BadName));
+            return Err(place.at_key("name").error(DataProblem::BadName));
         }
         let file = resolve(folder, &entry.file, &place)?;
         let table = Table::load(&file, Some(manifest.sample_period_s))?;
@@ -153,31 +153,31 @@ fn load_folder(folder: &Path) -> Result<DataSet, DataError> {
 }
 
 /// The path of a record's file, which has to be a file inside the folder, also after following links.
-fn resolve(folder: &Path, file: &str, manifest: &Place) -> Result<PathBuf, DataError> {
+fn resolve(folder: &Path, file: &str, manifest: &FilePlace) -> Result<PathBuf, DataError> {
     let place = || manifest.clone().at_key("file");
     let relative = Path::new(file);
     let plain = relative
         .components()
         .all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
     if !plain || file.contains('\0') {
-        return Err(place().error(Problem::OutsideFolder(printable(file))));
+        return Err(place().error(DataProblem::OutsideFolder(printable(file))));
     }
     let path = folder.join(relative);
     let unreadable = |e: io::Error| DataError::unreadable(&path, e);
     let real = fs::canonicalize(&path).map_err(unreadable)?;
     let root = fs::canonicalize(folder).map_err(unreadable)?;
     if !real.starts_with(&root) {
-        return Err(place().error(Problem::OutsideFolder(printable(file))));
+        return Err(place().error(DataProblem::OutsideFolder(printable(file))));
     }
     if !real.is_file() {
-        return Err(place().error(Problem::NotAFile(printable(file))));
+        return Err(place().error(DataProblem::NotAFile(printable(file))));
     }
     Ok(path)
 }
 
 /// The TOML error in one paragraph, with the line and the key it is about.
 fn manifest_error(path: &Path, text: &str, error: &toml::de::Error) -> DataError {
-    let mut place = Place::file(path);
+    let mut place = FilePlace::file(path);
     if let Some(span) = error.span() {
         let before = text.get(..span.start).unwrap_or(text);
         place.line = Some(before.matches('\n').count() as u64 + 1);
@@ -193,7 +193,7 @@ fn manifest_error(path: &Path, text: &str, error: &toml::de::Error) -> DataError
         .split_whitespace()
         .collect::<Vec<_>>()
         .join(" ");
-    place.error(Problem::Manifest(message))
+    place.error(DataProblem::Manifest(message))
 }
 
 /// The record's name as a file name: letters, digits, `-`, `_` and `.` stay, the rest becomes `-`.

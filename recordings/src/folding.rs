@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::averaging::{Align, AverageError, AverageSummary, Averaging, Defect, Dropped};
-use crate::error::Place;
+use crate::error::FilePlace;
 use crate::raw::RawReader;
 use crate::record::{Record, Use};
 use crate::thresholds::RULES;
@@ -331,7 +331,7 @@ impl Folding {
         raw: &RawReader<R>,
         name: &str,
         role: Use,
-        place: Place,
+        place: FilePlace,
     ) -> Result<(Record, AverageSummary), AverageError> {
         // A complete last period may still wait for the room of a late anchor.
         let mut left_over = self.waiting.len().saturating_sub(self.lead_in);

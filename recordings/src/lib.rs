@@ -23,7 +23,7 @@ mod thresholds;
 
 pub use average::average_files;
 pub use averaging::{Align, AverageError, AverageSummary, Averaging, Defect, Dropped};
-pub use error::{DataError, Place, Problem};
+pub use error::{DataError, DataProblem, FilePlace};
 pub use record::{Record, Use};
 pub use set::DataSet;
 pub use table::InputFile;

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use crate::error::{DataError, Problem};
+use crate::error::{DataError, DataProblem};
 use crate::rows::{RowReader, number};
 use crate::sampling::tidy;
 use crate::thresholds::RULES;
@@ -73,7 +73,10 @@ impl<R: BufRead> RawReader<R> {
             .iter()
             .find(|n| matches!(n.as_str(), "y_sd" | "y_min" | "y_max"))
         {
-            return Err(rows.here().in_column(name).error(Problem::ReservedChannel));
+            return Err(rows
+                .here()
+                .in_column(name)
+                .error(DataProblem::ReservedChannel));
         }
         let mut names = vec!["y".to_owned()];
         let mut slots = Vec::with_capacity(rows.names().len());
@@ -186,7 +189,7 @@ fn head_period(source: impl BufRead, path: &Path) -> Result<f64, DataError> {
         .filter(|&s| s > 0.0)
         .collect();
     if steps.is_empty() {
-        return Err(rows.place().error(Problem::TooFewRows(times.len())));
+        return Err(rows.place().error(DataProblem::TooFewRows(times.len())));
     }
     let middle = steps.len() / 2;
     let median = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::error::{DataError, Place, Problem};
+use crate::error::{DataError, DataProblem, FilePlace};
 use crate::thresholds::RULES;
 
 /// Names of columns with a meaning of their own; every other column is a measured channel.
@@ -144,23 +144,28 @@ impl Record {
     }
 
     /// Checks everything a [`DataSet`] promises about a record; `place` turns a sample into a place in a file.
-    pub(crate) fn check(&self, place: &dyn Fn(Option<usize>) -> Place) -> Result<(), DataError> {
+    pub(crate) fn check(
+        &self,
+        place: &dyn Fn(Option<usize>) -> FilePlace,
+    ) -> Result<(), DataError> {
         if self.name.trim().is_empty() || self.name.chars().any(char::is_control) {
-            return Err(place(None).error(Problem::BadName));
+            return Err(place(None).error(DataProblem::BadName));
         }
         if !(self.sample_period_s.is_finite() && self.sample_period_s > 0.0) {
-            return Err(place(None).error(Problem::BadPeriod(self.sample_period_s)));
+            return Err(place(None).error(DataProblem::BadPeriod(self.sample_period_s)));
         }
         if self.u.len() < 2 {
-            return Err(place(None).error(Problem::TooFewRows(self.u.len())));
+            return Err(place(None).error(DataProblem::TooFewRows(self.u.len())));
         }
         check_values("t", &[self.t0], place)?;
         for (name, values) in self.columns() {
             if values.len() != self.u.len() {
-                return Err(place(None).in_column(name).error(Problem::UnequalLengths {
-                    expected: self.u.len(),
-                    found: values.len(),
-                }));
+                return Err(place(None)
+                    .in_column(name)
+                    .error(DataProblem::UnequalLengths {
+                        expected: self.u.len(),
+                        found: values.len(),
+                    }));
             }
             check_values(name, values, place)?;
         }
@@ -169,24 +174,26 @@ impl Record {
             .keys()
             .find(|n| RESERVED.contains(&n.as_str()))
         {
-            return Err(place(None).in_column(name).error(Problem::ReservedChannel));
+            return Err(place(None)
+                .in_column(name)
+                .error(DataProblem::ReservedChannel));
         }
         if let Some(name) = self.channels.keys().find(|n| {
             n.trim().is_empty() || n.trim() != n.as_str() || n.chars().any(char::is_control)
         }) {
-            return Err(place(None).in_column(name).error(Problem::BadName));
+            return Err(place(None).in_column(name).error(DataProblem::BadName));
         }
         if let Some((k, &sd)) = indexed(self.y_sd.as_deref()).find(|&(_, &sd)| sd < 0.0) {
             return Err(place(Some(k))
                 .in_column("y_sd")
-                .error(Problem::NegativeDeviation(sd)));
+                .error(DataProblem::NegativeDeviation(sd)));
         }
         let envelope = indexed(self.y_min.as_deref()).zip(self.y_max.iter().flatten());
         for ((k, &low), &high) in envelope {
             if low > high {
                 return Err(place(Some(k))
                     .in_column("y_min")
-                    .error(Problem::EnvelopeCrossed { low, high }));
+                    .error(DataProblem::EnvelopeCrossed { low, high }));
             }
         }
         Ok(())
@@ -201,13 +208,13 @@ pub(crate) fn indexed(values: Option<&[f64]>) -> impl Iterator<Item = (usize, &f
 pub(crate) fn check_values(
     column: &str,
     values: &[f64],
-    place: &dyn Fn(Option<usize>) -> Place,
+    place: &dyn Fn(Option<usize>) -> FilePlace,
 ) -> Result<(), DataError> {
     for (k, &value) in values.iter().enumerate() {
         let problem = if !value.is_finite() {
-            Problem::NotFinite(value)
+            DataProblem::NotFinite(value)
         } else if value.abs() > LARGEST {
-            Problem::TooLarge(value)
+            DataProblem::TooLarge(value)
         } else {
             continue;
         };
@@ -225,17 +232,17 @@ pub(crate) struct Origin {
 }
 
 impl Origin {
-    pub(crate) fn place(&self, name: &str, sample: Option<usize>) -> Place {
+    pub(crate) fn place(&self, name: &str, sample: Option<usize>) -> FilePlace {
         match &self.file {
-            Some(file) => Place {
+            Some(file) => FilePlace {
                 file: Some(file.clone()),
                 line: sample.and_then(|k| self.lines.get(k).copied()),
-                ..Place::default()
+                ..FilePlace::default()
             },
-            None => Place {
+            None => FilePlace {
                 record: Some(name.to_owned()),
                 sample,
-                ..Place::default()
+                ..FilePlace::default()
             },
         }
     }

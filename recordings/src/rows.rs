@@ -7,7 +7,7 @@
 use std::io::{BufRead, Read};
 use std::path::{Path, PathBuf};
 
-use crate::error::{DataError, Place, Problem, printable};
+use crate::error::{DataError, DataProblem, FilePlace, printable};
 
 /// The longest line that is still taken for a row of measurements, bytes.
 const LONGEST_LINE: u64 = 1 << 20;
@@ -34,7 +34,7 @@ impl<R: BufRead> RowReader<R> {
             bytes: 0,
         };
         if !reader.fill_line()? {
-            return Err(reader.place().error(Problem::Empty));
+            return Err(reader.place().error(DataProblem::Empty));
         }
         let place = reader.here();
         let header = reader
@@ -42,7 +42,7 @@ impl<R: BufRead> RowReader<R> {
             .strip_prefix(b"\xef\xbb\xbf")
             .unwrap_or(&reader.buffer);
         let text =
-            std::str::from_utf8(header).map_err(|_| place.clone().error(Problem::NotText))?;
+            std::str::from_utf8(header).map_err(|_| place.clone().error(DataProblem::NotText))?;
         reader.names = split_header(text, &place)?;
         Ok(reader)
     }
@@ -60,7 +60,7 @@ impl<R: BufRead> RowReader<R> {
     /// Index of a column that has to be there.
     pub(crate) fn required(&self, name: &'static str) -> Result<usize, DataError> {
         self.column(name).ok_or_else(|| {
-            self.place().at_line(1).error(Problem::MissingColumn {
+            self.place().at_line(1).error(DataProblem::MissingColumn {
                 name,
                 found: printable(&self.names.join(",")),
             })
@@ -68,12 +68,12 @@ impl<R: BufRead> RowReader<R> {
     }
 
     /// The file, for messages.
-    pub(crate) fn place(&self) -> Place {
-        Place::file(&self.path)
+    pub(crate) fn place(&self) -> FilePlace {
+        FilePlace::file(&self.path)
     }
 
     /// The file and the current line, for messages.
-    pub(crate) fn here(&self) -> Place {
+    pub(crate) fn here(&self) -> FilePlace {
         self.place().at_line(self.line)
     }
 
@@ -122,7 +122,7 @@ impl<R: BufRead> RowReader<R> {
                 self.buffer.pop();
             }
         } else if count as u64 > LONGEST_LINE {
-            return Err(self.here().error(Problem::LineTooLong));
+            return Err(self.here().error(DataProblem::LineTooLong));
         }
         Ok(true)
     }
@@ -136,16 +136,16 @@ fn bare(cell: &[u8]) -> &[u8] {
     }
 }
 
-fn split_header(text: &str, place: &Place) -> Result<Vec<String>, DataError> {
+fn split_header(text: &str, place: &FilePlace) -> Result<Vec<String>, DataError> {
     if text.trim().is_empty() {
         return Err(place
             .clone()
-            .error(Problem::BadHeader("it is blank".into())));
+            .error(DataProblem::BadHeader("it is blank".into())));
     }
     if !text.contains(',') {
         for (separator, word) in [(';', "semicolons"), ('\t', "tabs")] {
             if text.contains(separator) {
-                return Err(place.clone().error(Problem::WrongSeparator(word)));
+                return Err(place.clone().error(DataProblem::WrongSeparator(word)));
             }
         }
     }
@@ -156,31 +156,34 @@ fn split_header(text: &str, place: &Place) -> Result<Vec<String>, DataError> {
     let mut record = csv::StringRecord::new();
     reader
         .read_record(&mut record)
-        .map_err(|e| place.clone().error(Problem::BadHeader(e.to_string())))?;
+        .map_err(|e| place.clone().error(DataProblem::BadHeader(e.to_string())))?;
     let names: Vec<String> = record.iter().map(str::to_owned).collect();
     for (i, name) in names.iter().enumerate() {
         if name.is_empty() {
-            return Err(place.clone().error(Problem::UnnamedColumn(i + 1)));
+            return Err(place.clone().error(DataProblem::UnnamedColumn(i + 1)));
         }
         if name.chars().any(char::is_control) {
-            return Err(place.clone().in_column(name).error(Problem::BadName));
+            return Err(place.clone().in_column(name).error(DataProblem::BadName));
         }
         if names.iter().take(i).any(|n| n == name) {
-            return Err(place.clone().in_column(name).error(Problem::DoubledColumn));
+            return Err(place
+                .clone()
+                .in_column(name)
+                .error(DataProblem::DoubledColumn));
         }
     }
     Ok(names)
 }
 
 /// The number in a cell; the caller checks that it is finite.
-pub(crate) fn number(cell: &[u8]) -> Result<f64, Problem> {
+pub(crate) fn number(cell: &[u8]) -> Result<f64, DataProblem> {
     if cell.is_empty() {
-        return Err(Problem::MissingValue);
+        return Err(DataProblem::MissingValue);
     }
     std::str::from_utf8(cell)
         .ok()
         .and_then(|text| text.parse().ok())
-        .ok_or_else(|| Problem::NotANumber(printable(&String::from_utf8_lossy(cell))))
+        .ok_or_else(|| DataProblem::NotANumber(printable(&String::from_utf8_lossy(cell))))
 }
 
 /// The value of one unit in the last printed place: 0.001 for `1.250`, 1 for `7`, 1e-7 for `1.5e-6`.

@@ -1,6 +1,6 @@
 //! Uniform sampling: what period a printed time column has, and whether it holds throughout.
 
-use crate::error::Problem;
+use crate::error::DataProblem;
 use crate::thresholds::RULES;
 
 /// Times of a record as printed, with one unit in the last printed place of each.
@@ -13,7 +13,7 @@ pub(crate) struct PrintedTimes {
 /// A fault in a time column: the row where it shows (0 is the first row) and what it is.
 pub(crate) struct TimeFault {
     pub(crate) row: usize,
-    pub(crate) problem: Problem,
+    pub(crate) problem: DataProblem,
 }
 
 impl PrintedTimes {
@@ -23,16 +23,16 @@ impl PrintedTimes {
     pub(crate) fn period(&self, stated: Option<f64>) -> Result<f64, TimeFault> {
         let n = self.time.len();
         let (Some(first), Some(last)) = (self.time.first(), self.time.last()) else {
-            return Err(fault(0, Problem::TooFewRows(0)));
+            return Err(fault(0, DataProblem::TooFewRows(0)));
         };
         if n < 2 {
-            return Err(fault(0, Problem::TooFewRows(n)));
+            return Err(fault(0, DataProblem::TooFewRows(n)));
         }
         let mut steps: Vec<f64> = self.time.windows(2).map(|w| w[1] - w[0]).collect();
         if let Some(row) = steps.iter().position(|&s| s <= 0.0) {
             return Err(fault(
                 row + 1,
-                Problem::TimeBackward {
+                DataProblem::TimeBackward {
                     before: self.time[row],
                     time: self.time[row + 1],
                 },
@@ -47,7 +47,7 @@ impl PrintedTimes {
         {
             return Err(fault(
                 1,
-                Problem::PeriodMismatch {
+                DataProblem::PeriodMismatch {
                     found: tidy(median, 1e-6),
                     stated,
                 },
@@ -62,13 +62,13 @@ impl PrintedTimes {
                 return Err(fault(
                     row,
                     if missing >= 1.0 {
-                        Problem::TimeGap {
+                        DataProblem::TimeGap {
                             step,
                             period,
                             missing: missing as u64,
                         }
                     } else {
-                        Problem::TimeUneven { step, period }
+                        DataProblem::TimeUneven { step, period }
                     },
                 ));
             }
@@ -79,7 +79,7 @@ impl PrintedTimes {
         match stated {
             Some(stated) if (mean - stated).abs() > RULES.clock * stated + rounding => Err(fault(
                 1,
-                Problem::PeriodMismatch {
+                DataProblem::PeriodMismatch {
                     found: tidy(mean, 1e-6),
                     stated,
                 },
@@ -95,7 +95,7 @@ fn tolerance(period: f64, rounding: f64) -> f64 {
     (RULES.uneven * period + rounding).min(RULES.most_uneven * period)
 }
 
-fn fault(row: usize, problem: Problem) -> TimeFault {
+fn fault(row: usize, problem: DataProblem) -> TimeFault {
     TimeFault { row, problem }
 }
 
@@ -167,19 +167,25 @@ mod tests {
             gap.unit.remove(40);
             let fault = gap.period(None).err().unwrap();
             assert_eq!(fault.row, 40);
-            assert!(matches!(fault.problem, Problem::TimeGap { missing: 1, .. }));
+            assert!(matches!(
+                fault.problem,
+                DataProblem::TimeGap { missing: 1, .. }
+            ));
             let mut back = printed(100, period, 3);
             back.time[60] = back.time[59];
             let fault = back.period(Some(period)).err().unwrap();
             assert_eq!(fault.row, 60);
-            assert!(matches!(fault.problem, Problem::TimeBackward { .. }));
+            assert!(matches!(fault.problem, DataProblem::TimeBackward { .. }));
         }
         let wrong = printed(100, 0.001, 3).period(Some(0.01)).err().unwrap();
-        assert!(matches!(wrong.problem, Problem::PeriodMismatch { .. }));
+        assert!(matches!(wrong.problem, DataProblem::PeriodMismatch { .. }));
         let slightly = printed(10_000, 0.00101, 6)
             .period(Some(0.001))
             .err()
             .unwrap();
-        assert!(matches!(slightly.problem, Problem::PeriodMismatch { .. }));
+        assert!(matches!(
+            slightly.problem,
+            DataProblem::PeriodMismatch { .. }
+        ));
     }
 }

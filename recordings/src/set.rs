@@ -1,6 +1,6 @@
 //! Records that belong together, checked as one.
 
-use crate::error::{DataError, Place, Problem};
+use crate::error::{DataError, DataProblem, FilePlace};
 use crate::hash;
 use crate::record::{Origin, Record, Use, indexed};
 
@@ -31,7 +31,7 @@ impl DataSet {
     /// name, their sampling periods differ, or there is no record.
     pub fn from_records(title: Option<String>, records: Vec<Record>) -> Result<Self, DataError> {
         let origin = vec![Origin::default(); records.len()];
-        Self::assemble(title, records, origin, &Place::default())
+        Self::assemble(title, records, origin, &FilePlace::default())
     }
 
     /// Checks the records and what binds them; `whole` is the place for faults of the set itself.
@@ -39,10 +39,10 @@ impl DataSet {
         title: Option<String>,
         records: Vec<Record>,
         origin: Vec<Origin>,
-        whole: &Place,
+        whole: &FilePlace,
     ) -> Result<Self, DataError> {
         let Some(first) = records.first() else {
-            return Err(whole.clone().error(Problem::NoRecords));
+            return Err(whole.clone().error(DataProblem::NoRecords));
         };
         let sample_period_s = first.sample_period_s;
         for (i, (record, origin)) in records.iter().zip(&origin).enumerate() {
@@ -50,7 +50,7 @@ impl DataSet {
             if record.sample_period_s != sample_period_s {
                 return Err(origin
                     .place(&record.name, None)
-                    .error(Problem::PeriodMismatch {
+                    .error(DataProblem::PeriodMismatch {
                         found: record.sample_period_s,
                         stated: sample_period_s,
                     }));
@@ -59,7 +59,7 @@ impl DataSet {
                 return Err(whole
                     .clone()
                     .at_key("name")
-                    .error(Problem::DoubledRecord(record.name.clone())));
+                    .error(DataProblem::DoubledRecord(record.name.clone())));
             }
         }
         Ok(Self {
@@ -89,11 +89,11 @@ impl DataSet {
 
     /// Where sample `k` of record `record` stands in the user's files, for messages.
     #[must_use]
-    pub fn place(&self, record: usize, k: Option<usize>) -> Place {
+    pub fn place(&self, record: usize, k: Option<usize>) -> FilePlace {
         let name = self.records.get(record).map_or("", |r| r.name.as_str());
         self.origin
             .get(record)
-            .map_or_else(Place::default, |origin| origin.place(name, k))
+            .map_or_else(FilePlace::default, |origin| origin.place(name, k))
     }
 
     /// Refuses on/off commands with values that are neither 0 nor 1.
@@ -107,7 +107,7 @@ impl DataSet {
                 return Err(self
                     .place(i, Some(k))
                     .in_column("u")
-                    .error(Problem::StrayInput(u)));
+                    .error(DataProblem::StrayInput(u)));
             }
         }
         Ok(())
@@ -123,7 +123,7 @@ impl DataSet {
                 return Err(self
                     .place(i, Some(k))
                     .in_column("u")
-                    .error(Problem::NotOnOff(u)));
+                    .error(DataProblem::NotOnOff(u)));
             }
         }
         Ok(())

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use crate::error::{DataError, Place, Problem};
+use crate::error::{DataError, DataProblem, FilePlace};
 use crate::record::{Origin, Record, Use, check_values};
 use crate::rows::{RowReader, number, printed_unit};
 use crate::sampling::PrintedTimes;
@@ -41,7 +41,7 @@ impl Table {
         while rows.advance()? {
             let found = rows.cells().count();
             if found != names.len() {
-                return Err(rows.here().error(Problem::RowLength {
+                return Err(rows.here().error(DataProblem::RowLength {
                     expected: names.len(),
                     found,
                 }));
@@ -68,7 +68,7 @@ impl Table {
         times.time = columns.remove("t").unwrap_or_default();
         let sample_period_s = times.period(stated).map_err(|fault| {
             let at = match fault.problem {
-                Problem::TooFewRows(_) => place(None),
+                DataProblem::TooFewRows(_) => place(None),
                 _ => place(Some(fault.row)).in_column("t"),
             };
             at.error(fault.problem)
@@ -88,13 +88,13 @@ impl Table {
         let found: Vec<&str> = std::iter::once("t")
             .chain(self.columns.keys().map(String::as_str))
             .collect();
-        Err(self.header_place().error(Problem::MissingColumn {
+        Err(self.header_place().error(DataProblem::MissingColumn {
             name,
             found: found.join(","),
         }))
     }
 
-    fn header_place(&self) -> Place {
+    fn header_place(&self) -> FilePlace {
         self.origin.place("", None).at_line(1)
     }
 
@@ -157,7 +157,7 @@ impl InputFile {
 
     /// Where sample `k` stands in the user's file, for messages.
     #[must_use]
-    pub fn place(&self, k: Option<usize>) -> Place {
+    pub fn place(&self, k: Option<usize>) -> FilePlace {
         self.origin.place("", k)
     }
 
@@ -170,7 +170,7 @@ impl InputFile {
             Some(k) => Err(self
                 .place(Some(k))
                 .in_column("u")
-                .error(Problem::NotOnOff(self.u[k]))),
+                .error(DataProblem::NotOnOff(self.u[k]))),
             None => Ok(()),
         }
     }

@@ -9,7 +9,7 @@ use super::{Family, NoiseKind, RigError, RigPlan};
 use crate::command::Command;
 use crate::instrument::{Instrument, Noise, Unrest};
 use crate::plant::{
-    Altered, BasePlant, Character, DelayLaw, Effect, EffectError, PastTerm, Place, PlantSpec,
+    Altered, BasePlant, Character, Effect, EffectError, FlowDelay, PastTerm, Place, PlantSpec,
     RateLaw, log_uniform,
 };
 use crate::stream::{Stream, stream};
@@ -133,13 +133,13 @@ impl Family {
             _ => RateLaw::Switched,
         };
         base.delay = match share(rng) {
-            x if x < 0.25 => DelayLaw::Fixed {
+            x if x < 0.25 => FlowDelay::Fixed {
                 delay_s: rng.random_range(0.020..0.060),
             },
             x if x < 0.80 => base.delay,
             x if x < 0.92 => {
                 let rise_s = rng.random_range(0.006..0.015);
-                DelayLaw::Clamped {
+                FlowDelay::Clamped {
                     floor_s: rng.random_range(0.020..0.045),
                     rise_s,
                     level: rng.random_range(0.3..0.8) * level,
@@ -148,7 +148,7 @@ impl Family {
             _ => {
                 let rise_s = rng.random_range(0.020..0.060);
                 let more = rng.random_range(0.008..0.025);
-                DelayLaw::EdgeDependent {
+                FlowDelay::EdgeDependent {
                     rise_s,
                     fall_s: if rise_s > 0.040 {
                         rise_s - more

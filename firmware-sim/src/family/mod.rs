@@ -17,7 +17,7 @@ use thiserror::Error;
 use crate::command::{Command, LEAD_SAMPLES};
 use crate::instrument::{Instrument, InstrumentError};
 use crate::plant::{
-    DelayLaw, Effect, EffectError, FreeStream, Parameter, PlantError, PlantSpec, Rig,
+    Effect, EffectError, FlowDelay, FreeStream, Parameter, PlantError, PlantSpec, Rig,
     SAMPLE_PERIOD_S, ShowsWith,
 };
 use crate::stream::{Stream, stream};
@@ -230,11 +230,11 @@ impl RigPlan {
     /// Names that would be no error beside the hidden ones: true of the rig, though nobody hid them.
     pub fn also_right(&self) -> Vec<&'static str> {
         let delay = match self.plant.delay() {
-            DelayLaw::Fixed { .. } => None,
-            DelayLaw::StateDependent { .. } | DelayLaw::Clamped { .. } => {
+            FlowDelay::Fixed { .. } => None,
+            FlowDelay::StateDependent { .. } | FlowDelay::Clamped { .. } => {
                 Some("state-dependent-delay")
             }
-            DelayLaw::EdgeDependent { .. } => Some("edge-dependent-delay"),
+            FlowDelay::EdgeDependent { .. } => Some("edge-dependent-delay"),
         };
         let drift = (self.nuisances.drift != 0.0).then_some("thermal-drift");
         delay.into_iter().chain(drift).collect()

@@ -18,7 +18,7 @@ pub struct BasePlantError {
 
 /// How long the flow takes to notice the jet.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum DelayLaw {
+pub enum FlowDelay {
     /// The same transport delay always, in seconds (0–0.5).
     Fixed {
         /// Transport delay (s).
@@ -52,7 +52,7 @@ pub enum DelayLaw {
     },
 }
 
-impl DelayLaw {
+impl FlowDelay {
     /// The same law with every delay `factor` times as long.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
@@ -114,7 +114,7 @@ pub struct BasePlant {
     /// Friction the flow settles at under steady blowing (y).
     pub gain: f64,
     /// Transport delay.
-    pub delay: DelayLaw,
+    pub delay: FlowDelay,
     /// Rate of the flow for jets between off and on.
     pub rate_law: RateLaw,
 }
@@ -144,7 +144,7 @@ impl BasePlant {
             attach_s,
             separate_s,
             gain: rng.random_range(0.85..1.15),
-            delay: DelayLaw::StateDependent {
+            delay: FlowDelay::StateDependent {
                 floor_s,
                 rise_s,
                 rate,
@@ -176,8 +176,8 @@ impl BasePlant {
         time("separate_s", self.separate_s)?;
         within("gain", self.gain, -100.0, 100.0, "within ±100")?;
         match self.delay {
-            DelayLaw::Fixed { delay_s } => delay("delay_s", delay_s),
-            DelayLaw::StateDependent {
+            FlowDelay::Fixed { delay_s } => delay("delay_s", delay_s),
+            FlowDelay::StateDependent {
                 floor_s,
                 rise_s,
                 rate,
@@ -186,7 +186,7 @@ impl BasePlant {
                 delay("rise_s", rise_s)?;
                 within("rate", rate, 0.0, 1000.0, "0 to 1000 per y")
             }
-            DelayLaw::Clamped {
+            FlowDelay::Clamped {
                 floor_s,
                 rise_s,
                 level,
@@ -195,7 +195,7 @@ impl BasePlant {
                 delay("rise_s", rise_s)?;
                 within("level", level, 1e-9, 1e9, "above 0")
             }
-            DelayLaw::EdgeDependent { rise_s, fall_s } => {
+            FlowDelay::EdgeDependent { rise_s, fall_s } => {
                 delay("rise_s", rise_s)?;
                 delay("fall_s", fall_s)
             }
@@ -204,7 +204,7 @@ impl BasePlant {
 
     /// The same rig with a delay that does not depend on the flow: drawn from 20–60 ms.
     pub fn with_fixed_delay(mut self, rng: &mut ChaCha8Rng) -> Self {
-        self.delay = DelayLaw::Fixed {
+        self.delay = FlowDelay::Fixed {
             delay_s: rng.random_range(0.020..0.060),
         };
         self
@@ -231,7 +231,7 @@ mod tests {
             for tau in [base.attach_s, base.separate_s] {
                 assert!((0.020..=0.150).contains(&tau));
             }
-            let DelayLaw::StateDependent {
+            let FlowDelay::StateDependent {
                 floor_s,
                 rise_s,
                 rate,

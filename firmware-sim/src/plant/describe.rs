@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::base::{DelayLaw, RateLaw};
+use super::base::{FlowDelay, RateLaw};
 use super::fault::Fault;
 use super::rig::PlantSpec;
 
@@ -23,8 +23,8 @@ impl PlantSpec {
         );
         // Writing to a String cannot fail.
         let _ = match self.delay() {
-            DelayLaw::Fixed { delay_s } => writeln!(text, "delay_s = {delay_s}"),
-            DelayLaw::StateDependent {
+            FlowDelay::Fixed { delay_s } => writeln!(text, "delay_s = {delay_s}"),
+            FlowDelay::StateDependent {
                 floor_s,
                 rise_s,
                 rate,
@@ -32,7 +32,7 @@ impl PlantSpec {
                 text,
                 "delay_floor_s = {floor_s}\ndelay_rise_s = {rise_s}\ndelay_rate = {rate}"
             ),
-            DelayLaw::Clamped {
+            FlowDelay::Clamped {
                 floor_s,
                 rise_s,
                 level,
@@ -40,7 +40,7 @@ impl PlantSpec {
                 text,
                 "delay_floor_s = {floor_s}\ndelay_rise_s = {rise_s}\ndelay_level = {level}"
             ),
-            DelayLaw::EdgeDependent { rise_s, fall_s } => {
+            FlowDelay::EdgeDependent { rise_s, fall_s } => {
                 writeln!(text, "rise_delay_s = {rise_s}\nfall_delay_s = {fall_s}")
             }
         };

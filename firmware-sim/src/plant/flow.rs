@@ -215,7 +215,7 @@ fn resisted(push: f64, resistance: Resistance) -> f64 {
 #[cfg(test)]
 pub(crate) mod bench {
     use super::*;
-    use crate::plant::DelayLaw;
+    use crate::plant::FlowDelay;
     use crate::plant::part::Part;
     use crate::plant::rig::bench::base;
 
@@ -227,7 +227,7 @@ pub(crate) mod bench {
             Part::Flow(part) => part,
             _ => panic!("it does not act in the flow"),
         });
-        let base = base(DelayLaw::Fixed { delay_s: 0.03 });
+        let base = base(FlowDelay::Fixed { delay_s: 0.03 });
         Flow::new(&base, &Character::FirstOrder, parts.collect())
     }
 
@@ -245,10 +245,10 @@ mod tests {
     use super::bench::hold;
     use super::*;
     use crate::plant::character::PastTerm;
-    use crate::plant::{DelayLaw, rig};
+    use crate::plant::{FlowDelay, rig};
 
     fn base() -> BasePlant {
-        rig::bench::base(DelayLaw::Fixed { delay_s: 0.03 })
+        rig::bench::base(FlowDelay::Fixed { delay_s: 0.03 })
     }
 
     fn flow_of(character: Character) -> Flow {

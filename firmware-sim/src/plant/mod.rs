@@ -19,7 +19,7 @@ mod transport;
 
 pub use altered::Altered;
 pub(crate) use base::log_uniform;
-pub use base::{BasePlant, BasePlantError, DelayLaw, RateLaw};
+pub use base::{BasePlant, BasePlantError, FlowDelay, RateLaw};
 pub use character::{Character, PastTerm};
 pub use effects::{Effect, EffectError, Parameter, ShowsWith};
 pub use fault::Fault;

@@ -5,7 +5,7 @@
 
 use std::fmt::Debug;
 
-use super::base::DelayLaw;
+use super::base::FlowDelay;
 use super::free_stream::FreeStream;
 
 /// Where an effect sits, in the order in which the signals run.
@@ -51,7 +51,7 @@ pub(crate) struct Surroundings<'a> {
 /// A running part, by the room it belongs to.
 pub(crate) enum Part {
     /// It sets the transport delay.
-    Delay(DelayLaw),
+    Delay(FlowDelay),
     /// It shapes the jet.
     Jet(Box<dyn JetPart>),
     /// It acts in the flow.

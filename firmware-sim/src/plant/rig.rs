@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::altered::Altered;
-use super::base::{BasePlant, BasePlantError, DelayLaw};
+use super::base::{BasePlant, BasePlantError, FlowDelay};
 use super::character::Character;
 use super::effects::{Effect, EffectError};
 use super::fault::Fault;
@@ -55,7 +55,7 @@ impl PlantSpec {
     }
 
     /// The delay in force: an effect's, if one is about the delay, otherwise the base plant's.
-    pub fn delay(&self) -> DelayLaw {
+    pub fn delay(&self) -> FlowDelay {
         let parts = self.parts(&Surroundings::default()).into_iter();
         parts.fold(self.base.delay, |law, part| match part {
             Part::Delay(own) => own,
@@ -263,7 +263,7 @@ pub(crate) mod bench {
     use crate::plant::RateLaw;
 
     /// Attaches in 40 ms, separates in 100 ms, gain 1.
-    pub(crate) fn base(delay: DelayLaw) -> BasePlant {
+    pub(crate) fn base(delay: FlowDelay) -> BasePlant {
         BasePlant {
             attach_s: 0.04,
             separate_s: 0.1,
@@ -273,7 +273,7 @@ pub(crate) mod bench {
         }
     }
 
-    pub(crate) fn rig(delay: DelayLaw, effects: &[Effect]) -> Rig {
+    pub(crate) fn rig(delay: FlowDelay, effects: &[Effect]) -> Rig {
         Rig::new(&PlantSpec::new(base(delay), effects), None).unwrap()
     }
 }
@@ -288,7 +288,7 @@ mod tests {
     #[test]
     fn an_edge_between_samples_arrives_between_samples() {
         let delay_s = 0.030_37;
-        let mut rig = rig(DelayLaw::Fixed { delay_s }, &[]);
+        let mut rig = rig(FlowDelay::Fixed { delay_s }, &[]);
         // On at 1.23 ms, off at 61.66 ms.
         let (on, off) = (0.001_23, 0.061_66);
         for k in 0..150 {
@@ -318,7 +318,7 @@ mod tests {
     fn the_state_dependent_delay_is_the_law_at_the_arrival() {
         let (floor_s, rise_s, rate) = (0.030, 0.012, 8.0);
         let mut rig = rig(
-            DelayLaw::StateDependent {
+            FlowDelay::StateDependent {
                 floor_s,
                 rise_s,
                 rate,
@@ -411,7 +411,7 @@ mod tests {
             }
             .into(),
         ];
-        let mut rig = rig(DelayLaw::Fixed { delay_s: 0.03 }, &effects);
+        let mut rig = rig(FlowDelay::Fixed { delay_s: 0.03 }, &effects);
         let y = rig.play(&vec![1.0; 8000]);
         let e = |s: f64| (1.0 + ratio * (s + offset).cbrt()).sqrt();
         let expected = (e(0.8) - e(0.0)) / (e(1.0) - e(0.0));
@@ -428,7 +428,7 @@ mod tests {
         ) {
             let effects = [EchoPath { gain: 0.4, echo_delay: 0.033_3 }.into()];
             let play = |delay_s: f64, offset: f64| {
-                let mut rig = rig(DelayLaw::Fixed { delay_s }, &effects);
+                let mut rig = rig(FlowDelay::Fixed { delay_s }, &effects);
                 let mut at = offset;
                 let edges: Vec<(f64, f64)> = dwells
                     .iter()
@@ -459,7 +459,7 @@ mod tests {
 
     #[test]
     fn the_same_rig_answers_the_loop_one_sample_later_than_the_record() {
-        let law = DelayLaw::Fixed { delay_s: 0.0317 };
+        let law = FlowDelay::Fixed { delay_s: 0.0317 };
         let command: Vec<f64> = (0..500)
             .map(|k| f64::from(u8::from((k / 70) % 2 == 0)))
             .collect();

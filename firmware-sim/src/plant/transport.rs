@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::SUBSTEP_S;
-use super::base::DelayLaw;
+use super::base::FlowDelay;
 
 /// Window of the mean friction that sets the state-dependent delay (s).
 pub(crate) const MEAN_WINDOW_S: f64 = 0.250;
@@ -49,12 +49,12 @@ impl MeanFriction {
 /// Which moment of the jet reaches the sensor at a given time.
 #[derive(Debug, Clone)]
 pub(crate) struct ArrivalClock {
-    law: DelayLaw,
+    law: FlowDelay,
     read_from: f64,
 }
 
 impl ArrivalClock {
-    pub(crate) fn new(law: DelayLaw) -> Self {
+    pub(crate) fn new(law: FlowDelay) -> Self {
         let mut clock = Self {
             law,
             read_from: 0.0,
@@ -66,19 +66,19 @@ impl ArrivalClock {
     /// The delay at mean friction `mean` (s); reversed flow is no more separated than none.
     pub(crate) fn delay(&self, mean: f64) -> f64 {
         match self.law {
-            DelayLaw::Fixed { delay_s } => delay_s,
-            DelayLaw::StateDependent {
+            FlowDelay::Fixed { delay_s } => delay_s,
+            FlowDelay::StateDependent {
                 floor_s,
                 rise_s,
                 rate,
             } => floor_s + rise_s * (-rate * mean.max(0.0)).exp(),
-            DelayLaw::Clamped {
+            FlowDelay::Clamped {
                 floor_s,
                 rise_s,
                 level,
             } => floor_s + rise_s * (1.0 - mean.max(0.0) / level).max(0.0),
             // The edges have been re-timed before they reached the valve.
-            DelayLaw::EdgeDependent { .. } => 0.0,
+            FlowDelay::EdgeDependent { .. } => 0.0,
         }
     }
 
@@ -108,9 +108,9 @@ pub(crate) struct EdgeTravel {
 
 impl EdgeTravel {
     /// `None` for the laws that delay the jet as a whole.
-    pub(crate) fn new(law: DelayLaw) -> Option<Self> {
+    pub(crate) fn new(law: FlowDelay) -> Option<Self> {
         match law {
-            DelayLaw::EdgeDependent { rise_s, fall_s } => Some(Self {
+            FlowDelay::EdgeDependent { rise_s, fall_s } => Some(Self {
                 rise_s,
                 fall_s,
                 last_level: 0.0,
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn a_pulse_shorter_than_the_difference_of_the_delays_never_arrives() {
-        let law = DelayLaw::EdgeDependent {
+        let law = FlowDelay::EdgeDependent {
             rise_s: 0.050,
             fall_s: 0.030,
         };

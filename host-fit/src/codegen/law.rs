@@ -2,9 +2,10 @@
 
 use super::CodegenError;
 use super::pieces::{count, word};
-use crate::model::{Hold, Law, Maximise, Model, Track};
+use crate::model::{Law, Maximise, Model, Track};
 use crate::user_effect::number;
 use closed_loop::AHEAD;
+use model_core::control::HoldTimes;
 use model_core::control::{Pulses, Tracking, golden};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
@@ -20,7 +21,7 @@ pub(super) fn items(model: &Model) -> Result<TokenStream, CodegenError> {
         Some(Law::Maximise(law)) => {
             let pulses = Pulses {
                 train: law.train(),
-                hold: law.hold.into(),
+                hold: law.hold,
             };
             (train(law), golden::play(&pulses, GOLDEN_SAMPLES))
         }
@@ -48,7 +49,7 @@ fn none() -> TokenStream {
     }
 }
 
-fn hold(hold: Hold) -> TokenStream {
+fn hold(hold: HoldTimes) -> TokenStream {
     let (on, off) = (
         Literal::u32_unsuffixed(hold.on),
         Literal::u32_unsuffixed(hold.off),

@@ -8,8 +8,8 @@
 
 use super::bench::Player;
 use super::rules::RULES;
-use crate::model::Hold;
 use crate::simulate::HostState;
+use model_core::control::HoldTimes;
 use rayon::prelude::*;
 
 /// What to search.
@@ -65,7 +65,7 @@ impl FlowState {
         (0..samples).map(play).sum()
     }
 
-    fn may_switch(&self, hold: Hold) -> bool {
+    fn may_switch(&self, hold: HoldTimes) -> bool {
         self.since >= if self.on { hold.on } else { hold.off }
     }
 }
@@ -83,7 +83,7 @@ struct Node {
 
 pub(super) struct HorizonSearch<'a> {
     pub(super) bench: &'a Player<f64>,
-    pub(super) hold: Hold,
+    pub(super) hold: HoldTimes,
     pub(super) price: f64,
     pub(super) horizon: Horizon,
 }
@@ -234,7 +234,7 @@ mod tests {
     fn search(bench: &Player<f64>, hold: u32, price: f64, horizon: Horizon) -> HorizonSearch<'_> {
         HorizonSearch {
             bench,
-            hold: Hold {
+            hold: HoldTimes {
                 on: hold,
                 off: hold,
             },

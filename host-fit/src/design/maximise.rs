@@ -11,8 +11,9 @@ use super::error::{DesignError, check};
 use super::horizon::{self, FlowState, Horizon};
 use super::rules::RULES;
 use super::train::{JudgedTrain, Played, Train, distinct};
-use crate::model::{Hold, Maximise, Model};
+use crate::model::{Maximise, Model};
 use closed_loop::SAMPLE_PERIOD_S;
+use model_core::control::HoldTimes;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -146,7 +147,7 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
     check(model)?;
     let search = TrainSearch {
         bench: Player::of(model),
-        hold: Hold {
+        hold: HoldTimes {
             on: samples(request.min_on_s),
             off: samples(request.min_off_s),
         },
@@ -230,7 +231,7 @@ struct Lasting {
 
 struct TrainSearch {
     bench: Player<f64>,
-    hold: Hold,
+    hold: HoldTimes,
     price: f64,
     longest: u32,
 }
@@ -523,7 +524,7 @@ mod tests {
         };
         let search = TrainSearch {
             bench: Player::of(&model),
-            hold: Hold { on: 10, off: 10 },
+            hold: HoldTimes { on: 10, off: 10 },
             price: 0.4,
             longest: 3000,
         };

@@ -122,7 +122,7 @@ where
         let (case, _) = trial.run(&mut host_law(&bench, law), law.reference);
         case
     }));
-    let mut relay = Relay::new(law.hold.into(), 0.0);
+    let mut relay = Relay::new(law.hold, 0.0);
     let (_, compared) = plant.run(&mut relay, law.reference);
     Proof {
         cases,
@@ -138,7 +138,7 @@ pub fn prove_pulses<F>(law: &Maximise, blown: f64, plant: &Trial<F>, others: &[T
 where
     F: Controlled + Clone + Sync,
 {
-    let pulses = || OpenLoop::train(law.train(), law.hold.into());
+    let pulses = || OpenLoop::train(law.train(), law.hold);
     let (as_it_is, trace) = plant.run(&mut pulses(), blown);
     let mut cases = vec![as_it_is];
     cases.par_extend(others.par_iter().map(|trial| {

@@ -4,11 +4,11 @@ use super::bench::{Player, samples};
 use super::error::{DesignError, check};
 use super::rules::RULES;
 use super::steady::{Steady, steady, time_constants};
-use crate::model::{Delay, Hold, Model, Track};
+use crate::model::{Delay, Model, Track};
 use closed_loop::{AHEAD, Figures, ModelFlow, SAMPLE_PERIOD_S, TrackingController, run};
 use model_core::control::budget::Budget;
 use model_core::control::tracking::Unusable;
-use model_core::control::{Reachable, Tracking};
+use model_core::control::{HoldTimes, Reachable, Tracking};
 use model_core::delay::Transport;
 use serde::{Serialize, Serializer};
 
@@ -113,7 +113,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     let (shortest, longest) = bench.first_arrival(RULES.swing * blown.friction);
     let (opening, closing) = bench.valve();
     let equivalent_duty = equivalent_duty(model, request.target);
-    let mut hold = Hold {
+    let mut hold = HoldTimes {
         on: samples(request.min_on_s),
         off: samples(request.min_off_s),
     };
@@ -253,7 +253,7 @@ fn paced(law: &Track, rate: f64, duty: f64) -> Track {
 }
 
 /// Half of the longer time that a valve is held for, samples.
-fn half(hold: Hold) -> u16 {
+fn half(hold: HoldTimes) -> u16 {
     hold.on.max(hold.off).div_ceil(2).min(10_000) as u16
 }
 
@@ -433,7 +433,7 @@ pub(super) mod tests {
         let mut model = paper_state_dependent(LagConvention::OneStep);
         model.add(spec, &[0.060, 0.045], None);
         let design = track(&model, &TrackRequest::holding(0.8)).unwrap();
-        assert_eq!(design.law.hold, Hold { on: 18, off: 10 });
+        assert_eq!(design.law.hold, HoldTimes { on: 18, off: 10 });
         assert!((14..=16).contains(&design.law.opening));
         assert_eq!(design.law.lead, 45);
     }

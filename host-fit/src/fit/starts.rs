@@ -4,7 +4,7 @@
 use super::rules::RULES;
 use crate::data::Record;
 use crate::model::Model;
-use model_core::effect::{Facts, Parameter, Spec, Start, Starts};
+use model_core::effect::{Facts, Parameter, Spec, StartValue, Starts};
 
 /// The size of a signal: 1 where it is of order 1, as the catalogue's ranges are.
 fn size_of(records: &[&Record], signal: impl Fn(&Record) -> &[f64]) -> f64 {
@@ -48,7 +48,7 @@ pub(super) fn starts(base: &Model, spec: &Spec, records: &[&Record]) -> Vec<Vec<
     match spec.starts {
         Starts::Grid => product(spec.parameters, &facts),
         Starts::Rows(rows) => {
-            let values = |row: &&[Start]| {
+            let values = |row: &&[StartValue]| {
                 let each = row.iter().zip(spec.parameters);
                 each.map(|(start, p)| start.value(p, &facts)).collect()
             };
@@ -64,7 +64,7 @@ fn product(parameters: &[Parameter], facts: &Facts<'_>) -> Vec<Vec<f64>> {
         let extended = all.iter().flat_map(|start| {
             parameter.starts.iter().map(move |value| {
                 let mut longer = start.clone();
-                longer.push(Start::Value(*value).value(parameter, facts));
+                longer.push(StartValue::Number(*value).value(parameter, facts));
                 longer
             })
         });

@@ -92,7 +92,7 @@ pub(crate) fn difference(
 
 /// The signals that the recursion is fitted to, one entry per record.
 #[derive(Debug, Clone)]
-pub(crate) struct Signals {
+pub(crate) struct FitSignals {
     /// Input: u, or its average for an averaged model.
     pub(crate) u: Vec<Vec<f64>>,
     /// Output: y, or its average for an averaged model.
@@ -109,7 +109,7 @@ pub(crate) struct Signals {
     pub(crate) skipped: usize,
 }
 
-impl Signals {
+impl FitSignals {
     /// Prepares the records for a structure.
     pub(crate) fn new(records: &[Series<'_>], structure: &Structure) -> Self {
         let pick = |signal: &[f64]| {
@@ -387,7 +387,7 @@ mod tests {
             delay: InputDelay::StateDependent { law, factors: None },
             ..Structure::default()
         };
-        let signals = Signals::new(&[Series { u: &u, y: &y }], &structure);
+        let signals = FitSignals::new(&[Series { u: &u, y: &y }], &structure);
         let Weights::Intervals(on) = signals.arrived(12_500) else {
             panic!("u is on/off")
         };
@@ -423,7 +423,7 @@ mod tests {
         let y: Vec<f64> = (0..4000)
             .map(|k| 0.4 * ((k as f64 * 0.004).sin() + (k as f64 * 0.05).cos()))
             .collect();
-        let signals = Signals::new(&[Series { u: &u, y: &y }], &structure);
+        let signals = FitSignals::new(&[Series { u: &u, y: &y }], &structure);
         for tick in [0, 700, 10_000, 12_345, 60_000] {
             let Weights::Intervals(on) = signals.arrived(tick) else {
                 panic!("u is on/off")

@@ -10,7 +10,7 @@
 
 use model_core::delay::DelayLaw as _;
 
-use super::arrival::{CoreLaw, Signals, core_law, factor};
+use super::arrival::{CoreLaw, FitSignals, core_law, factor};
 use super::coefficients::Coefficients;
 use super::layout::Delays;
 use super::rules::RULES;
@@ -201,7 +201,7 @@ fn undecided(edges: &[usize], arrivals: &[Arrival]) -> Vec<(usize, usize)> {
 }
 
 impl FreeRunner {
-    pub(crate) fn new(signals: &Signals, structure: &Structure) -> Self {
+    pub(crate) fn new(signals: &FitSignals, structure: &Structure) -> Self {
         let largest = signals
             .y
             .iter()
@@ -217,7 +217,7 @@ impl FreeRunner {
     /// Runs all records, until the sum of squares reaches `give_up_at`.
     pub(crate) fn run(
         &self,
-        signals: &Signals,
+        signals: &FitSignals,
         delays: &Delays,
         coefficients: &Coefficients,
         give_up_at: f64,
@@ -243,7 +243,7 @@ impl FreeRunner {
 /// One run over all records, compiled for the vector unit that the machine has.
 struct BlockRun<'a> {
     runner: &'a FreeRunner,
-    signals: &'a Signals,
+    signals: &'a FitSignals,
     recursion: &'a Recursion,
     arrivals: &'a [Arrival],
     give_up_at: f64,

@@ -8,7 +8,7 @@
 //! ε of any exchange of lags is predicted by a quadratic form in the
 //! least-squares coefficients of the candidate, in microseconds.
 
-use super::arrival::Signals;
+use super::arrival::FitSignals;
 use super::coefficients::Coefficients;
 use super::free_runner::Trajectory;
 use super::lagged_products::ONE;
@@ -164,7 +164,7 @@ pub(crate) struct Linearised {
 impl Linearised {
     /// Linearises at `delays` and the solution of their regression, given their run.
     pub(crate) fn new(
-        signals: &Signals,
+        signals: &FitSignals,
         layout: &Layout,
         delays: &Delays,
         solution: &[f64],

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::arrival::{Signals, Weights, difference};
+use super::arrival::{FitSignals, Weights, difference};
 use super::lagged_products::{LaggedOutputs, TARGET, Table};
 use super::layout::{Column, Delays, Layout};
 use super::structure::{Series, Structure};
@@ -76,7 +76,7 @@ impl Normal {
 #[derive(Debug)]
 pub(crate) struct Regression {
     pub(crate) layout: Layout,
-    pub(crate) signals: Signals,
+    pub(crate) signals: FitSignals,
     pub(crate) lagged: LaggedOutputs,
     plain: Table,
     kept: BTreeMap<Which, Kept>,
@@ -89,7 +89,7 @@ pub(crate) struct Regression {
 impl Regression {
     pub(crate) fn new(records: &[Series<'_>], structure: &Structure) -> Self {
         let layout = Layout::new(structure);
-        let signals = Signals::new(records, structure);
+        let signals = FitSignals::new(records, structure);
         let longest = structure.convention.behind_newest(structure.longest_lag);
         let lagged = LaggedOutputs::new(&signals.y, longest);
         let plain = lagged.table(&signals.everywhere());

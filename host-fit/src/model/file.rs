@@ -71,8 +71,8 @@ struct File {
     lag_convention: Convention,
     #[serde(default)]
     start: Start,
-    structure: Structure,
-    coefficients: Coefficients,
+    structure: StructureTable,
+    coefficients: CoefficientTable,
     delay: DelayTable,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     effect: Vec<EffectTable>,
@@ -103,7 +103,7 @@ enum JetResponse {
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Structure {
+struct StructureTable {
     averaged: bool,
     window: u32,
     #[serde(default)]
@@ -114,7 +114,7 @@ struct Structure {
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Coefficients {
+struct CoefficientTable {
     #[serde(default)]
     constant: f64,
     a: Vec<f64>,
@@ -228,7 +228,7 @@ impl File {
                 LagConvention::OneStep => Convention::OneStep,
             },
             start: model.start,
-            structure: Structure {
+            structure: StructureTable {
                 averaged: model.averaging.averaged_model,
                 window: model.averaging.window,
                 jet_response: match model.grading {
@@ -239,7 +239,7 @@ impl File {
                 state_lags: model.state_lags.clone(),
                 product_lags: model.product_lags.clone(),
             },
-            coefficients: Coefficients {
+            coefficients: CoefficientTable {
                 constant: model.constant,
                 a: model.a.clone(),
                 b: model.b.clone(),
@@ -440,8 +440,9 @@ impl EffectTable {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Delay, Hold, Maximise, Track};
+    use super::super::{Delay, Maximise, Track};
     use super::*;
+    use model_core::control::HoldTimes;
 
     fn example() -> Model {
         let mut model = Model {
@@ -492,7 +493,7 @@ mod tests {
             reference: 0.8,
             reachable: [0.0, 1.05],
             slope: 0.0,
-            hold: Hold { on: 10, off: 12 },
+            hold: HoldTimes { on: 10, off: 12 },
             switches: Some([20, 10]),
             air: None,
             lead: 47,
@@ -518,7 +519,7 @@ mod tests {
         model.law = Some(Law::Maximise(Maximise {
             period: 250,
             pulses: vec![(0, 100)],
-            hold: Hold { on: 10, off: 10 },
+            hold: HoldTimes { on: 10, off: 10 },
             air_price: 0.0,
         }));
         let read = Model::from_toml(&model.to_toml(), "m").expect("own file");

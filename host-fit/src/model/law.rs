@@ -16,14 +16,12 @@ pub enum Law {
     Maximise(Maximise),
 }
 
-/// Shortest times of the valve, samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Hold {
-    /// Shortest on time, samples.
-    pub on: u32,
-    /// Shortest off time, samples.
-    pub off: u32,
+/// How [`HoldTimes`] stand in a file.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "HoldTimes", deny_unknown_fields)]
+struct HoldTable {
+    on: u32,
+    off: u32,
 }
 
 /// The constants of [`Tracking`], times in samples.
@@ -37,7 +35,8 @@ pub struct Track {
     /// Fastest change of the reference, y per sample; 0 for steps.
     pub slope: f64,
     /// Shortest on and off times.
-    pub hold: Hold,
+    #[serde(with = "HoldTable")]
+    pub hold: HoldTimes,
     /// Samples per switch that the valve's budget allows, and switches saved up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub switches: Option<[u32; 2]>,
@@ -73,18 +72,10 @@ pub struct Maximise {
     /// First sample and length of each pulse.
     pub pulses: Vec<(u32, u32)>,
     /// Shortest on and off times.
-    pub hold: Hold,
+    #[serde(with = "HoldTable")]
+    pub hold: HoldTimes,
     /// Price of steady blowing, y, for which it is the best.
     pub air_price: f64,
-}
-
-impl From<Hold> for HoldTimes {
-    fn from(hold: Hold) -> Self {
-        Self {
-            on: hold.on,
-            off: hold.off,
-        }
-    }
 }
 
 impl Track {
@@ -99,7 +90,7 @@ impl Track {
                 high: number(self.reachable[1]),
             },
             slope: number(self.slope),
-            hold: self.hold.into(),
+            hold: self.hold,
             budget: Budget {
                 switches: self.switches.map(|[samples_per_switch, saved]| Switches {
                     samples_per_switch,
@@ -167,7 +158,7 @@ impl Law {
                 }
                 let mut pulses = law.pulses.clone();
                 pulses.sort_unstable();
-                if !checks::train(law.period, &pulses, law.hold.into()) {
+                if !checks::train(law.period, &pulses, law.hold) {
                     return fault(
                         "pulses",
                         "are outside the period, too close or too short for `law.hold`",

@@ -15,7 +15,7 @@ mod rules;
 pub use chain::{Chain, HostEffect, HostState};
 pub use delay::{Delay, TransportLaw};
 pub use file::{FORMAT_VERSION, ModelError};
-pub use law::{Hold, Law, Maximise, Track};
+pub use law::{Law, Maximise, Track};
 pub use memory::{Channel, Footprint};
 pub use parameters::{Coordinate, Kind};
 pub use prepared::{AnyDelay, Prepared, Rounding};

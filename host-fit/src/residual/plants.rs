@@ -87,7 +87,7 @@ fn a_perfect_model_has_nothing_to_explain() {
 /// An error that is far above the stated noise but a function of nothing.
 #[test]
 fn pure_noise_explains_nothing() {
-    use firmware_sim::instrument::{Noise, NoiseSource};
+    use firmware_sim::instrument::{Noise, NoiseSignal};
     use rand::SeedableRng;
     let records = records(&[], &[], 3);
     let held_out: Vec<&Record> = records.iter().filter(|r| r.role == Use::Validate).collect();
@@ -104,7 +104,7 @@ fn pure_noise_explains_nothing() {
             .enumerate()
             .map(|(i, (record, run))| {
                 let rng = rand_chacha::ChaCha8Rng::seed_from_u64(1000 * seed + i as u64);
-                let mut noise = NoiseSource::new(Noise::HOT_FILM, rng);
+                let mut noise = NoiseSignal::new(Noise::HOT_FILM, rng);
                 let y = run.iter().map(|sim| sim + noise.sample()).collect();
                 Record {
                     y,

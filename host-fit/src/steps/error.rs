@@ -1,7 +1,7 @@
 //! Why a step was not done.
 
 use crate::codegen::CodegenError;
-use crate::data::{AverageError, DataError, Place};
+use crate::data::{AverageError, DataError, FilePlace};
 use crate::design::DesignError;
 use crate::diagnose::DiagnoseError;
 use crate::excitation::ExcitationError;
@@ -41,7 +41,7 @@ pub enum StepError {
     #[error("{place}: {cause}")]
     IdentifyRecord {
         /// The record's file.
-        place: Box<Place>,
+        place: Box<FilePlace>,
         /// Why.
         cause: IdentifyError,
     },
@@ -67,7 +67,7 @@ pub enum StepError {
     )]
     SamplePeriod {
         /// The recordings.
-        place: Box<Place>,
+        place: Box<FilePlace>,
         /// Their sampling period, s.
         data: f64,
         /// The model's, s.
@@ -90,7 +90,7 @@ pub enum StepError {
     )]
     InputPeriod {
         /// The command file.
-        place: Box<Place>,
+        place: Box<FilePlace>,
         /// Its sampling period, s.
         input: f64,
         /// The model's, s.
@@ -103,7 +103,7 @@ pub enum StepError {
     )]
     NoMeasurements {
         /// The command file.
-        place: Box<Place>,
+        place: Box<FilePlace>,
         /// How many are needed.
         samples: usize,
     },
@@ -111,7 +111,7 @@ pub enum StepError {
     #[error("{place}: no column `{channel}`, which the model's effects need; add it")]
     NoChannel {
         /// The command file.
-        place: Box<Place>,
+        place: Box<FilePlace>,
         /// The channel.
         channel: String,
     },
@@ -122,7 +122,7 @@ pub enum StepError {
     )]
     Diverges {
         /// The command file.
-        place: Box<Place>,
+        place: Box<FilePlace>,
         /// When, s.
         time_s: f64,
     },

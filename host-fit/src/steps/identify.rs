@@ -113,7 +113,7 @@ pub struct Identification {
     #[serde(flatten)]
     pub scores: Scores,
     /// Lags and delays of the model.
-    pub delays: Delays,
+    pub delays: IdentifiedDelays,
     /// Candidates that the search judged in closed form.
     pub screened: usize,
     /// Why the search ended.
@@ -131,7 +131,7 @@ pub struct Identification {
 
 /// Lags and delays of a model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Delays {
+pub struct IdentifiedDelays {
     /// State lags τ, samples.
     pub state: Vec<u16>,
     /// Product lags τ̄, samples.
@@ -152,7 +152,7 @@ fn stop_name<S: Serializer>(stop: &StopReason, to: S) -> Result<S::Ok, S::Error>
     stop.name().serialize(to)
 }
 
-impl Delays {
+impl IdentifiedDelays {
     fn of(model: &Model) -> Self {
         let (input, factors, law) = match &model.delay {
             Delay::Fixed { delays } => (delays.clone(), Vec::new(), None),
@@ -368,7 +368,7 @@ pub fn identify(
         evaluations: identified.evaluations,
         wall_time_s: identified.wall_time.as_secs_f64(),
         scores,
-        delays: Delays::of(&model),
+        delays: IdentifiedDelays::of(&model),
         screened: identified.screened,
         stop: identified.stop,
         refinement: identified.refinement,
@@ -426,7 +426,7 @@ fn automatic(
         evaluations: found.tried,
         wall_time_s: started.elapsed().as_secs_f64(),
         scores,
-        delays: Delays::of(&model),
+        delays: IdentifiedDelays::of(&model),
         screened: 0,
         stop: if onlooker.interrupt().load(Ordering::Relaxed) {
             StopReason::Interrupted

@@ -44,7 +44,7 @@ pub use design::{Design, DesignOutcome, DesignRequest, design, try_out};
 pub use diagnose::{Finding, diagnose};
 pub use error::StepError;
 pub use extend::{Extension, RecordChange, extend};
-pub use identify::{DelayKind, Delays, Identification, IdentifyRequest, identify};
+pub use identify::{DelayKind, Identification, IdentifiedDelays, IdentifyRequest, identify};
 pub use onlooker::Onlooker;
 pub use rules::{rulebooks, rules_page};
 pub use simulate::{Simulation, simulate};

@@ -3,7 +3,7 @@
 use super::RULES;
 use crate::data::Record;
 use crate::model::Model;
-use model_core::effect::{Facts, Parameter, Spec, Start, Starts, Unit};
+use model_core::effect::{Facts, Parameter, Spec, StartValue, Starts, Unit};
 
 /// Points along a parameter's range where it is the only one, one of two, of more.
 const POINTS: [usize; 3] = [12, 4, 3];
@@ -68,7 +68,7 @@ impl Known {
 pub(super) fn grid(spec: &Spec, model: &Model, known: &Known) -> Vec<Vec<f64>> {
     let facts = known.facts(model);
     if let Starts::Rows(rows) = spec.starts {
-        let values = |row: &&[Start]| {
+        let values = |row: &&[StartValue]| {
             let each = row.iter().zip(spec.parameters);
             each.map(|(start, p)| start.value(p, &facts)).collect()
         };
@@ -84,7 +84,7 @@ pub(super) fn grid(spec: &Spec, model: &Model, known: &Known) -> Vec<Vec<f64>> {
     let along = |p: &Parameter| -> Vec<f64> {
         let middle = |starts: &[f64]| starts.get(starts.len() / 2).copied().unwrap_or(p.low);
         if scales(p) {
-            vec![Start::Value(middle(p.starts)).value(p, &facts)]
+            vec![StartValue::Number(middle(p.starts)).value(p, &facts)]
         } else if p.low >= p.high {
             vec![p.low]
         } else if p.unit == Unit::Hertz {
@@ -96,7 +96,9 @@ pub(super) fn grid(spec: &Spec, model: &Model, known: &Known) -> Vec<Vec<f64>> {
             LEVELS.iter().map(|q| low + q * (high - low)).collect()
         } else {
             let values = p.starts.iter();
-            values.map(|v| Start::Value(*v).value(p, &facts)).collect()
+            values
+                .map(|v| StartValue::Number(*v).value(p, &facts))
+                .collect()
         }
     };
     let mut all = vec![Vec::new()];

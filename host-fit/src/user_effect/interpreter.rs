@@ -36,7 +36,7 @@ pub struct UserState<T> {
 }
 
 /// The signals of a sample.
-struct Signals<'a, T> {
+struct Readings<'a, T> {
     own: T,
     relaxation: T,
     at: &'a Instant<'a, T>,
@@ -94,7 +94,7 @@ impl<T: Real> UserEffect<T> {
         self.taps.iter().map(|tap| tap.whole + 2).collect()
     }
 
-    fn run(&self, state: &mut UserState<T>, signals: &Signals<'_, T>) -> T {
+    fn run(&self, state: &mut UserState<T>, signals: &Readings<'_, T>) -> T {
         let UserState {
             results,
             states,
@@ -163,7 +163,7 @@ impl<T: Real> Effect<T> for UserEffect<T> {
         if self.place != Place::Jet {
             return jet;
         }
-        let signals = Signals {
+        let signals = Readings {
             own: jet,
             relaxation: T::ZERO,
             at,
@@ -179,7 +179,7 @@ impl<T: Real> Effect<T> for UserEffect<T> {
         if self.place != Place::Flow {
             return T::ZERO;
         }
-        let signals = Signals {
+        let signals = Readings {
             own: flow.now,
             relaxation: flow.relaxation,
             at,
@@ -191,7 +191,7 @@ impl<T: Real> Effect<T> for UserEffect<T> {
         if self.place != Place::Sensor {
             return signal;
         }
-        let signals = Signals {
+        let signals = Readings {
             own: signal,
             relaxation: T::ZERO,
             at,

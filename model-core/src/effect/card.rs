@@ -149,9 +149,9 @@ impl Facts<'_> {
 
 /// A value from which a search sets out.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Start {
+pub enum StartValue {
     /// A number, for signals of order 1.
-    Value(f64),
+    Number(f64),
     /// The value of y below which this share of all samples lies.
     Quantile(f64),
     /// So many samples longer than the present delay.
@@ -162,7 +162,7 @@ pub enum Start {
     Records(f64),
 }
 
-impl Start {
+impl StartValue {
     /// The value for `parameter`, in its unit.
     #[must_use]
     pub fn value(self, parameter: &Parameter, facts: &Facts<'_>) -> f64 {
@@ -175,8 +175,8 @@ impl Start {
         };
         match self {
             // The usual change of y is nearer to what is sought than its size.
-            Self::Value(value) if parameter.unit == Unit::YPerSample => value * facts.y_per_sample,
-            Self::Value(value) => value * parameter.unit.scale(facts.y, facts.time, facts.u),
+            Self::Number(value) if parameter.unit == Unit::YPerSample => value * facts.y_per_sample,
+            Self::Number(value) => value * parameter.unit.scale(facts.y, facts.time, facts.u),
             Self::Quantile(q) => facts.quantile(q),
             Self::Delay(longer) => in_time(facts.delay + longer),
             Self::TimeConstants(times) => in_time(times * facts.time_constant / facts.period),
@@ -192,7 +192,7 @@ pub enum Starts {
     Grid,
     /// From these, each with one value for every parameter: they depend on each
     /// other, or on the data.
-    Rows(&'static [&'static [Start]]),
+    Rows(&'static [&'static [StartValue]]),
 }
 
 /// What an effect needs to show at all, besides its channel.
@@ -376,20 +376,20 @@ mod tests {
 
     #[test]
     fn starts_follow_the_data() {
-        let value = |start: Start, unit: Unit| {
+        let value = |start: StartValue, unit: Unit| {
             start.value(&Parameter::new("p", unit, [0.001, 0.5], &[]), &FACTS)
         };
-        assert_eq!(value(Start::Value(0.1), Unit::Y), 5.0);
-        assert_eq!(value(Start::Value(0.1), Unit::YPerSample), 0.025);
-        assert_eq!(value(Start::Value(0.1), Unit::Second), 0.2);
-        assert_eq!(value(Start::Quantile(0.5), Unit::Y), 10.0);
-        assert_eq!(value(Start::Delay(-6.0), Unit::Samples), 34.0);
-        assert_eq!(value(Start::Delay(-6.0), Unit::Second), 0.068);
+        assert_eq!(value(StartValue::Number(0.1), Unit::Y), 5.0);
+        assert_eq!(value(StartValue::Number(0.1), Unit::YPerSample), 0.025);
+        assert_eq!(value(StartValue::Number(0.1), Unit::Second), 0.2);
+        assert_eq!(value(StartValue::Quantile(0.5), Unit::Y), 10.0);
+        assert_eq!(value(StartValue::Delay(-6.0), Unit::Samples), 34.0);
+        assert_eq!(value(StartValue::Delay(-6.0), Unit::Second), 0.068);
         // Not below a sample, not above the range.
-        assert_eq!(value(Start::Delay(-60.0), Unit::Second), 0.002);
-        assert_eq!(value(Start::Delay(1e6), Unit::Second), 1.0);
-        assert!((value(Start::TimeConstants(2.0), Unit::Samples) - 100.0).abs() < 1e-9);
-        assert!((value(Start::Records(0.01), Unit::Second) - 0.2).abs() < 1e-12);
+        assert_eq!(value(StartValue::Delay(-60.0), Unit::Second), 0.002);
+        assert_eq!(value(StartValue::Delay(1e6), Unit::Second), 1.0);
+        assert!((value(StartValue::TimeConstants(2.0), Unit::Samples) - 100.0).abs() < 1e-9);
+        assert!((value(StartValue::Records(0.01), Unit::Second) - 0.2).abs() < 1e-12);
     }
 
     #[test]

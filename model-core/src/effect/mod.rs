@@ -10,7 +10,7 @@ mod unit;
 
 pub use card::{
     Amplitude, Facts, Influence, LawCard, Needs, Parameter, Place, RustType, Said, Sign, Spec,
-    Start, Starts,
+    StartValue, Starts,
 };
 pub use unit::Unit;
 

@@ -2,7 +2,8 @@
 
 use crate::delay::Transport;
 use crate::effect::{
-    LawCard, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Start, Starts, Unit, take,
+    LawCard, Needs, Parameter, Physics, Place, RustType, Setting, Spec, StartValue, Starts, Unit,
+    take,
 };
 use crate::real::Real;
 
@@ -41,7 +42,7 @@ impl<T: Real> Physics<T> for ConstantDelay<T> {
             [0.0, 1000.0],
             &[40.0],
         )],
-        starts: Starts::Rows(&[&[Start::Delay(0.0)]]),
+        starts: Starts::Rows(&[&[StartValue::Delay(0.0)]]),
         amplitude: None,
         channel: None,
         needs: Needs::Nothing,

@@ -3,7 +3,8 @@
 
 use crate::delay::Transport;
 use crate::effect::{
-    LawCard, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Start, Starts, Unit, take,
+    LawCard, Needs, Parameter, Physics, Place, RustType, Setting, Spec, StartValue, Starts, Unit,
+    take,
 };
 use crate::real::Real;
 
@@ -88,10 +89,10 @@ impl<T: Real> Physics<T> for EdgeDependentDelay<T> {
             Parameter::new("fall_delay", Unit::Second, [0.001, 0.5], &[0.03]),
         ],
         starts: Starts::Rows(&[
-            &[Start::Delay(6.0), Start::Delay(-6.0)],
-            &[Start::Delay(-6.0), Start::Delay(6.0)],
-            &[Start::Delay(18.0), Start::Delay(-18.0)],
-            &[Start::Delay(1.0), Start::Delay(-1.0)],
+            &[StartValue::Delay(6.0), StartValue::Delay(-6.0)],
+            &[StartValue::Delay(-6.0), StartValue::Delay(6.0)],
+            &[StartValue::Delay(18.0), StartValue::Delay(-18.0)],
+            &[StartValue::Delay(1.0), StartValue::Delay(-1.0)],
         ]),
         amplitude: None,
         channel: None,

@@ -1,7 +1,7 @@
 //! The sensor or its amplifier has a limited range.
 
 use crate::effect::{
-    Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Start, Starts,
+    Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, StartValue, Starts,
     Unit, take,
 };
 use crate::real::Real;
@@ -35,10 +35,10 @@ impl<T: Real> Physics<T> for SensorSaturation<T> {
             Parameter::new("upper_limit", Unit::Y, [-10.0, 10.0], &[0.8]),
         ],
         starts: Starts::Rows(&[
-            &[Start::Quantile(0.05), Start::Quantile(0.95)],
-            &[Start::Quantile(0.0), Start::Quantile(0.9)],
-            &[Start::Quantile(0.1), Start::Quantile(0.999)],
-            &[Start::Quantile(0.2), Start::Quantile(0.8)],
+            &[StartValue::Quantile(0.05), StartValue::Quantile(0.95)],
+            &[StartValue::Quantile(0.0), StartValue::Quantile(0.9)],
+            &[StartValue::Quantile(0.1), StartValue::Quantile(0.999)],
+            &[StartValue::Quantile(0.2), StartValue::Quantile(0.8)],
         ]),
         amplitude: None,
         channel: None,

@@ -2,7 +2,8 @@
 
 use crate::delay::Transport;
 use crate::effect::{
-    LawCard, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Start, Starts, Unit, take,
+    LawCard, Needs, Parameter, Physics, Place, RustType, Setting, Spec, StartValue, Starts, Unit,
+    take,
 };
 use crate::real::Real;
 
@@ -55,10 +56,26 @@ impl<T: Real> Physics<T> for StateDependentDelay<T> {
             Parameter::new("delay_rate", Unit::PerY, [0.1, 200.0], &[4.0, 20.0]),
         ],
         starts: Starts::Rows(&[
-            &[Start::Delay(-3.0), Start::Value(10.0), Start::Value(4.0)],
-            &[Start::Delay(-1.0), Start::Value(10.0), Start::Value(16.0)],
-            &[Start::Delay(-6.0), Start::Value(10.0), Start::Value(2.0)],
-            &[Start::Delay(3.0), Start::Value(-8.0), Start::Value(4.0)],
+            &[
+                StartValue::Delay(-3.0),
+                StartValue::Number(10.0),
+                StartValue::Number(4.0),
+            ],
+            &[
+                StartValue::Delay(-1.0),
+                StartValue::Number(10.0),
+                StartValue::Number(16.0),
+            ],
+            &[
+                StartValue::Delay(-6.0),
+                StartValue::Number(10.0),
+                StartValue::Number(2.0),
+            ],
+            &[
+                StartValue::Delay(3.0),
+                StartValue::Number(-8.0),
+                StartValue::Number(4.0),
+            ],
         ]),
         amplitude: None,
         channel: None,

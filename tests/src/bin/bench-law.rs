@@ -6,7 +6,7 @@ use closed_loop::{
 };
 use firmware_sim::bench::{Disturbed, Lost};
 use firmware_sim::instrument::{Converter, Noise};
-use firmware_sim::plant::{BasePlant, DelayLaw, PlantSpec, Rig};
+use firmware_sim::plant::{BasePlant, FlowDelay, PlantSpec, Rig};
 use host_fit::design::{TrackRequest, track};
 use host_fit::model::{Delay, Model, Start, Track, Training};
 use host_fit::ring::Ring;
@@ -46,13 +46,13 @@ impl Bench {
         let per_sample = |time_s: f64| (-0.001 / (0.9 * time_s)).exp();
         let (attached, separated) = (per_sample(base.attach_s), per_sample(base.separate_s));
         let (floor, rise, rate) = match base.delay {
-            DelayLaw::StateDependent {
+            FlowDelay::StateDependent {
                 floor_s,
                 rise_s,
                 rate,
             } => (floor_s, rise_s, rate),
-            DelayLaw::Fixed { delay_s } => (delay_s, 0.0, 1.0),
-            DelayLaw::Clamped { .. } | DelayLaw::EdgeDependent { .. } => {
+            FlowDelay::Fixed { delay_s } => (delay_s, 0.0, 1.0),
+            FlowDelay::Clamped { .. } | FlowDelay::EdgeDependent { .. } => {
                 unreachable!("plants are drawn with the exponential law")
             }
         };
@@ -199,9 +199,9 @@ impl Bench {
             return controller;
         }
         let delay_s = match self.base.delay {
-            DelayLaw::StateDependent { floor_s, .. } => floor_s,
-            DelayLaw::Fixed { delay_s } => delay_s,
-            DelayLaw::Clamped { .. } | DelayLaw::EdgeDependent { .. } => {
+            FlowDelay::StateDependent { floor_s, .. } => floor_s,
+            FlowDelay::Fixed { delay_s } => delay_s,
+            FlowDelay::Clamped { .. } | FlowDelay::EdgeDependent { .. } => {
                 unreachable!("plants are drawn with the exponential law")
             }
         };

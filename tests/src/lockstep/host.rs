@@ -44,7 +44,7 @@ pub fn steps(model: &Model) -> Step {
             model,
             Pulses {
                 train: law.train(),
-                hold: law.hold.into(),
+                hold: law.hold,
             },
         ),
     }

@@ -5,7 +5,7 @@ use super::{Case, Link};
 use anyhow::{Context, Result, bail};
 use firmware::cases::SETTINGS;
 use firmware::link::lockstep::{BATCH, REPORT, Report, START, STEPS};
-use firmware_sim::plant::{BasePlant, DelayLaw, PlantSpec, RateLaw, Rig};
+use firmware_sim::plant::{BasePlant, FlowDelay, PlantSpec, RateLaw, Rig};
 
 /// Switches below which a run shows nothing.
 const FEWEST_SWITCHES: usize = 10;
@@ -27,7 +27,7 @@ fn plant() -> Result<Rig> {
         attach_s: 0.055,
         separate_s: 0.080,
         gain: 1.0,
-        delay: DelayLaw::StateDependent {
+        delay: FlowDelay::StateDependent {
             floor_s: 0.04735,
             rise_s: 0.01269,
             rate: 15.0,

@@ -1,4 +1,4 @@
-//! Proves that an effect and a delay law are each added with one file and one line:
+//! Proves that an effect of each place and a delay law are each added with one file and one line:
 //! in a copy of the tree, which is built, lists them, tries them in a diagnosis,
 //! fits the law and generates constants from it.
 
@@ -10,7 +10,12 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-const EFFECT: &str = "scratch-effect";
+/// An effect at every place, as the templates have it.
+const EFFECTS: [(&str, &str); 3] = [
+    ("scratch-nozzle", "jet"),
+    ("scratch-wall", "flow"),
+    ("scratch-film", "sensor"),
+];
 const LAW: &str = "clamped-linear-delay";
 /// Named apart from the product's, whose folder of artefacts it shares.
 const PROGRAM: &str = "host-fit-scratch";
@@ -24,7 +29,9 @@ pub(crate) fn proof() -> Result<()> {
     for workspace in ["", "firmware"] {
         rename_version(&copy.join(workspace).join("Cargo.toml"))?;
     }
-    write(&copy, EFFECT, "jet")?;
+    for (name, place) in EFFECTS {
+        write(&copy, name, place)?;
+    }
     write(&copy, LAW, "delay")?;
     let law = copy.join(MODEL).join("clamped_linear_delay.rs");
     fs::write(&law, include_str!("clamped_linear_delay.txt"))?;
@@ -74,7 +81,8 @@ pub(crate) fn proof() -> Result<()> {
     };
 
     let listed = tool(&["effects"])?;
-    for name in [EFFECT, LAW] {
+    let added = || EFFECTS.map(|(name, _)| name).into_iter().chain([LAW]);
+    for name in added() {
         if !has(&listed, "name", name) {
             bail!("`host-fit effects` does not list {name}");
         }
@@ -83,7 +91,7 @@ pub(crate) fn proof() -> Result<()> {
     let model = recordings(&data)?;
     let (data, model) = (data.display().to_string(), model.display().to_string());
     let diagnosis = tool(&["diagnose", &model, &data, "--most-effects", "1"])?;
-    for name in [EFFECT, LAW] {
+    for name in added() {
         if !has(&diagnosis["ranking"], "effect", name) {
             bail!("`host-fit diagnose` has not tried {name}: {diagnosis}");
         }

@@ -3,7 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use crate::plant::base::{BasePlant, DelayLaw};
+use crate::plant::base::{BasePlant, FlowDelay};
 use crate::plant::effects::{Card, Limits, Physics};
 use crate::plant::part::{Part, Place, Surroundings};
 
@@ -37,7 +37,7 @@ impl Physics for ClampedDelay {
     }
 
     fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Delay(DelayLaw::Clamped {
+        Part::Delay(FlowDelay::Clamped {
             floor_s: self.floor,
             rise_s: self.rise,
             level: self.level,

@@ -4,7 +4,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::{Card, Limits, Physics};
-use crate::plant::base::{BasePlant, DelayLaw};
+use crate::plant::base::{BasePlant, FlowDelay};
 use crate::plant::part::{Part, Place, Surroundings};
 
 /// Rising and falling edges travel for different times; replaces the base plant's delay.
@@ -38,7 +38,7 @@ impl Physics for EdgeDependentDelay {
     }
 
     fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Delay(DelayLaw::EdgeDependent {
+        Part::Delay(FlowDelay::EdgeDependent {
             rise_s: self.rise_delay,
             fall_s: self.fall_delay,
         })
@@ -56,7 +56,7 @@ mod tests {
             rise_delay: 0.025,
             fall_delay: 0.0405,
         };
-        let mut rig = rig(DelayLaw::Fixed { delay_s: 0.05 }, &[effect.into()]);
+        let mut rig = rig(FlowDelay::Fixed { delay_s: 0.05 }, &[effect.into()]);
         let mut command = vec![1.0; 50];
         command.resize(200, 0.0);
         let y = rig.play(&command);

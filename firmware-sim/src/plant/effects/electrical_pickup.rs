@@ -39,13 +39,13 @@ impl SensorPart for ElectricalPickup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::DelayLaw;
+    use crate::plant::FlowDelay;
     use crate::plant::rig::bench::rig;
 
     #[test]
     fn pickup_is_read_with_the_command_before_the_flow_moves() {
         let effect = ElectricalPickup { gain: 0.2 };
-        let mut rig = rig(DelayLaw::Fixed { delay_s: 0.03 }, &[effect.into()]);
+        let mut rig = rig(FlowDelay::Fixed { delay_s: 0.03 }, &[effect.into()]);
         let y = rig.play(&[0.0, 1.0, 1.0, 0.0, 0.0]);
         assert_eq!(y, [0.0, 0.2, 0.2, 0.0, 0.0]);
     }

@@ -62,7 +62,7 @@ impl JetPart for Stream {
 mod tests {
     use super::*;
     use crate::plant::rig::bench::base;
-    use crate::plant::{DelayLaw, PlantSpec, Rig};
+    use crate::plant::{FlowDelay, PlantSpec, Rig};
     use rand::SeedableRng;
 
     #[test]
@@ -72,7 +72,7 @@ mod tests {
         let spec = PlantSpec::new(
             BasePlant {
                 attach_s: 0.002,
-                ..base(DelayLaw::Fixed { delay_s: 0.02 })
+                ..base(FlowDelay::Fixed { delay_s: 0.02 })
             },
             &[FreeStreamVariation { gain: -2.0 }.into()],
         );

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{Card, Limits, Physics};
 use crate::plant::SAMPLE_PERIOD_S;
-use crate::plant::base::{BasePlant, DelayLaw};
+use crate::plant::base::{BasePlant, FlowDelay};
 use crate::plant::part::{Part, Place, Surroundings};
 
 /// h = floor + rise·exp(−rate·ỹ); replaces the base plant's delay.
@@ -42,7 +42,7 @@ impl Physics for StateDependentDelay {
     }
 
     fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Delay(DelayLaw::StateDependent {
+        Part::Delay(FlowDelay::StateDependent {
             floor_s: self.delay_floor * SAMPLE_PERIOD_S,
             rise_s: self.delay_rise * SAMPLE_PERIOD_S,
             rate: self.delay_rate,
@@ -61,7 +61,7 @@ mod tests {
             delay_rise: 12.0,
             delay_rate: 8.0,
         };
-        let Part::Delay(DelayLaw::StateDependent {
+        let Part::Delay(FlowDelay::StateDependent {
             floor_s,
             rise_s,
             rate,

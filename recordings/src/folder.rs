@@ -45,6 +45,13 @@ struct Entry {
 impl DataSet {
     /// Loads a folder with `dataset.toml`, or one CSV file (then one `identify` record named by the file's stem).
     ///
+    /// ```
+    /// let set = recordings::DataSet::load("../data/paper-like".as_ref())?;
+    /// assert_eq!(set.sample_period_s, 0.001);
+    /// assert!(set.is_on_off() && set.validate().count() > 0);
+    /// # Ok::<(), recordings::DataError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`DataError`] naming file, line and column (or TOML key) of the first fault found.
     pub fn load(path: &Path) -> Result<Self, DataError> {

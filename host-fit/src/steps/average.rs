@@ -22,6 +22,17 @@ pub struct Average {
 /// Phase-averages raw recordings in constant memory; those named in `validate` (file name without its ending) are held
 /// out. `progress` hears the index of the file being read and the bytes read of it.
 ///
+/// ```no_run
+/// use host_fit::data::Averaging;
+/// use host_fit::steps::average;
+///
+/// let raw = ["step.csv".as_ref(), "square.csv".as_ref()];
+/// let held_out = ["square".to_owned()];
+/// let averaged = average(&raw, &held_out, &Averaging::over(2.0), &mut |_, _| {})?;
+/// println!("{} records", averaged.set.records.len());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`StepError`] naming file and line, or the name that no recording has.
 pub fn average(

@@ -30,6 +30,19 @@ fn places<S: Serializer>(failures: &Failures, serializer: S) -> Result<S::Ok, S:
 
 /// Runs `model` free over every record of `set`.
 ///
+/// ```
+/// use host_fit::data::DataSet;
+/// use host_fit::model::Model;
+/// use host_fit::steps::compare;
+///
+/// let model = Model::load("../data/paper/table-2-state-dependent.toml".as_ref())?;
+/// let set = DataSet::load("../data/paper-like".as_ref())?;
+/// let compared = compare(&model, &set)?;
+/// assert_eq!(compared.scores.records.len(), set.records.len());
+/// println!("{}", compared.words.join(" "));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`StepError`] when the sampling periods differ, a channel is missing or a run diverges.
 pub fn compare(model: &Model, set: &DataSet) -> Result<Comparison, StepError> {

@@ -25,6 +25,17 @@ pub struct BoardConstants {
 
 /// Writes `model`, and its law where it has one, as Rust for a `no_std` crate on `model-core`.
 ///
+/// ```
+/// use host_fit::model::Model;
+/// use host_fit::steps::constants;
+///
+/// let model = Model::load("../data/paper/table-2-state-dependent.toml".as_ref())?;
+/// let constants = constants(&model)?;
+/// assert_eq!(constants.sizes, [5, 10, 1]);
+/// assert!(constants.text.contains("pub const STATE_LAGS: [u16; 5]"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`StepError::Codegen`] with the reason why this model cannot run on a board.
 pub fn constants(model: &Model) -> Result<BoardConstants, StepError> {

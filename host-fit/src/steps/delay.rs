@@ -116,6 +116,19 @@ impl Serialize for DelayReport {
 
 /// Measures the delay of the response to every edge of the command, and fits the law (2) to the identify records.
 ///
+/// ```
+/// use host_fit::data::DataSet;
+/// use host_fit::delay::DelayOptions;
+/// use host_fit::steps::measure_delays;
+///
+/// let set = DataSet::load("../data/paper-like".as_ref())?;
+/// let measured = measure_delays(&set, &DelayOptions::default())?;
+/// let law = measured.study.law.as_ref().ok_or("no law")?;
+/// println!("{}", measured.study.words);
+/// assert!((20.0..80.0).contains(&law.p0.value));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`StepError::Data`] when the command is not on/off.
 pub fn measure_delays(set: &DataSet, options: &DelayOptions) -> Result<DelayReport, StepError> {

@@ -44,6 +44,22 @@ pub enum DesignOutcome {
 
 /// Designs the law that `request` asks for and puts it into the model.
 ///
+/// ```
+/// use host_fit::design::TrackRequest;
+/// use host_fit::model::{Law, Model};
+/// use host_fit::steps::{DesignOutcome, DesignRequest, design};
+///
+/// let model = Model::load("../data/paper/table-2-state-dependent.toml".as_ref())?;
+/// let request = DesignRequest::Track(TrackRequest::holding(0.8));
+/// // Only the one-step convention is stable under steady blowing.
+/// let model = Model { convention: model_core::recursion::LagConvention::OneStep, ..model };
+/// let designed = design(&model, &request)?;
+/// let DesignOutcome::Track(track) = &designed.outcome else { unreachable!() };
+/// assert!((track.equivalent_duty - 0.713).abs() < 1e-3);
+/// assert!(matches!(designed.model.law, Some(Law::Track(_))));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`StepError::Design`] with the reason: out of reach, a model that does not settle, not from rest, not at 1 kHz.
 pub fn design(model: &Model, request: &DesignRequest) -> Result<Design, StepError> {

@@ -97,6 +97,20 @@ impl Serialize for Finding {
 /// Finds what `model` lacks on `set`, judged in free run on held-out records. Effects of the user's own are tried with
 /// those of the catalogue if the model knows them ([`Model::define`]).
 ///
+/// ```no_run
+/// use host_fit::data::DataSet;
+/// use host_fit::diagnose::Options;
+/// use host_fit::model::Model;
+/// use host_fit::steps::diagnose;
+///
+/// let model = Model::load("model.toml".as_ref())?;
+/// let set = DataSet::load("data/hidden-ramp".as_ref())?;
+/// let found = diagnose(&model, &set, &Options::default(), &())?;
+/// println!("{}. {}", found.headline, found.meaning);
+/// found.model.save("with-what-was-missing.toml".as_ref())?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`StepError`]: different sampling periods, nothing to learn from, a missing channel, a user who ended it at once.
 pub fn diagnose(

@@ -64,6 +64,18 @@ fn one_or_several<S: Serializer>(effects: &[String], serializer: S) -> Result<S:
 
 /// Adds the effects called `effects` to `model` and refits everything on the identify records of `set`.
 ///
+/// ```no_run
+/// use host_fit::data::DataSet;
+/// use host_fit::model::Model;
+/// use host_fit::steps::extend;
+///
+/// let model = Model::load("model.toml".as_ref())?;
+/// let set = DataSet::load("data/hidden-ramp".as_ref())?;
+/// let extended = extend(&model, &set, &["plenum-droop".to_owned()], &())?;
+/// println!("{:.1} s", extended.parameters["recovery_time"].value);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`StepError`]: an unknown or doubled effect, a missing channel, a model that diverges from every start.
 pub fn extend(

@@ -56,6 +56,21 @@ impl Simulation {
 
 /// Runs `model` free over `input`.
 ///
+/// ```
+/// use host_fit::data::InputFile;
+/// use host_fit::model::Model;
+/// use host_fit::steps::simulate;
+///
+/// let model = Model::load("../data/paper/table-2-state-dependent.toml".as_ref())?;
+/// let input = InputFile::load("../data/paper-like/sq4-50.csv".as_ref(), None)?;
+/// let run = simulate(&model, &input)?;
+/// assert_eq!(run.samples, 10_000);
+/// let mut csv = Vec::new();
+/// run.write_csv(&mut csv)?;
+/// assert!(csv.starts_with(b"t,u,y\n"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`StepError`] when the sampling periods differ, a column is missing or the run diverges.
 pub fn simulate(model: &Model, input: &InputFile) -> Result<Simulation, StepError> {

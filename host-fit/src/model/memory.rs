@@ -80,16 +80,6 @@ impl Model {
 }
 
 impl Footprint {
-    /// Jet strengths that a board keeps: whole words where a sample is one bit.
-    #[must_use]
-    pub fn jets_on_board(&self) -> usize {
-        if self.graded {
-            self.jets
-        } else {
-            self.words() * BITS
-        }
-    }
-
     /// Words for jets that are on or off.
     #[must_use]
     pub fn words(&self) -> usize {
@@ -122,7 +112,6 @@ mod tests {
         // Lag 300 of the one-step convention is 299 behind the newest.
         assert_eq!((memory.outputs, memory.jets), (300, 63));
         assert_eq!((memory.graded, memory.words()), (false, 2));
-        assert_eq!(memory.jets_on_board(), 64);
         model.averaging.averaged_model = true;
         assert_eq!(model.memory().jets, 313);
         model.state_lags = vec![1, 2];
@@ -140,7 +129,6 @@ mod tests {
         assert!(!model.memory().graded);
         add(&mut model, "plenum-droop");
         assert!(model.memory().graded);
-        assert_eq!(model.memory().jets_on_board(), model.memory().jets);
     }
 
     #[test]

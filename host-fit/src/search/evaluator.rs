@@ -114,11 +114,6 @@ impl<'a, P: Problem> Evaluator<'a, P> {
         self.cache_hits
     }
 
-    /// Evaluations still allowed.
-    pub fn remaining(&self) -> usize {
-        self.budget - self.evaluations.min(self.budget)
-    }
-
     /// Best point of the whole run.
     pub fn best(&self) -> Option<&Success> {
         self.best.as_ref()

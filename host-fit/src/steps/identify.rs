@@ -360,21 +360,9 @@ pub fn identify(
         search(&set.records, &options, &progress, onlooker.interrupt())
     })
     .map_err(|error| located(set, error))?;
-    let mut model = identified.model;
-    for definition in &request.definitions {
-        model.define(definition)?;
-    }
-    let records = model.targets(&set.records);
-    if !request.effects.is_empty() {
-        effects_for(&model, &request.effects)?;
-        model = watched(onlooker, "refitting with the effects", || {
-            extend(&model, &records, &request.effects)
-        })?
-        .model;
-    }
-    let (scores, diverged) = score_new(&model, &records)?;
-    remarks.extend(diverged.iter().map(ToString::to_string));
-    remarks.extend(overfitted(&scores));
+    let records = identified.model.targets(&set.records);
+    let (mut model, scores) =
+        with_effects(identified.model, &records, request, onlooker, &mut remarks)?;
     let (name, value) = (identified.objective.name(), identified.objective_value);
     model.training = training(set, &scores, request.seed, name, value);
     Ok(Identification {
@@ -399,6 +387,30 @@ pub fn identify(
     })
 }
 
+/// The base model with the effects that were asked for, and how it scores.
+fn with_effects(
+    mut model: Model,
+    records: &[Record],
+    request: &IdentifyRequest,
+    onlooker: &dyn Onlooker,
+    remarks: &mut Vec<String>,
+) -> Result<(Model, Scores), StepError> {
+    for definition in &request.definitions {
+        model.define(definition)?;
+    }
+    if !request.effects.is_empty() {
+        effects_for(&model, &request.effects)?;
+        model = watched(onlooker, "refitting with the effects", || {
+            extend(&model, records, &request.effects)
+        })?
+        .model;
+    }
+    let (scores, diverged) = score_new(&model, records)?;
+    remarks.extend(diverged.iter().map(ToString::to_string));
+    remarks.extend(overfitted(&scores));
+    Ok((model, scores))
+}
+
 /// Identifies a model whose structure is chosen by held-out error.
 fn automatic(
     set: &DataSet,
@@ -420,21 +432,9 @@ fn automatic(
         )
     });
     let found = found.ok_or(ExcitationError::NoIdentifyRecord)??;
-    let mut model = found.model;
-    for definition in &request.definitions {
-        model.define(definition)?;
-    }
-    let records = model.targets(&set.records);
-    if !request.effects.is_empty() {
-        effects_for(&model, &request.effects)?;
-        model = watched(onlooker, "refitting with the effects", || {
-            extend(&model, &records, &request.effects)
-        })?
-        .model;
-    }
-    let (scores, diverged) = score_new(&model, &records)?;
-    let mut remarks: Vec<String> = diverged.iter().map(ToString::to_string).collect();
-    remarks.extend(overfitted(&scores));
+    let records = found.model.targets(&set.records);
+    let mut remarks = Vec::new();
+    let (mut model, scores) = with_effects(found.model, &records, request, onlooker, &mut remarks)?;
     model.training = trained_in_free_run(set, &scores, request.seed);
     let objective_value = model.training.objective_value;
     let objective = Objective::FreeRun;

@@ -1,0 +1,284 @@
+//! What an effect file says, and its checks.
+
+use super::expression::{Compiler, Fault, Kind, Meaning, Typed};
+use super::program::{Carried, Op, Program, Signal};
+use super::{module_name, type_name};
+use model_core::effect::{Needs, Parameter, Place, RustType, Spec, Starts, Unit};
+use serde::{Deserialize, Serialize};
+
+/// What an effect file holds, and what a model file keeps of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Source {
+    pub(crate) name: String,
+    place: SourcePlace,
+    summary: String,
+    #[serde(default, rename = "source", skip_serializing_if = "Option::is_none")]
+    reference: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    channel: Option<String>,
+    expression: String,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    state: Vec<SourceState>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    parameter: Vec<SourceParameter>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum SourcePlace {
+    Jet,
+    Flow,
+    Sensor,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SourceState {
+    name: String,
+    #[serde(default)]
+    start: f64,
+    update: String,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SourceParameter {
+    name: String,
+    unit: String,
+    low: f64,
+    high: f64,
+    starts: Vec<f64>,
+}
+
+/// Why a source was refused: the key, and what is wrong with its value or its expression.
+pub(super) enum Refusal {
+    Key(String, String),
+    Expression(String, Fault),
+}
+
+/// A name of a signal, state or parameter.
+fn is_identifier(name: &str) -> bool {
+    name.starts_with(|c: char| c.is_ascii_lowercase())
+        && name.len() <= 40
+        && name
+            .chars()
+            .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+        && syn::parse_str::<syn::Ident>(name).is_ok()
+}
+
+/// A name of an effect: words of small letters and digits joined by hyphens.
+fn is_effect_name(name: &str) -> bool {
+    let word = |word: &str| {
+        !word.is_empty()
+            && word
+                .chars()
+                .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit())
+    };
+    name.len() <= 40
+        && name.starts_with(|c: char| c.is_ascii_lowercase())
+        && name.split('-').all(word)
+}
+
+impl Source {
+    fn place(&self) -> Place {
+        match self.place {
+            SourcePlace::Jet => Place::Jet,
+            SourcePlace::Flow => Place::Flow,
+            SourcePlace::Sensor => Place::Sensor,
+        }
+    }
+
+    pub(super) fn compile(&self) -> Result<Program, Refusal> {
+        let key = |key: &str, problem: String| Err(Refusal::Key(key.to_owned(), problem));
+        if !is_effect_name(&self.name) {
+            let problem = format!(
+                "`{}` is no name for an effect: use at most 40 small letters and digits, words joined by `-`",
+                self.name
+            );
+            return key("name", problem);
+        }
+        if model_core::effects::spec(&self.name).is_some() {
+            let problem = format!(
+                "`{}` is in the catalogue already; take another name",
+                self.name
+            );
+            return key("name", problem);
+        }
+        if self.summary.trim().is_empty() || self.summary.contains(['\n', '\r']) {
+            return key("summary", "say in one line what the effect is".to_owned());
+        }
+        let mut compiler = Compiler::default();
+        let mut signals = vec![
+            ("u", Op::Signal(Signal::Command)),
+            ("y", Op::Signal(Signal::Flow)),
+            ("t", Op::Signal(Signal::Time)),
+            ("since_edge", Op::Signal(Signal::SinceEdge)),
+            ("period", Op::Period),
+        ];
+        match self.place {
+            SourcePlace::Jet => signals.push(("jet", Op::Signal(Signal::Own))),
+            SourcePlace::Flow => signals.extend([
+                ("arrived", Op::Signal(Signal::Arrived)),
+                ("relaxation", Op::Signal(Signal::Relaxation)),
+            ]),
+            SourcePlace::Sensor => signals.extend([
+                ("reading", Op::Signal(Signal::Own)),
+                ("arrived", Op::Signal(Signal::Arrived)),
+            ]),
+        }
+        if let Some(channel) = &self.channel {
+            signals.push((channel, Op::Signal(Signal::Channel)));
+            signals.push(("reference", Op::Reference));
+        }
+        let mut name = |label: String, name: &str, op: Op| {
+            if !is_identifier(name) {
+                let problem = format!(
+                    "`{name}` is no name: use at most 40 small letters, digits and `_`, no word of Rust"
+                );
+                return Err(Refusal::Key(label, problem));
+            }
+            if compiler.names.iter().any(|(known, _)| known == name) {
+                let problem = format!("`{name}` has a meaning already; take another name");
+                return Err(Refusal::Key(label, problem));
+            }
+            compiler.names.push((name.to_owned(), Meaning::Read(op)));
+            Ok(())
+        };
+        for (signal, op) in signals {
+            name("channel".to_owned(), signal, op)?;
+        }
+        for (index, parameter) in self.parameter.iter().enumerate() {
+            let label = format!("parameter.{}", parameter.name);
+            name(label.clone(), &parameter.name, Op::Parameter(index))?;
+            parameter
+                .check()
+                .map_err(|problem| Refusal::Key(label, problem))?;
+        }
+        for (index, state) in self.state.iter().enumerate() {
+            let label = format!("state.{}", state.name);
+            name(label.clone(), &state.name, Op::State(index))?;
+            if !(state.start as f32).is_finite() {
+                return key(&label, "`start` is no finite number".to_owned());
+            }
+        }
+        let mut states = Vec::with_capacity(self.state.len());
+        for state in &self.state {
+            let update = compiler.number(&state.update).map_err(|fault| {
+                Refusal::Expression(format!("state.{}.update", state.name), fault)
+            })?;
+            // From here on the name is the state's new value.
+            let kind = Kind::Number;
+            let value = Meaning::Value(Typed {
+                register: update,
+                kind,
+            });
+            for (known, meaning) in &mut compiler.names {
+                if *known == state.name {
+                    *meaning = value;
+                }
+            }
+            states.push(Carried {
+                name: state.name.clone(),
+                start: state.start,
+                update,
+            });
+        }
+        let value = compiler
+            .number(&self.expression)
+            .map_err(|fault| Refusal::Expression("expression".to_owned(), fault))?;
+        let program = compiler.builder.finish(value, states);
+        for (index, parameter) in self.parameter.iter().enumerate() {
+            if !program.reads(Op::Parameter(index)) {
+                let problem =
+                    "it has no influence; use it in the expression or remove it".to_owned();
+                return key(&format!("parameter.{}", parameter.name), problem);
+            }
+        }
+        if self.channel.is_some() && !program.reads(Op::Signal(Signal::Channel)) {
+            let problem = "the channel has no influence; use it in the expression or remove it";
+            return key("channel", problem.to_owned());
+        }
+        Ok(program)
+    }
+
+    pub(super) fn spec(&self, program: &Program) -> Spec {
+        fn keep(text: &str) -> &'static str {
+            String::leak(text.to_owned())
+        }
+        let parameters = self.parameter.iter().enumerate().map(|(index, parameter)| {
+            let card = Parameter::new(
+                keep(&parameter.name),
+                Unit::of(keep(&parameter.unit)),
+                [parameter.low, parameter.high],
+                Vec::leak(parameter.starts.clone()),
+            );
+            if program.is_compared(index) {
+                card.stepwise()
+            } else {
+                card
+            }
+        });
+        let parameters: Vec<Parameter> = parameters.collect();
+        Spec {
+            name: keep(&self.name),
+            rust: keep(&format!(
+                "{}::{}",
+                module_name(&self.name),
+                type_name(&self.name)
+            )),
+            rust_type: RustType::Plain,
+            place: self.place(),
+            summary: keep(&self.summary),
+            equation: keep(&self.equation()),
+            parameters: Vec::leak(parameters),
+            starts: Starts::Grid,
+            amplitude: None,
+            channel: self.channel.as_deref().map(keep),
+            needs: Needs::Nothing,
+            base: false,
+            law: None,
+            source: keep(self.reference.as_deref().unwrap_or("the user's own effect")),
+        }
+    }
+
+    /// States and value as they were written, on one line.
+    fn equation(&self) -> String {
+        let flat = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+        let mut parts: Vec<String> = self
+            .state
+            .iter()
+            .map(|state| format!("{} ← {}", state.name, flat(&state.update)))
+            .collect();
+        let value = flat(&self.expression);
+        parts.push(match self.place {
+            SourcePlace::Jet => format!("j = {value}"),
+            SourcePlace::Flow => format!("adds {value}"),
+            SourcePlace::Sensor => format!("y = {value}"),
+        });
+        parts.join("; ")
+    }
+}
+
+impl SourceParameter {
+    fn check(&self) -> Result<(), String> {
+        let finite = |value: &f64| (*value as f32).is_finite();
+        if !(finite(&self.low) && finite(&self.high) && self.low < self.high) {
+            return Err("`low` and `high` are finite, and `low` is below `high`".to_owned());
+        }
+        if self.starts.is_empty()
+            || !self
+                .starts
+                .iter()
+                .all(|s| (self.low..=self.high).contains(s))
+        {
+            return Err(
+                "`starts` needs at least one value, all of them from `low` to `high`".to_owned(),
+            );
+        }
+        if self.unit.trim().is_empty() || self.unit.contains(['\n', '\r']) {
+            return Err("`unit` is a unit in words, `-` for none".to_owned());
+        }
+        Ok(())
+    }
+}

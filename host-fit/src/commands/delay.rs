@@ -39,7 +39,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let set = DataSet::load(&args.dataset)?;
     let options = DelayOptions {
-        window: args.window as usize,
+        window: args.window,
         max_delay: args.max_delay as usize,
         reach: args.reach as usize,
         seed: args.seed,

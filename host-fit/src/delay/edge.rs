@@ -1,4 +1,4 @@
-//! Edges of the command, and the averaged output (1) they are paired with.
+//! Edges of the command.
 
 use crate::data::Record;
 
@@ -26,27 +26,6 @@ pub fn edges(record: &Record) -> Vec<Edge> {
     edges
 }
 
-/// Averaged output (1): ỹ_k = (1/W) Σ_{s=1}^{W−1} y_{k−s}, one value per sample of `y`; y before the record is 0.
-///
-/// As printed in the ECC 2016 paper: W − 1 terms divided by W, without y_k itself.
-#[must_use]
-pub fn mean_output(y: &[f64], window: usize) -> Vec<f64> {
-    let mut sums = Vec::with_capacity(y.len() + 1);
-    let mut total = 0.0;
-    sums.push(total);
-    for value in y {
-        total += value;
-        sums.push(total);
-    }
-    let before = |k: usize| sums.get(k).copied().unwrap_or(total);
-    (0..y.len())
-        .map(|k| {
-            let first = (k + 1).saturating_sub(window.max(1));
-            (before(k) - before(first)) / window.max(1) as f64
-        })
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -61,18 +40,5 @@ mod tests {
             .map(|e| (e.sample, e.rising))
             .collect();
         assert_eq!(found, [(0, true), (2, false), (4, true)]);
-    }
-
-    #[test]
-    fn mean_output_is_equation_1_to_the_letter() {
-        let y: Vec<f64> = (0..40).map(|k| f64::from(k * k % 17)).collect();
-        for window in [1, 2, 7, 250] {
-            for (k, mean) in mean_output(&y, window).into_iter().enumerate() {
-                let sum: f64 = (1..window)
-                    .filter_map(|s| k.checked_sub(s).map(|i| y[i]))
-                    .sum();
-                assert!((mean - sum / window as f64).abs() < 1e-12);
-            }
-        }
     }
 }

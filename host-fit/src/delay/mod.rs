@@ -16,7 +16,7 @@ mod study;
 
 pub use dependence::DelayVerdict;
 pub use drawing::draw_delays;
-pub use edge::{Edge, edges, mean_output};
+pub use edge::{Edge, edges};
 pub use law::{DelayLawFit, DelayPoint, Estimate, fit_delay_law};
 pub use onset::{Onset, Unmeasured};
 pub use rules::{RULES, Rules};

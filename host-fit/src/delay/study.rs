@@ -1,10 +1,11 @@
 //! All delays of a data set, the law through them, their statistics, and whether the data bear the law out.
 
 use super::dependence::{DelayVerdict, Tests, words};
-use super::edge::{Edge, edges, mean_output};
+use super::edge::{Edge, edges};
 use super::law::{DelayLawFit, DelayPoint, fit_delay_law};
 use super::onset::{Onset, Unmeasured, measure_all};
 use super::spread::{Spread, correlation, spread};
+use crate::averages::averaged_past;
 use crate::data::{DataError, DataSet, Use};
 use model_core::average::WINDOW;
 
@@ -12,7 +13,7 @@ use model_core::average::WINDOW;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DelayOptions {
     /// W of the averaged output (1), samples; 250 in the paper.
-    pub window: usize,
+    pub window: u32,
     /// Longest delay that is looked for, samples.
     pub max_delay: usize,
     /// Samples of y used on either side of the start of a response: more average away more noise, fewer cope with
@@ -25,7 +26,7 @@ pub struct DelayOptions {
 impl Default for DelayOptions {
     fn default() -> Self {
         Self {
-            window: WINDOW as usize,
+            window: WINDOW,
             max_delay: 250,
             reach: 30,
             seed: 0,
@@ -115,7 +116,7 @@ pub fn study_delays(set: &DataSet, options: &DelayOptions) -> Result<DelayStudy,
     let onsets = measure_all(&series, options.max_delay, options.reach.max(4));
     let mut found = Vec::new();
     for ((record, (y, edges)), onsets) in set.records.iter().zip(&series).zip(onsets) {
-        let averaged = mean_output(y, options.window);
+        let averaged = averaged_past(y, options.window);
         for (&edge, onset) in edges.iter().zip(onsets) {
             let mean_output = onset.ok().and_then(|o| {
                 let arrival = (edge.sample as f64 + o.delay).round().max(0.0) as usize;
@@ -173,7 +174,7 @@ fn statistics(
     points: &[DelayPoint],
     law: Option<&DelayLawFit>,
     set: &DataSet,
-    window: usize,
+    window: u32,
 ) -> Option<DelayStatistics> {
     if points.is_empty() {
         return None;
@@ -191,7 +192,7 @@ fn statistics(
         let (mut h, mut u, mut y) = (Vec::new(), Vec::new(), Vec::new());
         for record in set.identify() {
             h.extend(
-                mean_output(&record.y, window)
+                averaged_past(&record.y, window)
                     .into_iter()
                     .map(|m| law.at(m.max(0.0))),
             );

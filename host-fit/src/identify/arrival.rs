@@ -1,10 +1,10 @@
 //! The command as it arrives at the sensor, for any input delay.
 
-use model_core::average::WindowSum;
 use model_core::delay::{DelayLaw as _, ScaledDelay, Tap};
 use model_core::effects::StateDependentDelay;
 
 use super::structure::{ExponentialDelay, FACTOR_STEP, InputDelay, Series, Structure};
+use crate::averages::{averaged_past, moving_average};
 use model_core::average::WINDOW;
 
 /// Strength with which samples enter a sum of products.
@@ -114,7 +114,7 @@ impl FitSignals {
     pub(crate) fn new(records: &[Series<'_>], structure: &Structure) -> Self {
         let pick = |signal: &[f64]| {
             if structure.averaged {
-                moving_average(signal)
+                moving_average(signal, WINDOW, false)
             } else {
                 signal.to_vec()
             }
@@ -130,7 +130,7 @@ impl FitSignals {
                     let follows = if structure.averaged {
                         y.clone()
                     } else {
-                        averaged_past(y)
+                        averaged_past(y, WINDOW)
                     };
                     follows.iter().map(|f| law.evaluate(f.max(0.0))).collect()
                 })
@@ -312,42 +312,6 @@ fn delay_samples(factor: f64, base: f64) -> usize {
     Tap::at(factor * base, true).whole
 }
 
-/// ỹ_k of eq. (1): the W − 1 values before y_k, divided by W.
-pub(crate) fn averaged_past(y: &[f64]) -> Vec<f64> {
-    let terms = WINDOW as usize - 1;
-    let mut sum = WindowSum::new();
-    y.iter()
-        .enumerate()
-        .map(|(k, y_k)| {
-            let average = sum.value() / f64::from(WINDOW);
-            let leaving = k
-                .checked_sub(terms)
-                .and_then(|i| y.get(i))
-                .copied()
-                .unwrap_or(0.0);
-            sum.slide(*y_k, leaving, WINDOW - 1);
-            average
-        })
-        .collect()
-}
-
-/// Mean of the last W values, eqs. (12) and (13).
-pub(crate) fn moving_average(x: &[f64]) -> Vec<f64> {
-    let mut sum = WindowSum::new();
-    x.iter()
-        .enumerate()
-        .map(|(k, x_k)| {
-            let leaving = k
-                .checked_sub(WINDOW as usize)
-                .and_then(|i| x.get(i))
-                .copied()
-                .unwrap_or(0.0);
-            sum.slide(*x_k, leaving, WINDOW);
-            sum.value() / f64::from(WINDOW)
-        })
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -360,19 +324,6 @@ mod tests {
             .map(|k| 0.5 + 0.6 * (k as f64 * 0.01).sin())
             .collect();
         (u, y)
-    }
-
-    #[test]
-    fn averages_equal_their_definitions() {
-        let (_, y) = wave();
-        let (past, mean) = (averaged_past(&y), moving_average(&y));
-        for k in [0usize, 1, 5, 249, 250, 251, 600, 899] {
-            let at = |s: usize| k.checked_sub(s).map_or(0.0, |i| y[i]);
-            let expected: f64 = (1..250).map(at).sum::<f64>() / 250.0;
-            assert!((past[k] - expected).abs() < 1e-14);
-            let expected: f64 = (0..250).map(at).sum::<f64>() / 250.0;
-            assert!((mean[k] - expected).abs() < 1e-14);
-        }
     }
 
     #[test]
@@ -391,7 +342,7 @@ mod tests {
         let Weights::Intervals(on) = signals.arrived(12_500) else {
             panic!("u is on/off")
         };
-        let follows = averaged_past(&y);
+        let follows = averaged_past(&y, WINDOW);
         for k in 0..899 {
             let delay =
                 (1.25 * (20.0 + 30.0 * (-3.0 * follows[k].max(0.0)).exp())).round() as usize;

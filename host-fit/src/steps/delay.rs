@@ -15,7 +15,7 @@ pub struct DelayReport {
     /// Sampling period, s.
     pub sample_period_s: f64,
     /// W of the averaged output ỹ, samples.
-    pub window: usize,
+    pub window: u32,
     /// Names of the records.
     pub records: Vec<String>,
     /// What was measured.
@@ -83,7 +83,7 @@ impl Serialize for DelayReport {
         #[derive(Serialize)]
         struct Document<'a> {
             sample_period_s: f64,
-            window_samples: usize,
+            window_samples: u32,
             law: Option<&'a crate::delay::DelayLawFit>,
             statistics: Option<&'a crate::delay::DelayStatistics>,
             verdict: crate::delay::DelayVerdict,

@@ -8,9 +8,7 @@ use firmware_sim::bench::{Disturbed, Lost};
 use firmware_sim::instrument::{Converter, Noise};
 use firmware_sim::plant::{BasePlant, Effect, FlowDelay, FreeStream, PlantSpec, RateLaw, Rig};
 use host_fit::design::{CaseGroup, DesignError, RULES, Trial, steady, time_constants};
-use host_fit::model::{Added, Delay, Model, TransportLaw};
-use model_core::effect::Physics;
-use model_core::effects::{EdgeDependentDelay, StateDependentDelay};
+use host_fit::model::{Delay, Model, TransportLaw};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -84,7 +82,7 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
     };
     let (mut effects, mut left_out) = (Vec::new(), Vec::new());
     for added in &model.effects {
-        match physical_effect(added) {
+        match physical_effect(&added.name, &added.parameters) {
             Ok(effect) => effects.push(effect),
             Err(error) => left_out.push(format!(
                 "tried on plants without {}, which the simulator does not have so: {error:#}",
@@ -99,32 +97,22 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
 /// its delays.
 fn transport(law: &TransportLaw, period: f64) -> FlowDelay {
     let factor = law.factors.iter().copied().fold(f64::INFINITY, f64::min);
-    let is = |name: &str| law.spec.name == name;
-    match law.parameters.as_slice() {
-        [floor, rise, rate] if is(StateDependentDelay::<f64>::SPEC.name) => {
-            FlowDelay::StateDependent {
-                floor_s: factor * floor * period,
-                rise_s: factor * rise * period,
-                rate: *rate,
-            }
-        }
-        [rise, fall] if is(EdgeDependentDelay::<f64>::SPEC.name) => FlowDelay::EdgeDependent {
-            rise_s: *rise,
-            fall_s: *fall,
-        },
-        _ => FlowDelay::Fixed {
-            delay_s: factor * period * law.range(period)[1],
-        },
-    }
+    let known = physical_effect(law.spec.name, &law.parameters).ok();
+    let delay = known.and_then(|effect| effect.delay());
+    let longest = || FlowDelay::Fixed {
+        delay_s: period * law.range(period)[1],
+    };
+    delay.unwrap_or_else(longest).scaled(factor)
 }
 
-fn physical_effect(added: &Added) -> anyhow::Result<Effect> {
-    // The kind by its name, the values from the model.
+/// The effect of that name with a model's values for it.
+fn physical_effect(name: &str, values: &[f64]) -> anyhow::Result<Effect> {
+    // Drawn for its kind alone.
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let base = BasePlant::draw(&mut rng);
-    let mut effect = Effect::draw(&added.name, &base, &mut rng)?;
-    let names = model_core::effects::spec(&added.name).map_or(&[][..], |spec| spec.parameters);
-    for (parameter, value) in names.iter().zip(&added.parameters) {
+    let mut effect = Effect::draw(name, &base, &mut rng)?;
+    let names = model_core::effects::spec(name).map_or(&[][..], |spec| spec.parameters);
+    for (parameter, value) in names.iter().zip(values) {
         effect = effect.with(parameter.name, *value)?;
     }
     Ok(effect)

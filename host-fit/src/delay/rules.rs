@@ -48,7 +48,7 @@ rules! {
     /// Probability that an interval of the law's parameters holds the true one.
     confidence: f64 = 0.95, "", "convention; held by the tests of `law.rs`";
     /// A response has its level at the latest after this.
-    response: usize = 150, "samples", "judgement: seven time constants of a fast flow";
+    response: usize = 150, "samples", "judgement";
 
     /// Fewest measured edges of the tests.
     tested_edges: usize = 8, "edges", "judgement";

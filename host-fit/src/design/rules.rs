@@ -10,7 +10,7 @@ rules! {
     /// A model is settled when its mean over two seconds moves by less than this from one to the next …
     settled: f64 = 1e-4, "share of the mean", "judgement";
     /// … and is waited for no longer than this.
-    longest_wait_s: f64 = 60.0, "s", "judgement: four times the slowest wall";
+    longest_wait_s: f64 = 60.0, "s", "judgement";
     /// Shares of a mean are shares of this where it is smaller.
     least_mean: f64 = 0.1, "y", "judgement: friction gains are of order one";
     /// A natural friction below this is what is left of the start, and none.
@@ -26,16 +26,16 @@ rules! {
     sure_pulse: u32 = 3, "samples", "theory 3.2: k − h advances by 0 to 2 a sample";
     /// The observer is so many times as fast as the flow: slower, the estimate is the model's alone; faster, it follows the
     /// sensor's noise …
-    observer_speed: f64 = 2.0, "times the faster time constant", "judgement; held by the table of docs/law.md";
+    observer_speed: f64 = 2.0, "times the faster time constant", "chosen on the plants of docs/law.md";
     /// … and corrects no more than this at once.
     observer_most: f64 = 0.1, "share of the residual", "judgement";
     /// The bias of the estimate follows so much of a residual in a delay: slow, so that neither noise nor a wrong delay
     /// turns corrections into an oscillation …
-    bias_in_a_delay: f64 = 0.03, "share of the residual", "judgement; held by the table of docs/law.md";
+    bias_in_a_delay: f64 = 0.03, "share of the residual", "chosen on the plants of docs/law.md";
     /// … in a delay of at least this.
     bias_delay: u16 = 10, "samples", "judgement";
     /// The integral correction follows so much of an offset in a delay …
-    integral_in_a_delay: f64 = 0.04, "share of the offset", "judgement; held by the table of docs/law.md";
+    integral_in_a_delay: f64 = 0.04, "share of the offset", "judgement";
     /// … of at least this.
     integral_delay: u16 = 20, "samples", "judgement";
     /// Corrections go no further than this.
@@ -52,12 +52,12 @@ rules! {
     /// … if the mean stays within this of the reference.
     paced_offset: f64 = 0.005, "share of what can be reached", "judgement";
     /// The air budget may be exceeded on the model by this.
-    air_margin: f64 = 0.02, "share of the air of steady blowing", "judgement: the duty is known no better from 10 s";
+    air_margin: f64 = 0.02, "share of the air of steady blowing", "judgement";
 
     /// Length of the run on the model that says what air a law takes …
     model_run: usize = 15_000, "samples", "judgement";
     /// … and from where it counts.
-    model_run_from: usize = 5000, "samples", "judgement: the slowest flow of the plants has settled";
+    model_run_from: usize = 5000, "samples", "judgement: the start is over";
     /// Length of a trial in the loop …
     trial: usize = 12_000, "samples", "judgement";
     /// … and from where it counts.
@@ -95,9 +95,9 @@ rules! {
     distinct_duty: f64 = 0.1, "", "judgement";
 
     /// Most chances to switch in a horizon.
-    blocks: u32 = 60, "", "judgement: seconds of computing";
+    blocks: u32 = 60, "", "judgement: for the time it takes";
     /// Commands kept at each of them.
-    beam: usize = 16, "", "judgement: seconds of computing";
+    beam: usize = 16, "", "judgement: for the time it takes";
     /// A law that plans again and again does so this often in a horizon: the end of a plan is cut off from what follows.
     plans: u32 = 3, "plans", "judgement";
     /// For this long a law plans again and again to show its cycle.

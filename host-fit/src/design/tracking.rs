@@ -284,32 +284,15 @@ fn on_model(bench: &Player<f64>, tracking: Tracking<f64>) -> Figures {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::model::{Start, Training};
     use model_core::effects::StateDependentDelay;
     use model_core::model::Averaging;
-    use model_core::recursion::{Grading, LagConvention};
+    use model_core::recursion::LagConvention;
 
     fn paper(convention: LagConvention) -> Model {
         Model {
-            sample_period_s: 0.001,
             convention,
-            averaging: Averaging {
-                window: 250,
-                averaged_model: false,
-            },
-            grading: Grading::default(),
-            start: Start::Rest,
-            constant: 0.0,
-            state_lags: Vec::new(),
-            a: Vec::new(),
-            product_lags: Vec::new(),
-            b: Vec::new(),
-            c: Vec::new(),
             delay: Delay::Fixed { delays: vec![49] },
-            effects: Vec::new(),
-            definitions: Vec::new(),
-            training: Training::default(),
-            law: None,
+            ..Model::default()
         }
     }
 

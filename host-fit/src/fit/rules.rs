@@ -8,7 +8,7 @@ rules! {
     pub struct Rules in "fit";
 
     /// A fit without a better step has a minimum when the cosines between the residual and all derivatives are below this.
-    stationary: f64 = 1e-6, "cosine", "NIST's problems, started at their certified values";
+    stationary: f64 = 1e-6, "cosine", "judgement; held by the tests of `levenberg.rs`";
     /// Most iterations of a fit.
     iterations: usize = 30, "", "judgement";
     /// A fit ends when an iteration lowers the sum of squares by less than this.

@@ -1,5 +1,6 @@
 //! What an identification is asked for.
 
+use super::rules::RULES;
 use super::structure::Structure;
 use crate::search::Settings;
 
@@ -45,7 +46,7 @@ impl Default for IdentifyOptions {
             structure: Structure::default(),
             objective: Objective::default(),
             search: Settings::default(),
-            patience: 3,
+            patience: RULES.patience,
             refine: true,
         }
     }

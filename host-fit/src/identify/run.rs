@@ -5,7 +5,6 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use model_core::model::Averaging;
-use model_core::recursion::Grading;
 
 use super::arrival::factor;
 use super::coefficients::Coefficients;
@@ -123,7 +122,6 @@ fn model(
             averaged_model: structure.averaged,
         },
         start: structure.start,
-        grading: Grading::Proportional,
         constant,
         state_lags: delays.state.clone(),
         a,
@@ -144,8 +142,6 @@ fn model(
                 false,
             ),
         },
-        effects: Vec::new(),
-        definitions: Vec::new(),
         training: Training {
             y_range: [
                 ys().fold(f64::INFINITY, f64::min),
@@ -156,7 +152,7 @@ fn model(
             objective_value,
             ..Training::default()
         },
-        law: None,
+        ..Model::default()
     }
 }
 

@@ -2,6 +2,7 @@
 
 use model_core::recursion::LagConvention;
 
+use super::rules::RULES;
 use crate::model::Start;
 
 /// Step in which factors f are searched.
@@ -24,6 +25,13 @@ impl ExponentialDelay {
         floor: 47.35,
         rise: 12.69,
         rate: 20.18,
+    };
+
+    /// Where a search for the law sets out.
+    pub const USUAL: Self = Self {
+        floor: 40.0,
+        rise: 10.0,
+        rate: 8.0,
     };
 
     /// The longest delay of the law over ỹ ≥ 0, samples.
@@ -81,7 +89,7 @@ impl Default for Structure {
             state_lags: 5,
             product_lags: 10,
             inputs: 1,
-            longest_lag: 500,
+            longest_lag: RULES.longest_lag,
             convention: LagConvention::OneStep,
             delay: InputDelay::StateDependent {
                 law: ExponentialDelay::PAPER,

@@ -446,27 +446,14 @@ mod tests {
 
     fn example() -> Model {
         let mut model = Model {
-            sample_period_s: 0.001,
-            convention: LagConvention::OneStep,
-            averaging: Averaging {
-                window: 250,
-                averaged_model: false,
-            },
-            start: Start::Rest,
-            grading: Grading::Proportional,
-            constant: 0.0,
             state_lags: vec![1, 44],
             a: vec![0.9, 0.01],
-            product_lags: vec![1],
             b: vec![0.1, 1.0 / 3.0],
             c: vec![-0.02, 0.01],
             delay: Delay::Fixed {
                 delays: vec![49, 417],
             },
-            effects: Vec::new(),
-            definitions: Vec::new(),
-            training: Training::default(),
-            law: None,
+            ..Model::default()
         };
         for name in ["hot-film-lag", "valve-lag"] {
             let spec = model.spec(name).expect("in the catalogue");

@@ -3,11 +3,9 @@
 use super::{FailureCoordinate, Failures, where_it_fails};
 use crate::data::{Record, Use};
 use crate::fit::lean_base;
-use crate::model::{Delay, Model, Start, Training};
+use crate::model::{Delay, Model};
 use firmware_sim::hidden_set::HiddenSetPlan;
 use model_core::effects::StateDependentDelay;
-use model_core::model::Averaging;
-use model_core::recursion::{Grading, LagConvention};
 
 /// The records of a plant, as a user would have them.
 pub(crate) fn records(effects: &[&str], faults: &[&str], seed: u64) -> Vec<Record> {
@@ -20,25 +18,10 @@ pub(crate) fn records(effects: &[&str], faults: &[&str], seed: u64) -> Vec<Recor
 pub(crate) fn base(records: &[Record]) -> Model {
     let learning: Vec<&Record> = records.iter().filter(|r| r.role == Use::Identify).collect();
     let given = Model {
-        sample_period_s: 0.001,
-        convention: LagConvention::OneStep,
-        averaging: Averaging {
-            window: 250,
-            averaged_model: false,
-        },
-        start: Start::Rest,
-        grading: Grading::Proportional,
-        constant: 0.0,
-        state_lags: vec![1],
         a: vec![0.98],
-        product_lags: vec![1],
         b: vec![0.02],
-        c: vec![0.0],
         delay: Delay::of::<StateDependentDelay<f64>>(&[30.0, 10.0, 5.0], vec![1.0], false),
-        effects: Vec::new(),
-        definitions: Vec::new(),
-        training: Training::default(),
-        law: None,
+        ..Model::default()
     };
     lean_base(&given, &learning).expect("a stable model").model
 }

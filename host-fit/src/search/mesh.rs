@@ -7,11 +7,8 @@
 //! granular and discrete variables", SIAM J. Optim. 29(2), 2019; the numbers
 //! follow NOMAD 4's `GMesh`.
 
+use super::rules::RULES;
 use super::variable::{Point, Variable};
-
-/// Smallest share of its frame a variable must have moved on a success for its
-/// frame to be enlarged (NOMAD's anisotropy factor).
-const ANISOTROPY: f64 = 0.1;
 
 /// Mantissa and exponent of one variable's frame size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,9 +81,9 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Mesh with the initial frame sizes: a tenth of the range of each variable.
+    /// Mesh with the usual initial frame sizes.
     pub fn new(variables: &[Variable]) -> Self {
-        Self::with_frame_share(variables, 0.1)
+        Self::with_frame_share(variables, RULES.initial_frame)
     }
 
     /// Mesh whose initial frames are a given share of each variable's range.
@@ -122,7 +119,7 @@ impl Mesh {
     /// took part in it, so that the frame takes the shape of the valley.
     pub fn enlarge(&mut self, step: &[i64]) {
         for (axis, &moved) in self.axes.iter_mut().zip(step) {
-            if moved.unsigned_abs() as f64 > ANISOTROPY * axis.frame_size() as f64 {
+            if moved.unsigned_abs() as f64 > RULES.anisotropy * axis.frame_size() as f64 {
                 axis.enlarge();
             }
         }

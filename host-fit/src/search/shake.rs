@@ -7,6 +7,7 @@ use super::evaluator::{Evaluator, Success};
 use super::mads::descend;
 use super::mesh::{Mesh, moved};
 use super::problem::Problem;
+use super::rules::RULES;
 use super::settings::Settings;
 use super::step::{Around, SearchStep};
 use super::stop::StopReason;
@@ -42,9 +43,9 @@ impl<P: Problem> SearchStep<P> for Shake {
         }
         self.fruitless += 1;
         let variables = evaluator.problem().variables().to_vec();
-        // The kick grows from 2 % to 30 % of the range over the allowed tries,
-        // and moves a random share of the variables.
-        let share = 0.02 + 0.28 * self.fruitless as f64 / self.patience as f64;
+        // The kick grows over the allowed tries and moves a random share of the variables.
+        let growth = RULES.largest_kick - RULES.least_kick;
+        let share = RULES.least_kick + growth * self.fruitless as f64 / self.patience as f64;
         let moving: f64 = around.rng.random_range(0.2..1.0);
         let step: Vec<i64> = variables
             .iter()

@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use super::evaluator::{Evaluator, Success};
 use super::mesh::{Mesh, moved};
 use super::problem::Problem;
+use super::rules::RULES;
 use super::stop::StopReason;
 use super::variable::Point;
 
@@ -51,14 +52,11 @@ pub trait SearchStep<P: Problem> {
     }
 }
 
-/// After a success, tries four times the same displacement.
+/// After a success, tries a multiple of the same displacement.
 #[derive(Debug, Default)]
 pub struct Speculative {
     tried_from: Option<(Vec<i64>, Vec<i64>)>,
 }
-
-/// How much further the speculative point lies (NOMAD's default).
-const SPECULATIVE_FACTOR: f64 = 4.0;
 
 impl<P: Problem> SearchStep<P> for Speculative {
     fn search(
@@ -76,7 +74,7 @@ impl<P: Problem> SearchStep<P> for Speculative {
         self.tried_from = Some(here);
         let far: Vec<f64> = last
             .iter()
-            .map(|s| (SPECULATIVE_FACTOR - 1.0) * *s as f64)
+            .map(|s| (RULES.speculative - 1.0) * *s as f64)
             .collect();
         let point = moved(
             evaluator.problem().variables(),

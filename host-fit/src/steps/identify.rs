@@ -185,7 +185,8 @@ impl IdentifyRequest {
                 .into()
         };
         let longest_lag = self.max_lag.unwrap_or_else(|| {
-            u16::try_from(shortest / 4).map_or(500, |quarter| quarter.clamp(1, 500))
+            let fitting = shortest / RULES.longest_lag_fits;
+            u16::try_from(fitting).map_or(RULES.longest_lag, |lag| lag.clamp(1, RULES.longest_lag))
         });
         Ok(Structure {
             state_lags: size(self.n1, 5, 2).min(longest_lag.into()),
@@ -218,15 +219,10 @@ impl IdentifyRequest {
         let exponential = |law: ExponentialDelay| {
             Delay::of::<StateDependentDelay<f64>>(&[law.floor, law.rise, law.rate], vec![1.0], true)
         };
-        let usual = ExponentialDelay {
-            floor: 40.0,
-            rise: 10.0,
-            rate: 8.0,
-        };
         match self.delay {
-            None => vec![constant, exponential(usual)],
+            None => vec![constant, exponential(ExponentialDelay::USUAL)],
             Some(DelayKind::Fixed) => vec![constant],
-            Some(DelayKind::StateDependent) => vec![exponential(usual)],
+            Some(DelayKind::StateDependent) => vec![exponential(ExponentialDelay::USUAL)],
             Some(DelayKind::Prescribed(law)) => vec![exponential(law)],
         }
     }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::rules::Rulebook;
 use crate::{
     data, delay, design, diagnose, excitation, experiment, fit, identify, model, power, residual,
-    simulate, terms,
+    search, simulate, terms,
 };
 
 /// The rules of every room, in the order in which the way of the data meets them.
@@ -16,6 +16,7 @@ pub fn rulebooks() -> Vec<Rulebook> {
         excitation::RULES.book(),
         delay::RULES.book(),
         identify::RULES.book(),
+        search::RULES.book(),
         model::RULES.book(),
         simulate::RULES.book(),
         fit::RULES.book(),

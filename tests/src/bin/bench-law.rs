@@ -8,13 +8,11 @@ use firmware_sim::bench::{Disturbed, Lost};
 use firmware_sim::instrument::{Converter, Noise};
 use firmware_sim::plant::{BasePlant, FlowDelay, PlantSpec, Rig};
 use host_fit::design::{TrackRequest, track};
-use host_fit::model::{Delay, Model, Start, Track, Training};
+use host_fit::model::{Delay, Model, Track};
 use host_fit::ring::Ring;
 use model_core::State;
 use model_core::control::HoldTimes;
 use model_core::effects::StateDependentDelay;
-use model_core::model::Averaging;
-use model_core::recursion::{Grading, LagConvention};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -57,18 +55,7 @@ impl Bench {
             }
         };
         let model = Model {
-            sample_period_s: 0.001,
-            convention: LagConvention::OneStep,
-            averaging: Averaging {
-                window: 250,
-                averaged_model: false,
-            },
-            grading: Grading::default(),
-            start: Start::Rest,
-            constant: 0.0,
-            state_lags: vec![1],
             a: vec![separated],
-            product_lags: vec![1],
             b: vec![1.05 * base.gain * (1.0 - attached)],
             c: vec![attached - separated],
             delay: Delay::of::<StateDependentDelay<f64>>(
@@ -76,10 +63,7 @@ impl Bench {
                 vec![1.0],
                 false,
             ),
-            effects: Vec::new(),
-            definitions: Vec::new(),
-            training: Training::default(),
-            law: None,
+            ..Model::default()
         };
         Self { base, model, seed }
     }

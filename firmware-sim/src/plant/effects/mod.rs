@@ -32,7 +32,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
-use super::base::BasePlant;
+use super::base::{BasePlant, FlowDelay};
 use super::part::{Part, Place, Surroundings};
 
 /// Why an effect could not be made.
@@ -367,6 +367,14 @@ impl Effect {
     /// Whether the effect only shows with commands of more levels than off and on.
     pub fn needs_levels(&self) -> bool {
         self.shows_with() != ShowsWith::OnOff
+    }
+
+    /// The transport delay that it gives a plant, if it is a delay law.
+    pub fn delay(&self) -> Option<FlowDelay> {
+        match self.part(&Surroundings::default()) {
+            Part::Delay(delay) => Some(delay),
+            _ => None,
+        }
     }
 
     /// Whether `other` acts on the same part of the rig so that the two exclude each other.

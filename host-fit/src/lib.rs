@@ -38,7 +38,7 @@
 //! | [`indicators`], [`simulate`], [`target`] | a model run over records, and judged |
 //! | [`model`], [`user_effect`] | a model and its file; effects that users define |
 //! | [`picture`] | drawings and pages of plain numbers |
-//! | [`averages`], [`dual`], [`data`], [`output`], [`rules`] | moving averages, derivatives, recordings, files that appear whole or not at all, what a threshold is |
+//! | [`averages`], [`dual`], [`data`], [`output`], [`mod@rules`] | moving averages, derivatives, recordings, files that appear whole or not at all, what a threshold is |
 
 pub mod averages;
 pub mod codegen;

@@ -55,7 +55,7 @@ enum Command {
         /// Kind of flow: first-order, memory1, memory2, inertia, wake, rate-of-y.
         #[arg(long, value_parser = named(Family::ALL.map(Family::name)))]
         family: String,
-        /// Effect to hide, of the catalogue or in another law (two-reservoirs …); may be given several times.
+        /// Effect to hide, of the catalogue or in another law (two-reservoirs …), or a fault; may be given several times.
         #[arg(long)]
         effect: Vec<String>,
         /// What the repeats are disturbed by.

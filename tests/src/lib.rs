@@ -7,14 +7,18 @@ pub mod lockstep;
 use std::path::PathBuf;
 use std::process::Command;
 
-/// The program `host-fit`, built beside the running test.
+/// The program `host-fit`, built beside the running test or tool.
 ///
 /// # Panics
 /// When it is not there and cannot be built: a test has nothing to test then.
 #[must_use]
 pub fn program() -> PathBuf {
-    let test = std::env::current_exe().expect("this test");
-    let folder = test.ancestors().nth(2).expect("target/PROFILE/deps");
+    let running = std::env::current_exe().expect("what is running");
+    let folder = running.parent().expect("target/PROFILE, or its deps");
+    let folder = match folder.parent() {
+        Some(profile) if folder.ends_with("deps") => profile,
+        _ => folder,
+    };
     let program = folder.join(format!("host-fit{}", std::env::consts::EXE_SUFFIX));
     if !program.is_file() {
         let built = Command::new(env!("CARGO"))

@@ -5,11 +5,12 @@ use crate::shell::{cargo, run};
 
 pub(crate) const TASK: Task = Task {
     name: "hidden-effects",
-    does: "the diagnosis on rigs that hide something: [--draws N] [--nulls N] [--pairs N] [--seed N] [--only TEXT]",
+    does: "the diagnosis on rigs of all families that hide something; --help for its options",
     run: hidden_effects,
 };
 
 fn hidden_effects(arguments: &[String]) -> anyhow::Result<()> {
+    run(&mut cargo(&["build", "--release", "--package", "host-fit"]))?;
     let mut all = vec![
         "run",
         "--release",

@@ -1,7 +1,7 @@
 //! Random flows, noise and commands.
 
-use rand::RngExt;
 use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::weight::Weight;
@@ -9,13 +9,13 @@ use super::{Family, NoiseKind, RigError, RigPlan};
 use crate::command::Command;
 use crate::instrument::{Instrument, Noise, Unrest};
 use crate::plant::{
-    Altered, BasePlant, Character, Effect, EffectError, FlowDelay, PastTerm, Place, PlantSpec,
-    RateLaw, log_uniform,
+    Altered, BasePlant, Character, Effect, EffectError, Fault, FlowDelay, FreeStream, PastTerm,
+    Place, PlantSpec, RateLaw, log_uniform,
 };
 use crate::stream::{Stream, stream};
 
 /// Draws of an effect before the heaviest so far is taken.
-const ATTEMPTS: usize = 24;
+const ATTEMPTS: usize = 12;
 
 /// An effect as it is drawn: of the catalogue, or altered.
 enum Drawn {
@@ -33,7 +33,11 @@ impl Drawn {
             .map_err(|error| match error {
                 EffectError::UnknownEffect { name, known } => EffectError::UnknownEffect {
                     name,
-                    known: format!("{known}, {}", Altered::NAMES.join(", ")),
+                    known: format!(
+                        "{known}, {}, {}",
+                        Altered::NAMES.join(", "),
+                        Fault::NAMES.join(", ")
+                    ),
                 },
                 other => other,
             })
@@ -56,50 +60,84 @@ impl Drawn {
 }
 
 impl RigPlan {
-    /// Draws the named effects and puts them into the plant.
-    pub(super) fn hide(&mut self, names: &[&str]) -> Result<(), RigError> {
-        let mut rng = stream(self.seed, Stream::Effects);
-        let mut identities: Vec<(&str, &str, Place)> = Vec::new();
+    /// Whether these can be hidden in one rig.
+    ///
+    /// # Errors
+    /// [`RigError`] for unknown names and for effects that exclude each other.
+    pub fn check(hidden: &[&str]) -> Result<(), RigError> {
+        let faulty = |name: &&str| Fault::NAMES.contains(name);
+        let names: Vec<&str> = hidden.iter().copied().filter(|n| !faulty(n)).collect();
+        Self::kinds(&names).map(|_| ())
+    }
+
+    /// The effects with any parameters.
+    fn kinds(names: &[&str]) -> Result<Vec<Drawn>, RigError> {
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        let base = BasePlant::draw(&mut rng);
+        let mut kinds: Vec<Drawn> = Vec::new();
         for name in names {
-            let identity = Drawn::draw(name, &self.plant.base, &mut rng.clone())?.identity();
-            let clash = identities.iter().find(|other| {
-                let both_transport = [other.2, identity.2] == [Place::Transport; 2];
-                other.1 == identity.1 || both_transport
+            let kind = Drawn::draw(name, &base, &mut rng)?;
+            let (own, resembles, place) = kind.identity();
+            let clash = kinds.iter().map(Drawn::identity).find(|other| {
+                let both_transport = [other.2, place] == [Place::Transport; 2];
+                other.1 == resembles || both_transport
             });
             if let Some((other, _, _)) = clash {
-                return Err(RigError::Exclusive(
-                    (*other).to_owned(),
-                    identity.0.to_owned(),
-                ));
+                return Err(RigError::Exclusive(other.to_owned(), own.to_owned()));
             }
-            identities.push(identity);
+            kinds.push(kind);
         }
-        if identities
-            .iter()
-            .any(|(_, _, place)| *place == Place::Transport)
-        {
-            // The hidden law is all there is.
-            self.plant.base = self.plant.base.with_fixed_delay(&mut rng);
+        Ok(kinds)
+    }
+
+    /// Draws the named effects and puts them into the plant. What the lightest of them weighs: at least 1 if
+    /// all of them matter; infinite without any.
+    pub(super) fn hide(&mut self, names: &[&str]) -> Result<f64, RigError> {
+        let mut rng = stream(self.seed, Stream::Effects);
+        let faulty = |name: &&str| Fault::NAMES.contains(name);
+        let (faults, names): (Vec<&str>, Vec<&str>) = names.iter().copied().partition(faulty);
+        let draw = |name: &str| Fault::draw(name, &mut rng);
+        self.plant.faults = faults.into_iter().filter_map(draw).collect();
+        // The same kinds with any parameters: they decide about the rest of the rig.
+        let mut kinds = self.plant.clone();
+        for kind in Self::kinds(&names)? {
+            if kind.identity().2 == Place::Transport {
+                // The hidden law is all there is.
+                self.plant.base = self.plant.base.with_fixed_delay(&mut rng);
+            }
+            kind.add_to(&mut kinds);
         }
+        if kinds.effects.iter().any(Effect::needs_levels) {
+            self.plant.base = self.plant.base.with_one_time_constant();
+        }
+        let wanders = kinds.effects.iter().any(|e| e.channel().is_some());
+        self.free_stream = wanders || rng.random_bool(0.2);
+
         let bare = self.plant.clone();
         // Effects are drawn for the friction that the flow reaches, not for what drives it.
         let reached = BasePlant {
             gain: bare.base.gain / bare.character.overshoot(),
             ..bare.base
         };
-        let weight = Weight::new(&self.commands()[4].0, self.instrument.standard_error());
+        let command = Self {
+            plant: kinds,
+            ..self.clone()
+        }
+        .commands()
+        .swap_remove(4)
+        .0;
+        let tunnel = wanders.then(|| {
+            FreeStream::draw(&mut stream(self.seed, Stream::Tunnel), command.levels.len())
+        });
+        let standard_error = self.instrument.standard_error();
+        let weight = Weight::new(&bare, &command.levels, tunnel, standard_error)?;
+        let mut lightest = f64::INFINITY;
         for name in names {
             let mut best: Option<(f64, PlantSpec)> = None;
             for _ in 0..ATTEMPTS {
                 let mut alone = bare.clone();
                 Drawn::draw(name, &reached, &mut rng)?.add_to(&mut alone);
-                // Without levels or a stream some show nothing: their usual range has to do.
-                let silent = |e: &Effect| e.needs_levels() || e.channel().is_some();
-                let found = if alone.effects.iter().any(silent) {
-                    f64::INFINITY
-                } else {
-                    weight.of(&bare, &alone)?
-                };
+                let found = weight.of(&alone)?;
                 if best.as_ref().is_none_or(|(most, _)| found > *most) {
                     best = Some((found, alone));
                 }
@@ -107,17 +145,13 @@ impl RigPlan {
                     break;
                 }
             }
-            if let Some((_, alone)) = best {
+            if let Some((found, alone)) = best {
                 self.plant.effects.extend(alone.effects);
                 self.plant.altered.extend(alone.altered);
+                lightest = lightest.min(found);
             }
         }
-        if self.plant.effects.iter().any(Effect::needs_levels) {
-            self.plant.base = self.plant.base.with_one_time_constant();
-        }
-        let wanders = self.plant.effects.iter().any(|e| e.channel().is_some());
-        self.free_stream = wanders || rng.random_bool(0.2);
-        Ok(())
+        Ok(lightest)
     }
 }
 

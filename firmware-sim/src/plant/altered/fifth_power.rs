@@ -25,7 +25,7 @@ impl Physics for FifthPower {
 
     fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
         Self {
-            coefficient: rng.random_range(0.2..0.8),
+            coefficient: rng.random_range(0.3..2.0),
         }
     }
 

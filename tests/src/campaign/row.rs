@@ -1,0 +1,238 @@
+//! What came of a case: one line of JSON.
+
+use serde::{Deserialize, Serialize};
+
+use super::case::Group;
+
+/// A parameter of a hidden effect, as it is and as it was found, in the units of the record.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Found {
+    /// EFFECT.PARAMETER.
+    pub name: String,
+    /// As the rig has it.
+    pub truth: f64,
+    /// As the written model has it.
+    pub found: f64,
+}
+
+/// What came of a case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// The case's key.
+    pub key: String,
+    /// What it is counted under.
+    pub group: Group,
+    /// Name of the family.
+    pub family: String,
+    /// What is hidden, by the plant's names.
+    pub label: String,
+    /// Noise, and nuisances where there are any.
+    pub circumstances: String,
+    /// The names that should be found.
+    pub hidden: Vec<String>,
+    /// Names that would be no error beside them.
+    pub also_right: Vec<String>,
+    /// The verdict, or `failed` with the reason in `failure`.
+    pub verdict: String,
+    /// Why there is no diagnosis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
+    /// The effects named, in their order.
+    pub missing: Vec<String>,
+    /// For each of them, what cannot be told from it.
+    #[serde(default)]
+    pub sets: Vec<Vec<String>>,
+    /// Terms that describe without being named.
+    #[serde(default)]
+    pub stand_ins: Vec<String>,
+    /// Held-out error of the model as given, over the noise floor.
+    pub given_over_floor: Option<f64>,
+    /// Held-out error of the last model, over the noise floor.
+    pub over_floor: Option<f64>,
+    /// Parameters of the effects that were hidden and found.
+    pub parameters: Vec<Found>,
+    /// How long the identification took.
+    pub identify: Spent,
+    /// How long the diagnosis took.
+    pub diagnose: Spent,
+}
+
+/// How long a run of the program took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Spent {
+    /// On the clock (s).
+    pub wall_s: f64,
+    /// Of all its threads (s); none where the system does not tell.
+    pub cpu_s: Option<f64>,
+}
+
+/// A model is at the noise floor up to this factor.
+pub(super) const AT_FLOOR: f64 = 1.1;
+
+/// Parameters are right up to this share of themselves.
+const NEAR: f64 = 0.2;
+
+impl Row {
+    /// The names that count: without those that are true of the rig though nobody hid them.
+    #[must_use]
+    pub fn named(&self) -> Vec<&str> {
+        let names = self.missing.iter().map(String::as_str);
+        let counts = |name: &&str| {
+            let is = |other: &String| other == name;
+            self.hidden.iter().any(is) || !self.also_right.iter().any(is)
+        };
+        names.filter(counts).collect()
+    }
+
+    /// Named though nothing of the kind is there.
+    #[must_use]
+    pub fn needless(&self) -> Vec<&str> {
+        let named = self.named().into_iter();
+        let needless = named.filter(|name| !self.hidden.iter().any(|hidden| hidden == name));
+        needless.collect()
+    }
+
+    /// Whether what was hidden was found: first for one effect, both for two; nothing named for nothing; for
+    /// what the catalogue does not have, nothing named and something left to explain.
+    #[must_use]
+    pub fn is_found(&self) -> bool {
+        if self.failure.is_some() {
+            return false;
+        }
+        let named = self.named();
+        match self.group {
+            Group::Single | Group::Altered | Group::Units => {
+                named.first().copied() == self.hidden.first().map(String::as_str)
+            }
+            Group::Pair => self
+                .hidden
+                .iter()
+                .all(|name| named.contains(&name.as_str())),
+            Group::Nothing => named.is_empty(),
+            Group::Outside => named.is_empty() && self.verdict != "nothing-missing",
+        }
+    }
+
+    /// Found, with nothing needless beside it.
+    #[must_use]
+    pub fn is_right(&self) -> bool {
+        self.is_found() && self.needless().is_empty()
+    }
+
+    /// Found, or in the set that the records cannot tell apart.
+    #[must_use]
+    pub fn is_in_set(&self) -> bool {
+        let mut sets = self.sets.iter().flatten();
+        self.is_found() || sets.any(|name| self.hidden.first() == Some(name))
+    }
+
+    /// Whether the last model is at the noise floor.
+    #[must_use]
+    pub fn is_at_floor(&self) -> bool {
+        self.over_floor.is_some_and(|over| over <= AT_FLOOR)
+    }
+
+    /// Whether all parameters of the hidden effects are right; none where there are none to compare.
+    #[must_use]
+    pub fn parameters_hit(&self) -> Option<bool> {
+        let near = |p: &Found| (p.found - p.truth).abs() <= NEAR * p.truth.abs();
+        (!self.parameters.is_empty()).then(|| self.parameters.iter().all(near))
+    }
+
+    /// What was said, in short.
+    #[must_use]
+    pub fn said(&self) -> String {
+        if let Some(failure) = &self.failure {
+            return failure.clone();
+        }
+        let mut said = match self.verdict.as_str() {
+            "effect-missing" => self.missing.join(" + "),
+            "nothing-missing" => "nothing".to_owned(),
+            other => other.to_owned(),
+        };
+        if !self.stand_ins.is_empty() {
+            said += &format!(" ({})", self.stand_ins.join(" + "));
+        }
+        said
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(group: Group, hidden: &[&str], missing: &[&str]) -> Row {
+        let owned = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect();
+        Row {
+            key: "key".to_owned(),
+            group,
+            family: "wake".to_owned(),
+            label: hidden.join("+"),
+            circumstances: "white".to_owned(),
+            hidden: owned(hidden),
+            also_right: vec!["state-dependent-delay".to_owned()],
+            verdict: "effect-missing".to_owned(),
+            failure: None,
+            missing: owned(missing),
+            sets: Vec::new(),
+            stand_ins: Vec::new(),
+            given_over_floor: Some(3.0),
+            over_floor: Some(1.05),
+            parameters: Vec::new(),
+            identify: Spent::default(),
+            diagnose: Spent {
+                wall_s: 2.0,
+                cpu_s: Some(3.0),
+            },
+        }
+    }
+
+    #[test]
+    fn the_first_name_counts_and_true_names_beside_it_do_not() {
+        let right = row(
+            Group::Single,
+            &["valve-lag"],
+            &["state-dependent-delay", "valve-lag"],
+        );
+        assert!(right.is_right());
+        let late = row(Group::Single, &["valve-lag"], &["echo-path", "valve-lag"]);
+        assert!(!late.is_found());
+        assert_eq!(late.needless(), ["echo-path"]);
+        let mut alike = row(Group::Single, &["valve-lag"], &["hot-film-lag"]);
+        assert!(!alike.is_in_set());
+        alike.sets = vec![vec!["hot-film-lag".to_owned(), "valve-lag".to_owned()]];
+        assert!(alike.is_in_set() && !alike.is_found());
+        assert!(row(Group::Nothing, &[], &["state-dependent-delay"]).is_found());
+        assert!(!row(Group::Nothing, &[], &["echo-path"]).is_found());
+        let hidden = row(
+            Group::Single,
+            &["state-dependent-delay"],
+            &["state-dependent-delay"],
+        );
+        assert!(hidden.is_found() && hidden.is_at_floor());
+    }
+
+    #[test]
+    fn rows_survive_the_file_and_failures_are_no_finds() {
+        let mut failed = row(Group::Nothing, &[], &[]);
+        failed.failure = Some("timed out".to_owned());
+        failed.over_floor = None;
+        let line = serde_json::to_string(&failed).unwrap();
+        assert!(!line.contains('\n'));
+        assert_eq!(serde_json::from_str::<Row>(&line).unwrap(), failed);
+        assert!(!failed.is_found() && !failed.is_at_floor());
+        assert_eq!(failed.said(), "timed out");
+    }
+
+    #[test]
+    fn parameters_are_right_within_a_fifth() {
+        let mut one = row(Group::Single, &["valve-lag"], &["valve-lag"]);
+        assert_eq!(one.parameters_hit(), None);
+        for (found, hit) in [(-0.0119, true), (-0.0121, false), (f64::NAN, false)] {
+            let name = "valve-lag.opening_time".to_owned();
+            let truth = -0.01;
+            one.parameters = vec![Found { name, truth, found }];
+            assert_eq!(one.parameters_hit(), Some(hit));
+        }
+    }
+}

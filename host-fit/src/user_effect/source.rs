@@ -3,7 +3,7 @@
 use super::expression::{Compiler, Fault, Kind, Meaning, Typed};
 use super::program::{Carried, Op, Program, Signal};
 use super::{module_name, type_name};
-use model_core::effect::{Needs, Parameter, Place, RustType, Spec, Starts, Unit};
+use model_core::effect::{Parameter, Place, RustType, Spec, Unit};
 use serde::{Deserialize, Serialize};
 
 /// What an effect file holds, and what a model file keeps of it.
@@ -232,13 +232,9 @@ impl Source {
             summary: keep(&self.summary),
             equation: keep(&self.equation()),
             parameters: Vec::leak(parameters),
-            starts: Starts::Grid,
-            amplitude: None,
             channel: self.channel.as_deref().map(keep),
-            needs: Needs::Nothing,
-            base: false,
-            law: None,
             source: keep(self.reference.as_deref().unwrap_or("the user's own effect")),
+            ..Spec::PLAIN
         }
     }
 

@@ -351,6 +351,25 @@ pub struct Spec {
 }
 
 impl Spec {
+    /// What most cards have in common; an effect's own card says what it is and what differs: its parameters are
+    /// numbers, set out from every combination of their starting values, and need nothing.
+    pub const PLAIN: Self = Self {
+        name: "",
+        rust: "",
+        rust_type: RustType::Numbers,
+        place: Place::Jet,
+        summary: "",
+        equation: "",
+        parameters: &[],
+        starts: Starts::Grid,
+        amplitude: None,
+        channel: None,
+        needs: Needs::Nothing,
+        base: false,
+        law: None,
+        source: "",
+    };
+
     /// The index of the parameter called `name`.
     #[must_use]
     pub fn parameter(&self, name: &str) -> Option<usize> {

@@ -1,8 +1,7 @@
 //! The flow resists large amplitudes: a cubic term, hardening or softening.
 
 use crate::effect::{
-    Amplitude, Effect, Flow, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec,
-    Starts, Unit, take,
+    Amplitude, Effect, Flow, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -29,20 +28,15 @@ impl<T: Real> Physics<T> for AmplitudeSaturation<T> {
     const SPEC: Spec = Spec {
         name: "amplitude-saturation",
         rust: "amplitude_saturation::AmplitudeSaturation",
-        rust_type: RustType::Numbers,
         place: Place::Flow,
         summary: "growth saturates (or stiffens) with amplitude",
         equation: "adds −γ·s³ to the drive",
         parameters: &[
             Parameter::new("cubic", Unit::PerYSquared, [-1000.0, 1000.0], &[0.1]).positive(),
         ],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new("cubic", "an amplitude saturation").linear()),
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "Landau's amplitude equation; Stuart, J. Fluid Mech. 9 (1960)",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], _setting: &Setting<T>) -> Self {

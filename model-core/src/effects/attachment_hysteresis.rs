@@ -1,8 +1,7 @@
 //! Once attached the flow stays attached at a friction at which it would not have attached.
 
 use crate::effect::{
-    Amplitude, Effect, Flow, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec,
-    Starts, Unit, take,
+    Amplitude, Effect, Flow, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -44,7 +43,6 @@ impl<T: Real> Physics<T> for AttachmentHysteresis<T> {
     const SPEC: Spec = Spec {
         name: "attachment-hysteresis",
         rust: "attachment_hysteresis::AttachmentHysteresis",
-        rust_type: RustType::Numbers,
         place: Place::Flow,
         summary: "attachment has memory: it lets go later than it takes hold",
         equation: "relay r: 0→1 when s > θ_hi, 1→0 when s < θ_lo; adds g·r to the drive",
@@ -53,13 +51,9 @@ impl<T: Real> Physics<T> for AttachmentHysteresis<T> {
             Parameter::new("lower_threshold", Unit::Y, [-0.5, 2.0], &[0.15, 0.35]).stepwise(),
             Parameter::new("gain", Unit::Y, [-2.0, 2.0], &[0.15]),
         ],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new("gain", "an attachment hysteresis").linear()),
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "Greenblatt & Wygnanski, Prog. Aerosp. Sci. 36 (2000)",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], _setting: &Setting<T>) -> Self {

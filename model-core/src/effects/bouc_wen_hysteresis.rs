@@ -1,8 +1,7 @@
 //! A smooth hysteresis loop between displacement and restoring force.
 
 use crate::effect::{
-    Amplitude, Effect, Flow, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec,
-    Starts, Unit, take,
+    Amplitude, Effect, Flow, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -48,7 +47,6 @@ impl<T: Real> Physics<T> for BoucWenHysteresis<T> {
     const SPEC: Spec = Spec {
         name: "bouc-wen-hysteresis",
         rust: "bouc_wen_hysteresis::BoucWenHysteresis",
-        rust_type: RustType::Numbers,
         place: Place::Flow,
         summary: "a smooth hysteresis loop in the restoring force",
         equation: "ż = A·ṡ − β·|ṡ|·z − γ·ṡ·|z|; adds −α·z",
@@ -58,17 +56,13 @@ impl<T: Real> Physics<T> for BoucWenHysteresis<T> {
             Parameter::new("gamma", Unit::PerY, [-1000.0, 1000.0], &[0.5]),
             Parameter::new("alpha", Unit::None, [-5.0, 5.0], &[0.3]),
         ],
-        starts: Starts::Grid,
         amplitude: Some(
             Amplitude::new("alpha", "a Bouc–Wen hysteresis")
                 .linear()
                 .said(alpha),
         ),
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "Wen, J. Eng. Mech. Div. 102 (1976)",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], _setting: &Setting<T>) -> Self {

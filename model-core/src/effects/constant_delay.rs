@@ -2,8 +2,7 @@
 
 use crate::delay::Transport;
 use crate::effect::{
-    LawCard, Needs, Parameter, Physics, Place, RustType, Setting, Spec, StartValue, Starts, Unit,
-    take,
+    LawCard, Parameter, Physics, Place, Setting, Spec, StartValue, Starts, Unit, take,
 };
 use crate::real::Real;
 
@@ -32,7 +31,6 @@ impl<T: Real> Physics<T> for ConstantDelay<T> {
     const SPEC: Spec = Spec {
         name: "constant-delay",
         rust: "constant_delay::ConstantDelay",
-        rust_type: RustType::Numbers,
         place: Place::Delay,
         summary: "the delay is the same all the time",
         equation: "h constant",
@@ -43,9 +41,6 @@ impl<T: Real> Physics<T> for ConstantDelay<T> {
             &[40.0],
         )],
         starts: Starts::Rows(&[&[StartValue::Delay(0.0)]]),
-        amplitude: None,
-        channel: None,
-        needs: Needs::Nothing,
         base: true,
         law: Some(LawCard {
             words: "{} samples",
@@ -53,6 +48,7 @@ impl<T: Real> Physics<T> for ConstantDelay<T> {
             ..LawCard::PLAIN
         }),
         source: "Feingesicht et al., ECC 2016, eq. (3)",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], _setting: &Setting<T>) -> Self {

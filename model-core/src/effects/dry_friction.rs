@@ -1,8 +1,7 @@
 //! Coulomb friction: a force against the motion, whatever its speed.
 
 use crate::effect::{
-    Amplitude, Effect, Flow, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec,
-    Starts, Unit, take,
+    Amplitude, Effect, Flow, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -31,7 +30,6 @@ impl<T: Real> Physics<T> for DryFriction<T> {
     const SPEC: Spec = Spec {
         name: "dry-friction",
         rust: "dry_friction::DryFriction",
-        rust_type: RustType::Numbers,
         place: Place::Flow,
         summary: "Coulomb friction acts against the motion",
         equation: "adds −F·sign(s_{k+1} − s_k)",
@@ -41,13 +39,9 @@ impl<T: Real> Physics<T> for DryFriction<T> {
             [0.0, 1.0],
             &[0.001, 0.03, 0.3],
         )],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new("level", "dry friction")),
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "Coulomb friction; Armstrong-Hélouvry et al., Automatica 30 (1994)",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], _setting: &Setting<T>) -> Self {

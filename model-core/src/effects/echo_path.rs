@@ -2,8 +2,7 @@
 
 use crate::delay::Tap;
 use crate::effect::{
-    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
-    Unit, take,
+    Amplitude, Effect, Instant, Parameter, Physics, Place, RustType, Setting, Spec, Unit, take,
 };
 use crate::history::{DelayLine, Memory};
 use crate::real::Real;
@@ -44,13 +43,9 @@ impl<T: Real, const LEN: usize> Physics<T> for EchoPath<T, LEN> {
                 &[0.04, 0.08, 0.14, 0.22, 0.35],
             ),
         ],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new("gain", "an echo of the jet").linear()),
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "a second path of convection or an acoustic reflection",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], setting: &Setting<T>) -> Self {

@@ -3,8 +3,7 @@
 
 use crate::delay::Transport;
 use crate::effect::{
-    LawCard, Needs, Parameter, Physics, Place, RustType, Setting, Spec, StartValue, Starts, Unit,
-    take,
+    LawCard, Needs, Parameter, Physics, Place, Setting, Spec, StartValue, Starts, Unit, take,
 };
 use crate::real::Real;
 
@@ -80,7 +79,6 @@ impl<T: Real> Physics<T> for EdgeDependentDelay<T> {
     const SPEC: Spec = Spec {
         name: "edge-dependent-delay",
         rust: "edge_dependent_delay::EdgeDependentDelay",
-        rust_type: RustType::Numbers,
         place: Place::Delay,
         summary: "rising edges arrive later (or earlier) than falling ones",
         equation: "rising edges arrive after h_r, falling edges after h_f",
@@ -94,16 +92,14 @@ impl<T: Real> Physics<T> for EdgeDependentDelay<T> {
             &[StartValue::Delay(18.0), StartValue::Delay(-18.0)],
             &[StartValue::Delay(1.0), StartValue::Delay(-1.0)],
         ]),
-        amplitude: None,
-        channel: None,
         needs: Needs::OnOffInput,
-        base: false,
         law: Some(LawCard {
             words: "{} after rising, {} after falling edges",
             shapes_command: true,
             ..LawCard::PLAIN
         }),
         source: "Darabi & Wygnanski, J. Fluid Mech. 510 (2004): attachment and separation are different processes",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], setting: &Setting<T>) -> Self {

@@ -1,8 +1,7 @@
 //! The valve's current is seen by the sensor's cable, at once.
 
 use crate::effect::{
-    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
-    Unit, take,
+    Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -25,18 +24,13 @@ impl<T: Real> Physics<T> for ElectricalPickup<T> {
     const SPEC: Spec = Spec {
         name: "electrical-pickup",
         rust: "electrical_pickup::ElectricalPickup",
-        rust_type: RustType::Numbers,
         place: Place::Sensor,
         summary: "the command shows in the reading at once",
         equation: "y = s + g·u",
         parameters: &[Parameter::new("gain", Unit::Y, [-0.5, 0.5], &[0.05])],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new("gain", "an electrical pickup").linear()),
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "common-impedance coupling",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], _setting: &Setting<T>) -> Self {

@@ -1,8 +1,7 @@
 //! The free stream changes, and with it the strength of the jets relative to it.
 
 use crate::effect::{
-    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
-    Unit, take,
+    Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -33,7 +32,6 @@ impl<T: Real> Physics<T> for FreeStreamVariation<T> {
     const SPEC: Spec = Spec {
         name: "free-stream-variation",
         rust: "free_stream_variation::FreeStreamVariation",
-        rust_type: RustType::Numbers,
         place: Place::Jet,
         summary: "the free stream varies during the run",
         equation: "j = v·(1 + g·(U∞/U_ref − 1))",
@@ -43,13 +41,10 @@ impl<T: Real> Physics<T> for FreeStreamVariation<T> {
             [-5.0, 5.0],
             &[-1.0, 1.0],
         )],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new("gain", "a gain of the free stream").linear()),
         channel: Some("u_inf"),
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "momentum coefficient c_mu = ρ_j U_j² A_j/(½ ρ U∞² S)",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], setting: &Setting<T>) -> Self {

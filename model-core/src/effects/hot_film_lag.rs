@@ -1,8 +1,7 @@
 //! The hot-film and its substrate take time to follow the friction.
 
 use crate::effect::{
-    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
-    Unit, take,
+    Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -42,7 +41,6 @@ impl<T: Real> Physics<T> for HotFilmLag<T> {
     const SPEC: Spec = Spec {
         name: "hot-film-lag",
         rust: "hot_film_lag::HotFilmLag",
-        rust_type: RustType::Numbers,
         place: Place::Sensor,
         summary: "the hot-film follows the friction with a lag",
         equation: "τ·ẏ = s − y",
@@ -52,13 +50,9 @@ impl<T: Real> Physics<T> for HotFilmLag<T> {
             [0.002, 2.0],
             &[0.006, 0.03, 0.2],
         )],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new("time_constant", "a lag of the hot film")),
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "Bruun, Hot-wire Anemometry (1995)",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], setting: &Setting<T>) -> Self {

@@ -1,8 +1,6 @@
 //! The hot-film's voltage is not linear in the wall shear stress (King's law).
 
-use crate::effect::{
-    Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts, Unit, take,
-};
+use crate::effect::{Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take};
 use crate::real::Real;
 
 /// E² = 1 + κ·(s + s0)^(1/3); y = (E − E(0))/(E(1) − E(0)). A film cannot tell
@@ -37,7 +35,6 @@ impl<T: Real> Physics<T> for HotFilmNonlinearity<T> {
     const SPEC: Spec = Spec {
         name: "hot-film-nonlinearity",
         rust: "hot_film_nonlinearity::HotFilmNonlinearity",
-        rust_type: RustType::Numbers,
         place: Place::Sensor,
         summary: "the hot-film's voltage follows King's law, not the friction",
         equation: "E² = 1 + κ·(s + s0)^(1/3); y = (E − E(0))/(E(1) − E(0))",
@@ -45,13 +42,8 @@ impl<T: Real> Physics<T> for HotFilmNonlinearity<T> {
             Parameter::new("king_ratio", Unit::None, [0.1, 10.0], &[0.5, 3.0]),
             Parameter::new("king_offset", Unit::Y, [0.01, 1.0], &[0.05, 0.25]),
         ],
-        starts: Starts::Grid,
-        amplitude: None,
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "King, Phil. Trans. A 214 (1914); Bellhouse & Schultz, J. Fluid Mech. 24 (1966)",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], _setting: &Setting<T>) -> Self {

@@ -1,8 +1,6 @@
 //! The jet's effect is not proportional to the command (more than two levels).
 
-use crate::effect::{
-    Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts, Unit, take,
-};
+use crate::effect::{Effect, Instant, Needs, Parameter, Physics, Place, Setting, Spec, Unit, take};
 use crate::real::Real;
 
 /// j = v + g2·v² + g3·v³.
@@ -25,7 +23,6 @@ impl<T: Real> Physics<T> for InputNonlinearity<T> {
     const SPEC: Spec = Spec {
         name: "input-nonlinearity",
         rust: "input_nonlinearity::InputNonlinearity",
-        rust_type: RustType::Numbers,
         place: Place::Jet,
         summary: "the response is not proportional to the input",
         equation: "j = v + g2·v² + g3·v³",
@@ -33,13 +30,9 @@ impl<T: Real> Physics<T> for InputNonlinearity<T> {
             Parameter::new("quadratic", Unit::PerU, [-10.0, 10.0], &[0.1]),
             Parameter::new("cubic", Unit::PerUSquared, [-10.0, 10.0], &[0.1]),
         ],
-        starts: Starts::Grid,
-        amplitude: None,
-        channel: None,
         needs: Needs::GradedInput,
-        base: false,
-        law: None,
         source: "Hammerstein model",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], _setting: &Setting<T>) -> Self {

@@ -266,6 +266,18 @@ mod tests {
         for spec in EFFECTS.iter().chain(LAWS) {
             assert!(!names.contains(&spec.name), "{} is there twice", spec.name);
             names.push(spec.name);
+            let said = [
+                spec.name,
+                spec.rust,
+                spec.summary,
+                spec.equation,
+                spec.source,
+            ];
+            assert!(
+                !said.contains(&"") && !spec.parameters.is_empty(),
+                "{}",
+                spec.name
+            );
             assert_eq!(
                 spec.place == Place::Delay,
                 spec.law.is_some(),

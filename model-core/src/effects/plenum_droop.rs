@@ -1,8 +1,7 @@
 //! The plenum empties while the valve is open and fills again afterwards.
 
 use crate::effect::{
-    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
-    Unit, take,
+    Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -43,7 +42,6 @@ impl<T: Real> Physics<T> for PlenumDroop<T> {
     const SPEC: Spec = Spec {
         name: "plenum-droop",
         rust: "plenum_droop::PlenumDroop",
-        rust_type: RustType::Numbers,
         place: Place::Jet,
         summary: "the supply pressure sinks while blowing",
         equation: "Ṗ = (1 − P)/τ_r − κ·v·P, P(0) = 1; j = v·P",
@@ -56,13 +54,9 @@ impl<T: Real> Physics<T> for PlenumDroop<T> {
             ),
             Parameter::new("depletion_rate", Unit::PerSecond, [0.02, 5.0], &[0.3, 1.5]),
         ],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new("depletion_rate", "a plenum droop").said(loss)),
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "mass balance of an isothermal plenum",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], setting: &Setting<T>) -> Self {

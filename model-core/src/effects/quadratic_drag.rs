@@ -1,8 +1,7 @@
 //! Drag that grows with the square of the speed of change.
 
 use crate::effect::{
-    Amplitude, Effect, Flow, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec,
-    Starts, Unit, take,
+    Amplitude, Effect, Flow, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -34,20 +33,15 @@ impl<T: Real> Physics<T> for QuadraticDrag<T> {
     const SPEC: Spec = Spec {
         name: "quadratic-drag",
         rust: "quadratic_drag::QuadraticDrag",
-        rust_type: RustType::Numbers,
         place: Place::Flow,
         summary: "drag grows with the square of the speed of change",
         equation: "adds −d·(s_{k+1} − s_k)·|s_{k+1} − s_k|",
         parameters: &[
             Parameter::new("coefficient", Unit::SamplesPerY, [-1000.0, 1000.0], &[1.0]).positive(),
         ],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new("coefficient", "quadratic drag")),
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "Morison et al. (1950)",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], _setting: &Setting<T>) -> Self {

@@ -1,6 +1,6 @@
 //! The sensor cannot tell the sign.
 
-use crate::effect::{Effect, Instant, Needs, Physics, Place, RustType, Setting, Spec, Starts};
+use crate::effect::{Effect, Instant, Physics, Place, RustType, Setting, Spec};
 use crate::real::Real;
 
 /// y = |s|.
@@ -25,13 +25,8 @@ impl<T: Real> Physics<T> for RectifyingSensor {
         summary: "the sensor cannot tell the sign",
         equation: "y = |s|",
         parameters: &[],
-        starts: Starts::Grid,
-        amplitude: None,
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "Bruun, Hot-wire Anemometry (1995)",
+        ..Spec::PLAIN
     };
 
     fn new(_parameters: &[T], _setting: &Setting<T>) -> Self {

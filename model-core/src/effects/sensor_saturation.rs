@@ -1,8 +1,7 @@
 //! The sensor or its amplifier has a limited range.
 
 use crate::effect::{
-    Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, StartValue, Starts,
-    Unit, take,
+    Effect, Instant, Parameter, Physics, Place, Setting, Spec, StartValue, Starts, Unit, take,
 };
 use crate::real::Real;
 
@@ -26,7 +25,6 @@ impl<T: Real> Physics<T> for SensorSaturation<T> {
     const SPEC: Spec = Spec {
         name: "sensor-saturation",
         rust: "sensor_saturation::SensorSaturation",
-        rust_type: RustType::Numbers,
         place: Place::Sensor,
         summary: "the sensor has a limited range",
         equation: "y = min(max(s, lo), hi)",
@@ -40,12 +38,8 @@ impl<T: Real> Physics<T> for SensorSaturation<T> {
             &[StartValue::Quantile(0.1), StartValue::Quantile(0.999)],
             &[StartValue::Quantile(0.2), StartValue::Quantile(0.8)],
         ]),
-        amplitude: None,
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "amplifier limits",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], _setting: &Setting<T>) -> Self {

@@ -1,8 +1,7 @@
 //! The jet's front rolls up into a vortex that helps for a while.
 
 use crate::effect::{
-    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
-    Unit, take,
+    Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -48,7 +47,6 @@ impl<T: Real> Physics<T> for StartingVortex<T> {
     const SPEC: Spec = Spec {
         name: "starting-vortex",
         rust: "starting_vortex::StartingVortex",
-        rust_type: RustType::Numbers,
         place: Place::Jet,
         summary: "the jet's front rolls up into a vortex that helps for a while",
         equation: "ẇ = −w/τ + max(dj/dt, 0); the flow receives j + g·w",
@@ -61,13 +59,9 @@ impl<T: Real> Physics<T> for StartingVortex<T> {
                 &[0.008, 0.025, 0.08],
             ),
         ],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new("gain", "a starting vortex").linear()),
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "Glezer, AIAA J. 26 (1988): starting vortex of a jet",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], setting: &Setting<T>) -> Self {

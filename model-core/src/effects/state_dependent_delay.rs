@@ -2,8 +2,7 @@
 
 use crate::delay::Transport;
 use crate::effect::{
-    LawCard, Needs, Parameter, Physics, Place, RustType, Setting, Spec, StartValue, Starts, Unit,
-    take,
+    LawCard, Parameter, Physics, Place, Setting, Spec, StartValue, Starts, Unit, take,
 };
 use crate::real::Real;
 
@@ -46,7 +45,6 @@ impl<T: Real> Physics<T> for StateDependentDelay<T> {
     const SPEC: Spec = Spec {
         name: "state-dependent-delay",
         rust: "state_dependent_delay::StateDependentDelay",
-        rust_type: RustType::Numbers,
         place: Place::Delay,
         summary: "the delay shortens as the flow attaches",
         equation: "h = p0 + p1·exp(−p2·ỹ)",
@@ -77,16 +75,13 @@ impl<T: Real> Physics<T> for StateDependentDelay<T> {
                 StartValue::Number(4.0),
             ],
         ]),
-        amplitude: None,
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
         law: Some(LawCard {
             words: "{} + {}·exp(−{}·ỹ) samples",
             fields: Some(&["floor", "rise", "rate"]),
             ..LawCard::PLAIN
         }),
         source: "Feingesicht et al., ECC 2016, eq. (2)",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], _setting: &Setting<T>) -> Self {

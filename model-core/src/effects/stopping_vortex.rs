@@ -1,8 +1,7 @@
 //! A vortex rolls up after switch-off and the friction undershoots.
 
 use crate::effect::{
-    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
-    Unit, take,
+    Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -48,7 +47,6 @@ impl<T: Real> Physics<T> for StoppingVortex<T> {
     const SPEC: Spec = Spec {
         name: "stopping-vortex",
         rust: "stopping_vortex::StoppingVortex",
-        rust_type: RustType::Numbers,
         place: Place::Jet,
         summary: "a vortex rolls up after switch-off and the friction undershoots",
         equation: "ẇ = −w/τ + max(−dj/dt, 0); the flow receives j − g·w",
@@ -61,13 +59,9 @@ impl<T: Real> Physics<T> for StoppingVortex<T> {
                 &[0.008, 0.025, 0.08],
             ),
         ],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new("gain", "a stopping vortex").linear()),
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "Darabi & Wygnanski, J. Fluid Mech. 510 (2004): separation of a flow after forcing stops",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], setting: &Setting<T>) -> Self {

@@ -1,8 +1,7 @@
 //! The sensor warms up during the record.
 
 use crate::effect::{
-    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
-    Unit, take,
+    Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -31,7 +30,6 @@ impl<T: Real> Physics<T> for ThermalDrift<T> {
     const SPEC: Spec = Spec {
         name: "thermal-drift",
         rust: "thermal_drift::ThermalDrift",
-        rust_type: RustType::Numbers,
         place: Place::Sensor,
         summary: "the reading drifts while the sensor warms up",
         equation: "y = s + A·(1 − exp(−t/τ))",
@@ -44,13 +42,9 @@ impl<T: Real> Physics<T> for ThermalDrift<T> {
                 &[1.5, 5.0, 20.0],
             ),
         ],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new("amplitude", "a thermal drift").linear()),
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "Bruun, Hot-wire Anemometry (1995), ch. 7",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], setting: &Setting<T>) -> Self {

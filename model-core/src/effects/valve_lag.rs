@@ -1,8 +1,7 @@
 //! The valve takes time to open and to close.
 
 use crate::effect::{
-    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
-    Unit, take,
+    Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -35,7 +34,6 @@ impl<T: Real> Physics<T> for ValveLag<T> {
     const SPEC: Spec = Spec {
         name: "valve-lag",
         rust: "valve_lag::ValveLag",
-        rust_type: RustType::Numbers,
         place: Place::Jet,
         summary: "the valve opens and closes gradually",
         equation: "v̇ = (u − v)/τ_o while u > v, (u − v)/τ_c otherwise",
@@ -43,13 +41,9 @@ impl<T: Real> Physics<T> for ValveLag<T> {
             Parameter::new("opening_time", Unit::Second, [0.001, 0.05], &[0.004, 0.015]),
             Parameter::new("closing_time", Unit::Second, [0.001, 0.1], &[0.004, 0.025]),
         ],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new("opening_time", "a lag of the valve").together()),
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "first-order valve model; e.g. Topçu et al., Mechatronics 16 (2006)",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], setting: &Setting<T>) -> Self {

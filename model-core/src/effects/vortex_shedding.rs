@@ -1,8 +1,7 @@
 //! Jets set off the flow's own oscillation, which the sensor sees on top of the friction.
 
 use crate::effect::{
-    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
-    Unit, take,
+    Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -46,7 +45,6 @@ impl<T: Real> Physics<T> for VortexShedding<T> {
     const SPEC: Spec = Spec {
         name: "vortex-shedding",
         rust: "vortex_shedding::VortexShedding",
-        rust_type: RustType::Numbers,
         place: Place::Sensor,
         summary: "the jets excite the shedding, which rings in the friction",
         equation: "q̈ + 2ζω·q̇ + ω²·q = ω²·j(t − h); y gets + g·(q − j(t − h))",
@@ -60,13 +58,9 @@ impl<T: Real> Physics<T> for VortexShedding<T> {
             Parameter::new("damping_ratio", Unit::None, [0.005, 0.95], &[0.05, 0.2]),
             Parameter::new("gain", Unit::Y, [-2.0, 2.0], &[0.15]),
         ],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new("gain", "vortex shedding").linear()),
-        channel: None,
-        needs: Needs::Nothing,
-        base: false,
-        law: None,
         source: "Cattafesta & Sheplak, Annu. Rev. Fluid Mech. 43 (2011)",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], setting: &Setting<T>) -> Self {

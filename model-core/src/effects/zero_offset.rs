@@ -4,8 +4,7 @@
 //! base model, so that nothing else is bent to imitate it.
 
 use crate::effect::{
-    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec, Starts,
-    Unit, take,
+    Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -28,18 +27,14 @@ impl<T: Real> Physics<T> for ZeroOffset<T> {
     const SPEC: Spec = Spec {
         name: "zero-offset",
         rust: "zero_offset::ZeroOffset",
-        rust_type: RustType::Numbers,
         place: Place::Sensor,
         summary: "the sensor does not read 0 where there is no friction gain",
         equation: "y = s + o",
         parameters: &[Parameter::new("level", Unit::Y, [-1e6, 1e6], &[0.0])],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new("level", "an offset of the sensor").linear()),
-        channel: None,
-        needs: Needs::Nothing,
         base: true,
-        law: None,
         source: "calibration: the zero of normalised friction is the natural, separated flow",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], _setting: &Setting<T>) -> Self {

@@ -88,7 +88,7 @@ impl std::fmt::Display for Value {
 /// The rules of one room.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Rulebook {
-    /// The room: a module of this library.
+    /// The room: a module of `host-fit`, or a crate.
     pub room: &'static str,
     /// What its rules decide.
     pub about: String,

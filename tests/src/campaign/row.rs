@@ -32,6 +32,10 @@ pub struct Row {
     pub hidden: Vec<String>,
     /// Names that would be no error beside them.
     pub also_right: Vec<String>,
+    /// Whether the flow has a second lag: nobody can tell a lag of the film from it, so that one in a set with
+    /// `flow-lag` is true. One that is named alone is not.
+    #[serde(default)]
+    pub flow_lag: bool,
     /// The verdict, or `failed` with the reason in `failure`.
     pub verdict: String,
     /// Why there is no diagnosis.
@@ -76,12 +80,16 @@ impl Row {
     /// The names that count: without those that are true of the rig though nobody hid them.
     #[must_use]
     pub fn named(&self) -> Vec<&str> {
-        let names = self.missing.iter().map(String::as_str);
-        let counts = |name: &&str| {
-            let is = |other: &String| other == name;
-            self.hidden.iter().any(is) || !self.also_right.iter().any(is)
+        let has = |names: &[String], name: &str| names.iter().any(|other| other == name);
+        let lag = |name: &str| {
+            let mut sets = self.sets.iter();
+            let own = sets.find(|set| set.first().is_some_and(|first| first == name));
+            self.flow_lag && own.is_some_and(|set| has(set, "flow-lag"))
         };
-        names.filter(counts).collect()
+        let names = self.missing.iter().map(String::as_str);
+        names
+            .filter(|name| has(&self.hidden, name) || !(has(&self.also_right, name) || lag(name)))
+            .collect()
     }
 
     /// Named though nothing of the kind is there.
@@ -171,6 +179,7 @@ mod tests {
             circumstances: "white".to_owned(),
             hidden: owned(hidden),
             also_right: vec!["state-dependent-delay".to_owned()],
+            flow_lag: false,
             verdict: "effect-missing".to_owned(),
             failure: None,
             missing: owned(missing),
@@ -210,6 +219,18 @@ mod tests {
             &["state-dependent-delay"],
         );
         assert!(hidden.is_found() && hidden.is_at_floor());
+    }
+
+    #[test]
+    fn a_lag_of_the_film_is_true_of_a_flow_with_a_second_lag_if_that_is_said() {
+        let mut alone = row(Group::Nothing, &[], &["hot-film-lag"]);
+        alone.flow_lag = true;
+        alone.sets = vec![vec!["hot-film-lag".to_owned()]];
+        assert!(!alone.is_found());
+        alone.sets[0].push("flow-lag".to_owned());
+        assert!(alone.is_found());
+        alone.flow_lag = false;
+        assert!(!alone.is_found());
     }
 
     #[test]

@@ -113,6 +113,7 @@ pub fn run(case: &Case, program: &Program) -> Row {
         circumstances: circumstances.join(", "),
         hidden: Vec::new(),
         also_right: Vec::new(),
+        flow_lag: false,
         verdict: "failed".to_owned(),
         failure: None,
         missing: Vec::new(),
@@ -146,6 +147,10 @@ fn fill(row: &mut Row, case: &Case, program: &Program, folder: &Path) -> Result<
     let owned = |names: Vec<&str>| names.into_iter().map(str::to_owned).collect();
     row.hidden = owned(plan.hidden());
     row.also_right = owned(plan.also_right());
+    row.flow_lag = matches!(
+        plan.plant.character,
+        Character::Inertia { .. } | Character::SecondLag { .. }
+    );
     let inside = |name: &str| folder.join(name).to_string_lossy().into_owned();
     let (data, given, found) = (inside("set"), inside("given.toml"), inside("found.toml"));
     // Of an earlier run.

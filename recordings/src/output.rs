@@ -66,7 +66,7 @@ where
             .and_then(|()| device.flush())
             .map_err(failed);
     }
-    let mut temporary = permissions_of_a_plain_file(tempfile::Builder::new().prefix(".host-fit-"))
+    let mut temporary = permitted(tempfile::Builder::new().prefix(".host-fit-"), 0o666)
         .tempfile_in(parent_of(&target))
         .map_err(failed)?;
     {
@@ -106,7 +106,7 @@ impl Staging {
             Err(e) if e.kind() == io::ErrorKind::NotFound => target.to_path_buf(),
             Err(e) => return Err(failed(e)),
         };
-        let folder = permissions_of_a_plain_folder(tempfile::Builder::new().prefix(".host-fit-"))
+        let folder = permitted(tempfile::Builder::new().prefix(".host-fit-"), 0o777)
             .tempdir_in(parent_of(&real))
             .map_err(failed)?;
         Ok(Self {
@@ -191,25 +191,16 @@ fn parent_of(path: &Path) -> &Path {
     }
 }
 
-/// Temporary files are private by default; an output file has the permissions the user's umask gives.
-fn permissions_of_a_plain_file<'a, 'b>(
+/// Temporary files and folders are private by default; what is put out has the permissions that the user's umask
+/// leaves of `mode`.
+fn permitted<'a, 'b>(
     builder: &'a mut tempfile::Builder<'b, 'b>,
+    #[cfg_attr(not(unix), expect(unused_variables))] mode: u32,
 ) -> &'a mut tempfile::Builder<'b, 'b> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    builder
-}
-
-fn permissions_of_a_plain_folder<'a, 'b>(
-    builder: &'a mut tempfile::Builder<'b, 'b>,
-) -> &'a mut tempfile::Builder<'b, 'b> {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(fs::Permissions::from_mode(0o777));
+        builder.permissions(fs::Permissions::from_mode(mode));
     }
     builder
 }

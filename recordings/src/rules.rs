@@ -62,7 +62,13 @@ impl From<u16> for Value {
 
 impl<const N: usize> From<[u32; N]> for Value {
     fn from(values: [u32; N]) -> Self {
-        Self::List(values.map(f64::from).to_vec())
+        values.map(f64::from).into()
+    }
+}
+
+impl<const N: usize> From<[usize; N]> for Value {
+    fn from(values: [usize; N]) -> Self {
+        values.map(|value| value as f64).into()
     }
 }
 

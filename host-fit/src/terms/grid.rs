@@ -5,13 +5,6 @@ use crate::data::Record;
 use crate::model::Model;
 use model_core::effect::{Facts, Parameter, Spec, StartValue, Starts, Unit};
 
-/// Points along a parameter's range where it is the only one, one of two, of more.
-const POINTS: [usize; 3] = [12, 4, 3];
-/// Points along a range of frequencies: a weakly damped mode is narrow.
-const FREQUENCIES: usize = 28;
-/// Points along a parameter whose range is not logarithmic, between the outer quantiles of y.
-const LEVELS: [f64; 6] = [0.1, 0.25, 0.4, 0.55, 0.7, 0.88];
-
 /// The longest lag that is tried in records of at least `shortest` samples.
 pub(super) fn longest_lag(period_s: f64, shortest: usize) -> u16 {
     let longest = (RULES.longest_lag_s / period_s).round();
@@ -80,7 +73,7 @@ pub(super) fn grid(spec: &Spec, model: &Model, known: &Known) -> Vec<Vec<f64>> {
         .parameters
         .iter()
         .filter(|p| !scales(p) && p.low < p.high);
-    let points = POINTS[free.count().clamp(1, POINTS.len()) - 1];
+    let points = RULES.grid[free.count().clamp(1, RULES.grid.len()) - 1];
     let along = |p: &Parameter| -> Vec<f64> {
         let middle = |starts: &[f64]| starts.get(starts.len() / 2).copied().unwrap_or(p.low);
         if scales(p) {
@@ -88,12 +81,13 @@ pub(super) fn grid(spec: &Spec, model: &Model, known: &Known) -> Vec<Vec<f64>> {
         } else if p.low >= p.high {
             vec![p.low]
         } else if p.unit == Unit::Hertz {
-            logarithmic(p, FREQUENCIES)
+            logarithmic(p, RULES.grid_of_frequencies)
         } else if p.is_logarithmic() {
             logarithmic(p, points)
         } else if p.unit == Unit::Y {
             let (low, high) = (facts.quantile(0.05), facts.quantile(0.95));
-            LEVELS.iter().map(|q| low + q * (high - low)).collect()
+            let levels = RULES.grid_of_levels.iter();
+            levels.map(|q| low + q * (high - low)).collect()
         } else {
             let values = p.starts.iter();
             values
@@ -145,7 +139,7 @@ mod tests {
         for spec in SPECS {
             let grid = grid(spec, &model, &known);
             assert!(
-                (1..=FREQUENCIES * POINTS[1]).contains(&grid.len()),
+                (1..=RULES.grid_of_frequencies * RULES.grid[1]).contains(&grid.len()),
                 "{}: {}",
                 spec.name,
                 grid.len()

@@ -42,4 +42,22 @@ rules! {
     longest_lag_share: f64 = 0.25, "share of a record", "judgement";
     /// Steps between the lags that are screened.
     lag_step: usize = 8, "samples", "a wrong lag of half a step leaves a tenth of what the right one takes";
+
+    /// Points along a parameter's range where it is the only one that is free, one of two, of more …
+    grid: [usize; 3] = [12, 4, 3], "", "judgement";
+    /// … along a range of frequencies: a weakly damped mode is narrow …
+    grid_of_frequencies: usize = 28, "", "judgement";
+    /// … and, for levels of y, between its 5 and 95 % quantiles.
+    grid_of_levels: [f64; 6] = [0.1, 0.25, 0.4, 0.55, 0.7, 0.88], "share of the range", "a grid";
+
+    /// y is of size 1 where this share of all samples is closer to the level of rest than that.
+    full: f64 = 0.995, "share of the samples", "judgement: what is beyond is noise";
+    /// The level of rest is the mean of y before the first blowing, taken in pieces that are independent of each other …
+    quiet_piece: usize = 50, "samples", "judgement";
+    /// … if there are so many of them …
+    quiet_pieces: usize = 5, "pieces", "judgement";
+    /// … and 0 unless it is off by so much.
+    off_zero: f64 = 5.0, "standard errors", "convention";
+    /// Where records do not begin at rest, 0 is the level of rest unless it is further from all of y than this.
+    far: f64 = 1.0, "times the range of y", "judgement";
 }

@@ -12,11 +12,6 @@ use model_core::effects::ZERO_OFFSET;
 
 /// The sample period that cards are written for, s.
 const PERIOD_S: f64 = 0.001;
-/// The share of all samples that lies between the level of rest and a y of 1.
-const FULL: f64 = 0.995;
-/// Where the records do not rest, 0 is taken as the level of rest unless it is
-/// further from all of y than this many times their range.
-const NEAR: f64 = 1.0;
 
 /// What an inner unit is in outer ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +49,9 @@ impl Units {
             .filter(|size| size.is_finite())
             .collect();
         sizes.sort_by(f64::total_cmp);
-        let full = sizes.get((FULL * sizes.len() as f64) as usize).copied();
+        let full = sizes
+            .get((RULES.full * sizes.len() as f64) as usize)
+            .copied();
         let largest = |series: &[f64]| series.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         let u = records.iter().map(|r| largest(&r.u)).fold(0.0, f64::max);
         let or_one = |x: f64| if x > 0.0 && x.is_finite() { x } else { 1.0 };
@@ -178,18 +175,17 @@ fn level_of_rest(records: &[Record]) -> Option<f64> {
     for record in records {
         let blown = record.u.iter().position(|u| *u != 0.0);
         let quiet = &record.y[..blown.unwrap_or(record.len())];
-        // Pieces long enough to be independent of each other.
-        for piece in quiet.chunks_exact(50) {
+        for piece in quiet.chunks_exact(RULES.quiet_piece) {
             pieces.push(piece.iter().sum::<f64>() / piece.len() as f64);
         }
     }
-    let n = pieces.len() as f64;
-    if n < 5.0 {
+    if pieces.len() < RULES.quiet_pieces {
         return None;
     }
+    let n = pieces.len() as f64;
     let mean = pieces.iter().sum::<f64>() / n;
     let variance = pieces.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    let is_off = mean.abs() > 5.0 * (variance / n).sqrt() && mean.abs() > 1e-12;
+    let is_off = mean.abs() > RULES.off_zero * (variance / n).sqrt() && mean.abs() > 1e-12;
     Some(if is_off { mean } else { 0.0 })
 }
 
@@ -199,7 +195,7 @@ fn far_level(records: &[Record]) -> f64 {
     let low = all().fold(f64::INFINITY, f64::min);
     let high = all().fold(f64::NEG_INFINITY, f64::max);
     let range = high - low;
-    if low - NEAR * range > 0.0 || high + NEAR * range < 0.0 {
+    if low - RULES.far * range > 0.0 || high + RULES.far * range < 0.0 {
         all().sum::<f64>() / all().count().max(1) as f64
     } else {
         0.0

@@ -15,6 +15,14 @@ pub struct Found {
     pub found: f64,
 }
 
+impl Found {
+    /// Whether it is right.
+    #[must_use]
+    pub fn is_near(&self) -> bool {
+        (self.found - self.truth).abs() <= NEAR * self.truth.abs()
+    }
+}
+
 /// What came of a case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
@@ -143,8 +151,7 @@ impl Row {
     /// Whether all parameters of the hidden effects are right; none where there are none to compare.
     #[must_use]
     pub fn parameters_hit(&self) -> Option<bool> {
-        let near = |p: &Found| (p.found - p.truth).abs() <= NEAR * p.truth.abs();
-        (!self.parameters.is_empty()).then(|| self.parameters.iter().all(near))
+        (!self.parameters.is_empty()).then(|| self.parameters.iter().all(Found::is_near))
     }
 
     /// What was said, in short.

@@ -134,6 +134,7 @@ pub fn run(case: &Case, program: &Program) -> Row {
     };
     row.failure = outcome.err();
     if row.is_right()
+        && row.parameters_hit() != Some(false)
         && let Some(folder) = &kept
     {
         // What stays is looked at by people; a folder too many does no harm.

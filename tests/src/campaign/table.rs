@@ -58,7 +58,11 @@ pub fn table(rows: &[Row]) -> String {
             let over = row
                 .over_floor
                 .map_or(String::new(), |o| format!(", {o:.2} x floor"));
-            let _ = writeln!(text, "- `{}`: {}{over}", row.key, row.said());
+            let off: Vec<String> = (row.parameters.iter().filter(|p| !p.is_near()))
+                .map(|p| format!(", {} {:.4} instead of {:.4}", p.name, p.found, p.truth))
+                .collect();
+            let off = off.concat();
+            let _ = writeln!(text, "- `{}`: {}{over}{off}", row.key, row.said());
         }
     }
     text

@@ -247,7 +247,8 @@ impl RigPlan {
         let before = self.instrument.repeats as f64;
         if self.weight < 1.0 {
             let needed = (before / (self.weight * self.weight)).ceil();
-            self.instrument.repeats = (needed as usize).min(MOST_REPEATS);
+            // Of what weighs nothing, infinitely many.
+            self.instrument.repeats = needed.min(MOST_REPEATS as f64) as usize;
             self.weight *= (self.instrument.repeats as f64 / before).sqrt();
         }
     }
@@ -464,6 +465,22 @@ mod tests {
             );
             assert!(plan.answer().contains(name), "{name}");
             Rig::new(&plan.plant, None).unwrap();
+        }
+    }
+
+    /// An echo of the other sign drives the flow below rest.
+    #[test]
+    fn no_flow_runs_away() {
+        let draw = |seed| {
+            let family = Family::RateOfY;
+            RigPlan::draw(family, &["echo-path"], NoiseKind::Coloured, &[], seed).unwrap()
+        };
+        for seed in [900_000_103, 1, 2] {
+            let plan = draw(seed);
+            assert!(plan.weight >= 1.0);
+            let readings = plan.build().unwrap().noise_free;
+            let mut readings = readings.iter().flatten();
+            assert!(readings.all(|y| (-1.0..3.0).contains(y)), "{seed}");
         }
     }
 

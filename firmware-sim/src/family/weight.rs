@@ -1,5 +1,7 @@
 //! Whether an effect matters: what no change of the flow imitates, against the noise.
 
+use std::ops::RangeInclusive;
+
 use crate::plant::{BasePlant, FlowDelay, FreeStream, PlantError, PlantSpec, Rig, SAMPLE_PERIOD_S};
 
 /// An effect should change the readings by this many standard errors …
@@ -12,6 +14,10 @@ const OWN: f64 = 1.2;
 /// … and by this many, after the flow has been given a memory of any length too: without the effect, the
 /// best base is then left at √(1 + 0.6²) = 1.17 times the noise floor.
 const BEYOND_MEMORY: f64 = 0.6;
+
+/// Where readings have to stay (y), with room for noise inside the converter's −1 … 3: a rig with an effect that
+/// drives it out of there is not taken.
+const POSSIBLE: RangeInclusive<f64> = -0.8..=2.8;
 
 /// How far the flow's constants are moved to see what they do, relative.
 const STEP: f64 = 0.02;
@@ -80,6 +86,10 @@ impl Weight {
     /// At least 1 if what `with` has more than the bare plant matters.
     pub(super) fn of(&self, with: &PlantSpec) -> Result<f64, PlantError> {
         let mut change = self.change(with)?;
+        let mut readings = change.iter().zip(&self.before).map(|(d, y)| d + y);
+        if !readings.all(|y| POSSIBLE.contains(&y)) {
+            return Ok(0.0);
+        }
         let total = rms(&change);
         take_away(&self.constants, &mut change);
         let own = rms(&change);
@@ -203,6 +213,10 @@ mod tests {
             ..bare.clone()
         };
         assert!(weight.of(&with).unwrap() > 1.0);
+        // What runs away is none.
+        let mut away = bare.clone();
+        away.base.gain *= 4.0;
+        assert_eq!(weight.of(&away).unwrap(), 0.0);
         // A memory that changes the readings by several standard errors is no effect.
         let with = PlantSpec {
             character: Character::Memory(vec![PastTerm::new(0.2, -0.06, 0.1)]),

@@ -104,10 +104,11 @@ impl Character {
         }
     }
 
-    /// The factor of the separation rate at friction `s`.
+    /// The factor of the separation rate at friction `s`. A flow that is driven below rest goes back at the
+    /// rate of rest: if it slowed down there, it would run away.
     pub(crate) fn separation(&self, s: f64) -> f64 {
         match self {
-            Self::RateOfFriction { slope } => (1.0 + slope * s).max(SLOWEST),
+            Self::RateOfFriction { slope } => (1.0 + slope * s.max(0.0)).max(SLOWEST),
             _ => 1.0,
         }
     }

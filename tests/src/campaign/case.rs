@@ -56,7 +56,8 @@ impl Group {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Given {
-    /// What `identify` makes of the data with its defaults.
+    /// What `identify` makes of the data with its defaults; with fixed delays where a delay law is hidden, which
+    /// would not be missing otherwise.
     Default,
     /// One lag of each kind, identified.
     Lean,

@@ -225,15 +225,19 @@ fn compare(plan: &RigPlan, model: &Model) -> Vec<Found> {
 
 /// Options of `identify` for the model that is handed in.
 fn structure(given: Given, plan: &RigPlan) -> Vec<String> {
+    let hidden = plan.hidden();
     let lags = match (given, &plan.plant.character) {
         (Given::Truth, Character::Memory(terms)) => 1 + terms.len(),
         (Given::Truth, Character::Inertia { .. } | Character::SecondLag { .. }) => 2,
         (Given::Truth, Character::Wake { .. }) => 2,
         (Given::Truth, Character::FirstOrder | Character::RateOfFriction { .. })
         | (Given::Lean, _) => 1,
+        // A law that `identify` has found is not missing: what hides one is asked with fixed delays.
+        (Given::Default, _) if hidden.contains(&"state-dependent-delay") => {
+            return ["--delay", "fixed"].map(str::to_owned).to_vec();
+        }
         (Given::Default | Given::Guess | Given::BadDelays, _) => return Vec::new(),
     };
-    let hidden = plan.hidden();
     let delay = match plan.plant.delay() {
         FlowDelay::StateDependent { .. } | FlowDelay::Clamped { .. }
             if !hidden.contains(&"state-dependent-delay") =>

@@ -288,7 +288,7 @@ pub fn diagnose(
         return Ok(diagnosis);
     }
     progress("the leanest model");
-    let (root, step) = if mid_run && given.start == Start::Measured {
+    let (root, step) = if mid_run && given.start == Start::Measured && !judge.on_off {
         // Rigs that are no blown ramp: their dynamics is the user's choice of lags.
         session.root_of_given(&given_inside, &as_given)?
     } else {

@@ -51,8 +51,10 @@ pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) 
         let name = match &candidate.term {
             Term::Effect { spec, .. } => spec.name.to_owned(),
             Term::Memory(_) => FLOW_MEMORY.to_owned(),
-            Term::Inertia => FLOW_LAG.to_owned(),
-            Term::State(_) | Term::Product(_) | Term::Offset => continue,
+            Term::Inertia(_) => FLOW_LAG.to_owned(),
+            Term::State(_) | Term::Product(_) | Term::Offset | Term::LevelRate => {
+                continue;
+            }
         };
         if !best.iter().any(|(met, _)| *met == name) {
             best.push((name, candidate));

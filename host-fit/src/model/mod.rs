@@ -23,8 +23,8 @@ pub use rules::{RULES, Rules};
 
 use crate::user_effect::Definition;
 use model_core::average::WINDOW;
-use model_core::effect::{Place, Spec};
-use model_core::effects::{ConstantDelay, SPECS, ZERO_OFFSET};
+use model_core::effect::{Place, Spec, Unit};
+use model_core::effects::{ConstantDelay, NUISANCES, SPECS};
 use model_core::model::Averaging;
 use model_core::recursion::{Grading, LagConvention};
 use serde::{Deserialize, Serialize};
@@ -206,12 +206,12 @@ impl Model {
         SPECS.iter().chain(own)
     }
 
-    /// Everything that the model could have: the candidates, and the sensor's zero.
+    /// Everything that the model could have: the candidates, and the nuisances.
     fn known(&self) -> impl Iterator<Item = &'static Spec> {
-        self.candidates().chain([ZERO_OFFSET])
+        self.candidates().chain(NUISANCES)
     }
 
-    /// The effect called `name`: of the catalogue, the user's own, or the sensor's zero.
+    /// The effect called `name`: of the catalogue, the user's own, or a nuisance.
     #[must_use]
     pub fn spec(&self, name: &str) -> Option<&'static Spec> {
         self.known().find(|spec| spec.name == name)
@@ -286,6 +286,30 @@ impl Model {
                 let first = f64::from(delays.first().copied().unwrap_or(0));
                 let factors = self.delay.factors();
                 self.delay = Delay::of::<ConstantDelay<f64>>(&[first], factors, true);
+            }
+        }
+    }
+
+    /// Makes all delays longer by so many samples, or shorter, in as far as a law has
+    /// a level.
+    pub(crate) fn delay_later(&mut self, samples: f64) {
+        match &mut self.delay {
+            Delay::Fixed { delays } => {
+                let later = |h: &u16| (f64::from(*h) + samples).round().clamp(0.0, 65_535.0) as u16;
+                *delays = delays.iter().map(later).collect();
+            }
+            Delay::Law(law) => {
+                let by = |unit: Unit| match unit {
+                    Unit::Samples => Some(samples),
+                    Unit::Second => Some(samples * self.sample_period_s),
+                    _ => None,
+                };
+                if let Some((level, card)) =
+                    law.parameters.iter_mut().zip(law.spec.parameters).next()
+                    && let Some(by) = by(card.unit)
+                {
+                    *level = (*level + by).clamp(card.low, card.high);
+                }
             }
         }
     }

@@ -34,7 +34,7 @@ rules! {
     head_start: usize = 2, "parameters", "a memory costs three, an effect one to four";
     /// A record begins at rest if the mean of so many first samples …
     beginning: usize = 20, "samples", "judgement: as long as a fast flow takes";
-    /// … is no further from the level of rest than this, and the command is off.
+    /// … is no further from the level of rest than this: a command that is on from the first sample arrives later.
     at_rest: f64 = 0.1, "size of y", "the noise of 20 samples is 0.01 at most in any set at hand";
     /// Longest lag that is tried …
     longest_lag_s: f64 = 0.5, "s at 1 kHz", "the paper's lags";

@@ -20,7 +20,7 @@ use crate::fit::sensitivities;
 use crate::linalg::{dot, solve_symmetric};
 use crate::model::{Delay, Model};
 use model_core::effect::{Place, Sign, Spec};
-use model_core::effects::ZERO_OFFSET;
+use model_core::effects::{LEVEL_RATE, ZERO_OFFSET};
 use model_core::recursion::Grading;
 use rayon::prelude::*;
 
@@ -42,13 +42,19 @@ const APART: i32 = 20;
 /// Single candidates from which pairs are made.
 const PAIRED: usize = 24;
 /// Lags that are screened below the regular steps.
-const SHORT_LAGS: [u16; 7] = [2, 3, 5, 8, 12, 16, 20];
+const SHORT_LAGS: [u16; 6] = [3, 5, 8, 12, 16, 20];
+/// Second lags of the flow that are screened, samples.
+const SERIES: [f64; 6] = [1.5, 3.0, 6.0, 12.0, 24.0, 48.0];
+/// Change of the rate with the level by which its effect is seen.
+const SLOPE: f64 = 0.1;
 /// Lags whose derivatives are carried by one run, two each.
 const LAGS_AT_ONCE: usize = 4;
 /// Samples by which a lag is moved to see where it should be.
 const PROBE: u16 = 2;
 /// Longest move of a lag at a time.
 const LONGEST_MOVE: f64 = 12.0;
+/// What is not proportional must be wanted at least this many times.
+const SOME: f64 = 0.1;
 /// Share of the error that moving a lag must take.
 const WORTH_MOVING: f64 = 2e-4;
 
@@ -263,18 +269,27 @@ impl<'a> Screen<'a> {
         Some((scale, share(before, own), share(after, other)))
     }
 
-    /// By how many samples a lag should move, to first order; 0 where it is right.
+    /// By how many samples the lag of each term should move, to first order; 0 where
+    /// it is right, or the term has none.
     #[must_use]
-    pub fn move_of(&self, term: &Term) -> i32 {
-        let step = || {
-            let lag = term.lag()?;
-            let mut column = self.change(&term.moved_in(self.model, lag + PROBE)?)?;
+    pub fn moves_of(&self, terms: &[Term]) -> Vec<i32> {
+        let probed = terms.par_iter().enumerate().filter_map(|(index, term)| {
+            let mut column = self.change(&term.moved_in(self.model, term.lag()? + PROBE)?)?;
             self.residualise(&mut column);
-            let (scale, left, _) = self.regress(&[&column])?;
-            let step = (scale[0] * f64::from(PROBE)).clamp(-LONGEST_MOVE, LONGEST_MOVE);
-            (1.0 - left > WORTH_MOVING).then_some(step.round() as i32)
-        };
-        step().unwrap_or(0)
+            Some((index, column))
+        });
+        let (indices, columns): (Vec<usize>, Vec<Vec<f64>>) = probed.collect();
+        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let mut moves = vec![0; terms.len()];
+        if let Some((scales, left, _)) = self.regress(&columns)
+            && 1.0 - left > WORTH_MOVING
+        {
+            for (index, scale) in indices.into_iter().zip(scales) {
+                let step = (scale * f64::from(PROBE)).clamp(-LONGEST_MOVE, LONGEST_MOVE);
+                moves[index] = step.round() as i32;
+            }
+        }
+        moves
     }
 
     fn lags(&self) -> Vec<u16> {
@@ -323,6 +338,35 @@ impl<'a> Screen<'a> {
         each.flatten().collect()
     }
 
+    /// Changes by a second lag of the flow.
+    fn series(&self) -> Vec<(Term, Vec<f64>)> {
+        let order = |lags: &[u16]| lags.contains(&1) && !lags.contains(&2);
+        if !order(&self.model.state_lags) {
+            return Vec::new();
+        }
+        let changes = SERIES.into_par_iter().filter_map(|samples| {
+            let term = Term::Inertia(samples);
+            let mut column = self.change(&term.added_to(self.model, &[]))?;
+            self.residualise(&mut column);
+            Some((term, column))
+        });
+        changes.collect()
+    }
+
+    /// Changes by a rate that depends on the level, without jets and under them.
+    fn level_rate(&self) -> Option<[Vec<f64>; 2]> {
+        if self.model.effects.iter().any(|e| e.name == LEVEL_RATE.name) {
+            return None;
+        }
+        let of = |slopes: [f64; 2]| {
+            let mut column = self.change(&Term::LevelRate.added_to(self.model, &slopes))?;
+            column.iter_mut().for_each(|x| *x /= SLOPE);
+            self.residualise(&mut column);
+            Some(column)
+        };
+        Some([of([SLOPE, 0.0])?, of([0.0, SLOPE])?])
+    }
+
     /// The model's lags and the sensor's zero, with what each takes alone.
     fn base_candidates(&self, columns: &mut Vec<Vec<f64>>) -> Vec<Candidate> {
         let mut all: Vec<(Term, Vec<usize>)> = Vec::new();
@@ -330,13 +374,18 @@ impl<'a> Screen<'a> {
             let at = columns.len();
             columns.push(state);
             columns.push(product);
-            if lag == 2 {
-                all.push((Term::Inertia, vec![at, at + 1]));
-            } else {
-                all.push((Term::Memory(lag), vec![at, at + 1]));
-                all.push((Term::State(lag), vec![at]));
-                all.push((Term::Product(lag), vec![at + 1]));
-            }
+            all.push((Term::Memory(lag), vec![at, at + 1]));
+            all.push((Term::State(lag), vec![at]));
+            all.push((Term::Product(lag), vec![at + 1]));
+        }
+        for (term, column) in self.series() {
+            all.push((term, vec![columns.len()]));
+            columns.push(column);
+        }
+        if let Some([separating, attaching]) = self.level_rate() {
+            all.push((Term::LevelRate, vec![columns.len(), columns.len() + 1]));
+            columns.push(separating);
+            columns.push(attaching);
         }
         let has_zero = self
             .model
@@ -354,8 +403,8 @@ impl<'a> Screen<'a> {
             .into_iter()
             .filter_map(|(term, own)| {
                 let chosen: Vec<&[f64]> = own.iter().map(|i| columns[*i].as_slice()).collect();
-                let (_, learned, held_out) = self.regress(&chosen)?;
-                Some(Candidate {
+                let (scale, learned, held_out) = self.regress(&chosen)?;
+                Self::is_feasible(&term, scale[0]).then_some(Candidate {
                     term,
                     learned: 1.0 - learned,
                     held_out: 1.0 - held_out,
@@ -420,11 +469,12 @@ impl<'a> Screen<'a> {
 
     /// Whether so many times its change makes sense for a term.
     fn is_feasible(term: &Term, scale: f64) -> bool {
-        let Term::Effect {
-            spec, parameters, ..
-        } = term
-        else {
-            return true;
+        let (spec, parameters) = match term {
+            Term::Effect {
+                spec, parameters, ..
+            } => (spec, parameters),
+            Term::Inertia(_) => return scale > SOME,
+            _ => return true,
         };
         let linear = spec.amplitude.filter(|amplitude| amplitude.linear);
         match linear.and_then(|amplitude| spec.parameter(amplitude.parameter)) {
@@ -433,7 +483,7 @@ impl<'a> Screen<'a> {
                 physical || parameters[index] * scale >= 0.0
             }
             // What is not proportional keeps its direction, and some of its size.
-            None => spec.parameters.is_empty() || scale > 0.1,
+            None => spec.parameters.is_empty() || scale > SOME,
         }
     }
 
@@ -624,7 +674,7 @@ impl<'a> Screen<'a> {
 }
 
 /// Whether the model has an effect on the jet: it has a response to part jets then.
-fn has_jet_effect(model: &Model) -> bool {
+pub(super) fn has_jet_effect(model: &Model) -> bool {
     let places = model.effects.iter().filter_map(|e| model.spec(&e.name));
     places.into_iter().any(|spec| spec.place == Place::Jet)
 }

@@ -4,11 +4,12 @@ use super::RULES;
 use super::evidence::p_value;
 use super::grid::{Known, longest_lag};
 use super::judge::{Judge, Judged};
-use super::screen::{GRADINGS, Proposal, Screen};
+use super::screen::{GRADINGS, Proposal, Screen, has_jet_effect};
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit, lean_base, settle_fixed_delay};
 use crate::model::{Model, Start};
 use crate::simulate::SimulateError;
+use model_core::effects::NUISANCES;
 use rayon::prelude::*;
 use std::cmp::Ordering;
 use std::sync::atomic::{AtomicBool, Ordering as Memory};
@@ -124,7 +125,9 @@ impl Search<'_> {
         let learning = self.judge.learning(0);
         let mut bare = given.clone();
         // What was added before stays: the question is what is missing still.
-        let kept = std::mem::take(&mut bare.effects);
+        // Nuisances have to earn their place again.
+        let mut kept = std::mem::take(&mut bare.effects);
+        kept.retain(|added| NUISANCES.iter().all(|spec| spec.name != added.name));
         let mut model = lean_base(&bare, &learning)?.model;
         model.delay_between_samples();
         model.effects = kept;
@@ -187,7 +190,8 @@ impl Search<'_> {
             for (index, proposal) in &pool {
                 tried.push(signature(&all[*index].terms, &proposal.terms));
             }
-            let finished = self.refitted(&all, &pool);
+            let mut finished = self.refitted(&all, &pool);
+            finished.extend(self.regraded(&finished));
             all.extend(finished);
             let after = all[best(&all, |_| true)].score();
             if after > before - RULES.price {
@@ -324,6 +328,40 @@ impl Search<'_> {
         finished.into_iter().flatten().collect()
     }
 
+    /// The best of `finished` with another response to jets of part strength, if that
+    /// is better: it shows only once effects make such jets.
+    fn regraded(&self, finished: &[Hypothesis]) -> Option<Hypothesis> {
+        let leader = finished.get(best(finished, |_| true))?;
+        let model = leader.judged.model();
+        let part = !self.judge.on_off || has_jet_effect(model);
+        if !part || self.over(leader) <= RULES.near_the_floor || self.interrupted() {
+            return None;
+        }
+        let learning = self.judge.learning(0);
+        let others = GRADINGS.into_par_iter().filter(|g| *g != model.grading);
+        let fits = others.filter_map(|grading| {
+            let other = Model {
+                grading,
+                ..model.clone()
+            };
+            let options = FitOptions {
+                iterations: RULES.brief,
+                ..self.judge.options_for(&other)
+            };
+            fit(&other, &learning, &options).ok()
+        });
+        let fits: Vec<Fit> = fits.collect();
+        let least = fits
+            .into_iter()
+            .min_by(|a, b| a.mean_square().total_cmp(&b.mean_square()))?;
+        if least.mean_square() >= leader.judged.fits[0].mean_square() {
+            return None;
+        }
+        let graded = |term: &Term| term.with_grading(least.model.grading);
+        let terms = leader.terms.iter().map(graded).collect();
+        self.finish(terms, least)
+    }
+
     /// The fit of a proposal from where the screening puts it.
     pub(crate) fn set_out(
         &self,
@@ -363,42 +401,57 @@ impl Search<'_> {
         })
     }
 
-    /// Moves lags to where they leave least, by steps of Gauss and Newton.
+    /// Moves all lags to where they leave least, by steps of Gauss and Newton; a step
+    /// that does not lower the error is halved.
     fn settle_lags(&self, mut current: Fit, terms: &mut [Term]) -> Fit {
         let learning = self.judge.learning(0);
         let shortest = learning.iter().map(|r| r.len()).min().unwrap_or(0);
         let longest = longest_lag(current.model.sample_period_s, shortest);
         for _ in 0..LAG_ROUNDS {
-            let mut moved = false;
-            for term in terms.iter_mut() {
-                let Some(old) = term.lag() else { continue };
-                let step = match Screen::new(self.judge, &current.model) {
-                    Some(screen) => screen.move_of(term),
-                    None => return current,
-                };
-                let lag = (i32::from(old) + step).clamp(3, longest.into()) as u16;
-                let Some(model) = term.moved_in(&current.model, lag) else {
-                    continue;
-                };
-                let options = FitOptions {
-                    iterations: LAG_STEPS,
-                    ..self.judge.options_for(&model)
-                };
-                let fitted = fit(&model, &learning, &options);
-                let better = fitted.ok().filter(|fitted| {
-                    fitted.mean_square() < current.mean_square() * (1.0 - LAG_GAIN)
-                });
-                if let Some(fitted) = better {
-                    current = fitted;
-                    *term = term.with_lag(lag);
-                    moved = true;
-                }
+            let Some(screen) = Screen::new(self.judge, &current.model) else {
+                return current;
+            };
+            let mut steps = screen.moves_of(terms);
+            drop(screen);
+            let mut better = None;
+            while better.is_none() && steps.iter().any(|step| *step != 0) && !self.interrupted() {
+                better = self.moved(&current, terms, &steps, longest);
+                steps.iter_mut().for_each(|step| *step /= 2);
             }
-            if !moved || self.interrupted() {
-                break;
-            }
+            let Some((fitted, moved)) = better else {
+                return current;
+            };
+            current = fitted;
+            terms.clone_from_slice(&moved);
         }
         current
+    }
+
+    /// A fit with its lags moved, if that lowers the error.
+    fn moved(
+        &self,
+        current: &Fit,
+        terms: &[Term],
+        steps: &[i32],
+        longest: u16,
+    ) -> Option<(Fit, Vec<Term>)> {
+        let mut model = current.model.clone();
+        let mut moved = terms.to_vec();
+        for (term, step) in moved.iter_mut().zip(steps) {
+            let Some(old) = term.lag() else { continue };
+            let lag = (i32::from(old) + step).clamp(3, longest.into()) as u16;
+            if let Some(other) = term.moved_in(&model, lag) {
+                model = other;
+                *term = term.with_lag(lag);
+            }
+        }
+        let options = FitOptions {
+            iterations: LAG_STEPS,
+            ..self.judge.options_for(&model)
+        };
+        let fitted = fit(&model, &self.judge.learning(0), &options).ok()?;
+        let least = current.mean_square() * (1.0 - LAG_GAIN);
+        (fitted.mean_square() < least).then_some((fitted, moved))
     }
 
     /// A hypothesis refitted without one of its terms.

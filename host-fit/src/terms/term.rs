@@ -2,7 +2,7 @@
 
 use crate::model::Model;
 use model_core::effect::{Place, Spec};
-use model_core::effects::ZERO_OFFSET;
+use model_core::effects::{LEVEL_RATE, ZERO_OFFSET};
 use model_core::recursion::Grading;
 
 /// An addition to a model.
@@ -14,8 +14,10 @@ pub enum Term {
     State(u16),
     /// Times the arriving jet.
     Product(u16),
-    /// A flow of second order: lags of two samples.
-    Inertia,
+    /// A flow of second order, from a second lag of so many samples in series.
+    Inertia(f64),
+    /// The rate of the flow depends on its level, which is no missing physics.
+    LevelRate,
     /// The sensor's zero, which is no missing physics.
     Offset,
     /// A physical effect, with the values from which it is fitted.
@@ -61,12 +63,22 @@ impl Term {
         }
     }
 
+    /// The same with jets of part strength taken otherwise.
+    #[must_use]
+    pub fn with_grading(&self, grading: Grading) -> Self {
+        let mut other = self.clone();
+        if let Self::Effect { grading: own, .. } = &mut other {
+            *own = grading;
+        }
+        other
+    }
+
     /// What it costs: the parameters that are fitted and the places that are searched.
     #[must_use]
     pub fn cost(&self) -> usize {
         match self {
             Self::Memory(_) => 3,
-            Self::State(_) | Self::Product(_) | Self::Inertia => 2,
+            Self::State(_) | Self::Product(_) | Self::Inertia(_) | Self::LevelRate => 2,
             Self::Offset => 1,
             Self::Effect { spec, .. } => spec.parameters.iter().filter(|p| p.low < p.high).count(),
         }
@@ -79,7 +91,8 @@ impl Term {
             Self::Memory(lag) => format!("memory of {lag} samples"),
             Self::State(lag) => format!("lag of {lag} samples"),
             Self::Product(lag) => format!("lag of {lag} samples under the jet"),
-            Self::Inertia => "second order".to_owned(),
+            Self::Inertia(_) => "second order".to_owned(),
+            Self::LevelRate => LEVEL_RATE.name.to_owned(),
             Self::Offset => ZERO_OFFSET.name.to_owned(),
             Self::Effect { spec, .. } => spec.name.to_owned(),
         }
@@ -99,19 +112,11 @@ impl Term {
     }
 
     fn reads_states(&self) -> bool {
-        matches!(self, Self::Memory(_) | Self::State(_) | Self::Inertia)
+        matches!(self, Self::Memory(_) | Self::State(_))
     }
 
     fn reads_products(&self) -> bool {
-        matches!(self, Self::Memory(_) | Self::Product(_) | Self::Inertia)
-    }
-
-    /// The lag it reads in the recursion.
-    fn place(&self) -> Option<u16> {
-        match self {
-            Self::Inertia => Some(2),
-            term => term.lag(),
-        }
+        matches!(self, Self::Memory(_) | Self::Product(_))
     }
 
     /// The model with it. Coefficients of new lags are `coefficients`, one for each
@@ -133,8 +138,17 @@ impl Term {
                 let level = coefficients.first().copied().unwrap_or(0.0);
                 model.add(ZERO_OFFSET, &[level], None);
             }
+            Self::LevelRate => {
+                let slope = |i: usize| {
+                    let range = &LEVEL_RATE.parameters[i];
+                    let slope = coefficients.get(i).copied().unwrap_or(0.0);
+                    slope.clamp(range.low, range.high)
+                };
+                model.add(LEVEL_RATE, &[slope(0), slope(1)], None);
+            }
+            Self::Inertia(samples) => in_series(&mut model, *samples),
             lags => {
-                let Some(lag) = lags.place() else {
+                let Some(lag) = lags.lag() else {
                     return model;
                 };
                 let mut given = coefficients.iter().copied();
@@ -167,8 +181,10 @@ impl Term {
             }
             Self::Effect { spec, .. } => model.effects.retain(|e| e.name != spec.name),
             Self::Offset => model.effects.retain(|e| e.name != ZERO_OFFSET.name),
+            Self::LevelRate => model.effects.retain(|e| e.name != LEVEL_RATE.name),
+            Self::Inertia(_) => out_of_series(&mut model),
             lags => {
-                let of = |all: &[u16]| all.iter().position(|lag| Some(*lag) == lags.place());
+                let of = |all: &[u16]| all.iter().position(|lag| Some(*lag) == lags.lag());
                 if lags.reads_states()
                     && let Some(i) = of(&model.state_lags)
                 {
@@ -211,6 +227,91 @@ impl Term {
     }
 }
 
+/// The newest lag, and the one before.
+const NEWEST: u16 = 1;
+const BEFORE: u16 = 2;
+
+/// Puts a first-order lag of so many samples behind the flow; its delay moves into
+/// the second order.
+///
+/// With z the flow as it was and y_k = (1 − α) y_{k−1} + α z_k, the newest lag's terms
+/// become those of two lags, exactly; memories change slowly and are scaled by α.
+fn in_series(model: &mut Model, samples: f64) {
+    let keep = (-1.0 / samples).exp();
+    let newest = |lags: &[u16]| lags.iter().position(|lag| *lag == NEWEST);
+    let Some(first) = newest(&model.state_lags).filter(|_| !model.state_lags.contains(&BEFORE))
+    else {
+        return;
+    };
+    let scale = 1.0 - keep;
+    let slow = model.a[first];
+    model.a.iter_mut().for_each(|a| *a *= scale);
+    model.a[first] = slow + keep;
+    model.state_lags.push(BEFORE);
+    model.a.push(-slow * keep);
+    model.b.iter_mut().for_each(|b| *b *= scale);
+    let count = model.product_lags.len();
+    if let Some(first) = newest(&model.product_lags) {
+        let columns = (0..model.b.len()).flat_map(|l| {
+            let own = model.c[l * count..(l + 1) * count].iter().enumerate();
+            let c = model.c[l * count + first];
+            let scaled = own.map(|(i, c)| if i == first { *c } else { c * scale });
+            scaled.chain([-c * keep]).collect::<Vec<f64>>()
+        });
+        model.c = columns.collect();
+        model.product_lags.push(BEFORE);
+    } else {
+        model.c.iter_mut().for_each(|c| *c *= scale);
+    }
+    model.delay_later(-samples);
+}
+
+/// Takes the faster of the two lags of a second order away; its delay goes back to the
+/// command.
+fn out_of_series(model: &mut Model) {
+    let at = |lags: &[u16], lag: u16| lags.iter().position(|l| *l == lag);
+    let (Some(first), Some(second)) =
+        (at(&model.state_lags, NEWEST), at(&model.state_lags, BEFORE))
+    else {
+        return;
+    };
+    let (sum, product) = (model.a[first], -model.a[second]);
+    // The roots of λ² − sum·λ + product; where they are complex, their size.
+    let spread = sum * sum / 4.0 - product;
+    let keep = if spread >= 0.0 {
+        sum / 2.0 - spread.sqrt()
+    } else {
+        product.max(0.0).sqrt()
+    };
+    let keep = keep.clamp(0.0, 0.99);
+    let scale = 1.0 - keep;
+    model.a.iter_mut().for_each(|a| *a /= scale);
+    model.a[first] = 1.0 - (1.0 - sum + product) / scale;
+    model.state_lags.remove(second);
+    model.a.remove(second);
+    model.b.iter_mut().for_each(|b| *b /= scale);
+    let count = model.product_lags.len();
+    if let (Some(first), Some(second)) = (
+        at(&model.product_lags, NEWEST),
+        at(&model.product_lags, BEFORE),
+    ) {
+        let columns = (0..model.b.len()).flat_map(|l| {
+            let mut own: Vec<f64> = model.c[l * count..(l + 1) * count].to_vec();
+            own[first] += own[second];
+            own.iter_mut().for_each(|c| *c /= scale);
+            own.remove(second);
+            own
+        });
+        model.c = columns.collect();
+        model.product_lags.remove(second);
+    } else {
+        model.c.iter_mut().for_each(|c| *c /= scale);
+    }
+    if keep > 0.0 {
+        model.delay_later(-1.0 / keep.ln());
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -231,13 +332,67 @@ mod tests {
             Term::Memory(200),
             Term::State(30),
             Term::Product(40),
-            Term::Inertia,
+            Term::LevelRate,
             Term::Offset,
         ] {
             let with = term.added_to(&model, &[0.01, -0.02]);
             assert_ne!(with, model, "{term:?}");
             assert_eq!(with.coordinates().len(), with.values().len());
             assert_eq!(term.taken_from(&with, &model), model, "{term:?}");
+        }
+    }
+
+    /// A first order, put behind a lag, and taken out of it again.
+    #[test]
+    fn a_lag_in_series_is_found_again() {
+        let mut model = base();
+        model.delay = crate::model::Delay::Fixed {
+            delays: vec![40, 40],
+        };
+        let with = Term::Inertia(8.0).added_to(&model, &[]);
+        assert_eq!((with.state_lags.len(), with.product_lags.len()), (2, 2));
+        assert_eq!(
+            with.delay,
+            crate::model::Delay::Fixed {
+                delays: vec![32, 32]
+            }
+        );
+        let again = Term::Inertia(8.0).taken_from(&with, &model);
+        let close = |a: &[f64], b: &[f64]| {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9)
+        };
+        assert!(close(&again.a, &model.a), "{:?}", again.a);
+        assert!(close(&again.b, &model.b), "{:?}", again.b);
+        assert!(close(&again.c, &model.c), "{:?}", again.c);
+        assert_eq!(again.delay, model.delay);
+    }
+
+    /// y behind a lag of 8 samples is what the two lags give, sample by sample.
+    #[test]
+    fn a_lag_in_series_is_a_second_order() {
+        let model = Model {
+            a: vec![0.9],
+            b: vec![0.1],
+            c: vec![-0.05],
+            delay: crate::model::Delay::Fixed { delays: vec![20] },
+            ..Model::default()
+        };
+        let u: Vec<f64> = (0..400)
+            .map(|k| f64::from(u8::from(k % 100 < 50)))
+            .collect();
+        let record =
+            crate::data::Record::new("r", crate::data::Use::Identify, 0.001, u, vec![0.0; 400]);
+        let mut later = Term::Inertia(8.0).added_to(&model, &[]);
+        later.delay_later(8.0);
+        let (flow, film) = (
+            model.free_run(&record).unwrap(),
+            later.free_run(&record).unwrap(),
+        );
+        let keep = (-1.0_f64 / 8.0).exp();
+        let mut y = 0.0;
+        for (z, film) in flow.iter().zip(&film) {
+            y = keep * y + (1.0 - keep) * z;
+            assert!((y - film).abs() < 1e-9, "{y} {film}");
         }
     }
 

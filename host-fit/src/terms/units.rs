@@ -165,7 +165,7 @@ impl Units {
 pub fn begins_in_mid_run(record: &Record) -> bool {
     let first = record.y.len().min(RULES.beginning);
     let mean = record.y[..first].iter().sum::<f64>() / first.max(1) as f64;
-    record.u.first().is_some_and(|u| *u != 0.0) || mean.abs() > RULES.at_rest
+    mean.abs() > RULES.at_rest
 }
 
 /// Mean y of the records before the first command, 0 where it is that but for chance;

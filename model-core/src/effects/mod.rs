@@ -18,6 +18,7 @@ pub mod free_stream_variation;
 pub mod hot_film_lag;
 pub mod hot_film_nonlinearity;
 pub mod input_nonlinearity;
+pub mod level_rate;
 pub mod plenum_droop;
 pub mod quadratic_drag;
 pub mod rectifying_sensor;
@@ -191,6 +192,7 @@ catalogue! {
     quadratic_drag::QuadraticDrag: QuadraticDrag<T>,
     bouc_wen_hysteresis::BoucWenHysteresis: BoucWenHysteresis<T>,
     vortex_shedding::VortexShedding: VortexShedding<T>,
+    level_rate::LevelRate: LevelRate<T>,
     rectifying_sensor::RectifyingSensor: RectifyingSensor,
     hot_film_nonlinearity::HotFilmNonlinearity: HotFilmNonlinearity<T>,
     hot_film_lag::HotFilmLag: HotFilmLag<T>,
@@ -207,6 +209,12 @@ pub const SPECS: &[Spec] = &in_order::<{ lacking(LAWS) + lacking(EFFECTS) }>();
 /// The card of the sensor's zero: a nuisance that belongs to a base model, never a
 /// missing effect.
 pub const ZERO_OFFSET: &Spec = &<ZeroOffset<f64> as Physics<f64>>::SPEC;
+
+/// The card of a rate that depends on the level: another one.
+pub const LEVEL_RATE: &Spec = &<LevelRate<f64> as Physics<f64>>::SPEC;
+
+/// The nuisances that a base model may have.
+pub const NUISANCES: [&Spec; 2] = [LEVEL_RATE, ZERO_OFFSET];
 
 /// How many of `specs` a model can lack.
 const fn lacking(specs: &[Spec]) -> usize {
@@ -240,13 +248,10 @@ const fn in_order<const N: usize>() -> [Spec; N] {
     ordered
 }
 
-/// The card of the effect `name`: an entry of the catalogue, or the sensor's zero.
+/// The card of the effect `name`: an entry of the catalogue, or a nuisance.
 #[must_use]
 pub fn spec(name: &str) -> Option<&'static Spec> {
-    SPECS
-        .iter()
-        .chain([ZERO_OFFSET])
-        .find(|spec| spec.name == name)
+    SPECS.iter().chain(NUISANCES).find(|spec| spec.name == name)
 }
 
 /// The card of the delay law `name`, of base models or an effect.
@@ -306,7 +311,11 @@ mod tests {
         assert!(SPECS.is_sorted_by_key(|spec| spec.place));
         let lacking: std::vec::Vec<&str> = SPECS.iter().map(|spec| spec.name).collect();
         names.retain(|name| !lacking.contains(name));
-        assert_eq!(names, ["zero-offset", "constant-delay"], "of base models");
+        assert_eq!(
+            names,
+            ["level-rate", "zero-offset", "constant-delay"],
+            "of base models"
+        );
         assert!(spec("constant-delay").is_none() && law("constant-delay").is_some());
     }
 }

@@ -6,7 +6,7 @@ use host_fit::codegen::generate;
 use host_fit::design::{TrackRequest, track};
 use host_fit::model::{Law, Model};
 use model_core::effect::{Place, Spec};
-use model_core::effects::{LAWS, SPECS, ZERO_OFFSET};
+use model_core::effects::{LAWS, NUISANCES, SPECS};
 use std::path::Path;
 
 /// Steps of the cases that budgets are for, and of the many others.
@@ -95,7 +95,7 @@ pub fn all() -> Result<Vec<Case>> {
 /// Every effect and delay law that a model can have, those of base models among them.
 fn known() -> impl Iterator<Item = &'static Spec> {
     let effects = SPECS.iter().filter(|spec| spec.place != Place::Delay);
-    LAWS.iter().chain(effects).chain([ZERO_OFFSET])
+    LAWS.iter().chain(effects).chain(NUISANCES)
 }
 
 /// `base` with an effect at the first of its usual values. Its natural flow is a

@@ -1,0 +1,93 @@
+//! The flow attaches or separates at a rate that depends on its level.
+//!
+//! Not a missing effect but a property of the flow itself: it belongs to the base
+//! model, so that nothing else is bent to imitate it.
+
+use crate::effect::{
+    Amplitude, Effect, Flow, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec,
+    Starts, Unit, take,
+};
+use crate::real::Real;
+
+/// Multiplies the step of the flow by 1 + (p + (q − p)·j)·s: p where the jets are
+/// off, q under full jets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LevelRate<T> {
+    separating: T,
+    attaching: T,
+}
+
+impl<T: Real> Effect<T> for LevelRate<T> {
+    type State = ();
+    fn start(&self) {}
+    #[inline]
+    fn drives(&self) -> bool {
+        true
+    }
+    #[inline]
+    fn drive(&self, _state: &mut (), flow: &Flow<T>, at: &Instant<'_, T>) -> T {
+        let slope = self.separating + (self.attaching - self.separating) * at.arrived;
+        slope * flow.now * (flow.next - flow.now)
+    }
+}
+
+impl<T: Real> Physics<T> for LevelRate<T> {
+    const SPEC: Spec = Spec {
+        name: "level-rate",
+        rust: "level_rate::LevelRate",
+        rust_type: RustType::Numbers,
+        place: Place::Flow,
+        summary: "the rate of the flow depends on its level",
+        equation: "adds (p + (q − p)·j)·s_k·(s_{k+1} − s_k)",
+        parameters: &[
+            Parameter::new("separating", Unit::PerY, [-3.0, 3.0], &[0.0]),
+            Parameter::new("attaching", Unit::PerY, [-3.0, 3.0], &[0.0]),
+        ],
+        starts: Starts::Grid,
+        amplitude: Some(Amplitude::new(
+            "separating",
+            "a rate that changes with the level",
+        )),
+        channel: None,
+        needs: Needs::Nothing,
+        base: true,
+        law: None,
+        source: "expansion of the rate of eq. (3) to first order in y",
+    };
+
+    fn new(parameters: &[T], _setting: &Setting<T>) -> Self {
+        let [separating, attaching] = take(parameters);
+        Self {
+            separating,
+            attaching,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::bench::{flow, prepared};
+
+    #[test]
+    fn the_rate_changes_and_the_end_does_not() {
+        let end = |slope: f64| {
+            let rate: LevelRate<f64> = prepared(&[slope, slope]);
+            flow(&rate, |_| 0.8)
+        };
+        let (slow, plain, fast) = (end(-0.5), end(0.0), end(0.5));
+        for s in [&slow, &plain, &fast] {
+            assert!((s[1999] - 0.8).abs() < 1e-6);
+        }
+        // The first step starts from 0, where the rate is what it was.
+        assert_eq!(slow[0], plain[0]);
+        assert!(slow[40] < plain[40] && plain[40] < fast[40]);
+    }
+
+    #[test]
+    fn it_is_no_entry_of_the_catalogue_of_missing_effects() {
+        let name = LevelRate::<f64>::SPEC.name;
+        assert!(crate::effects::SPECS.iter().all(|spec| spec.name != name));
+        assert_eq!(crate::effects::spec(name).map(|spec| spec.name), Some(name));
+    }
+}

@@ -22,6 +22,7 @@ use crate::terms::{
     begins_in_mid_run, p_value,
 };
 use model_core::effect::Spec;
+use model_core::effects::SLOW_WAKE;
 use ranking::{Rival, alike, not_tried, ranked, rivals};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -300,14 +301,15 @@ pub fn diagnose(
     }
     let root_errors = root.judged.held_out.clone();
     let mut found = search.run(root);
-    // Many lags of a given model may hold more than terms that are added one by one.
-    if found.best.judged.rmse() > (1.0 - RULES.worthwhile) * as_given.rmse()
-        && judge.over_noise(as_given.rmse()) < judge.over_noise(found.best.judged.rmse())
+    // The given structure may hold what terms that are added one by one do not reach.
+    let reached = found.best.judged.rmse();
+    if (judge.over_noise(reached) > RULES.floor_margin
+        || reached > (1.0 - RULES.worthwhile) * as_given.rmse())
         && let Ok(judged) = judge.refitted(&given_inside)
-        && judged.rmse() < found.best.judged.rmse()
+        && judged.rmse() < root_errors.rmse()
     {
         let from_given = search.run(Hypothesis::new(judged));
-        if from_given.best.judged.rmse() < found.best.judged.rmse() {
+        if from_given.best.judged.rmse() < (1.0 - RULES.worthwhile) * reached {
             found = from_given;
         }
     }
@@ -762,7 +764,7 @@ struct Set {
 }
 
 /// What the flow of `model` feels of its own past: a term a·y(t − τ) of the recursion
-/// over the rate at which the flow forgets.
+/// over the rate at which the flow forgets; and a slow wake.
 fn memory(model: &Model) -> Vec<Memory> {
     let behind = |lag: &u16| model.convention.behind_newest(*lag);
     let is_memory = |lag: &u16| behind(lag) >= SHORTEST_MEMORY;
@@ -776,12 +778,23 @@ fn memory(model: &Model) -> Vec<Memory> {
         .filter(|(lag, _)| !is_memory(lag))
         .map(|(_, c)| c)
         .sum();
-    let rate = (1.0 - short).max(f64::MIN_POSITIVE);
-    let rate_blown = (1.0 - short - blown).max(f64::MIN_POSITIVE);
+    // Where lags nearly cancel, the rate is that of the slowest way back.
+    let slowest = model.sample_period_s / model.time_constant();
+    let or_slowest = |rate: f64| if rate > slowest { rate } else { slowest };
+    let (rate, rate_blown) = (or_slowest(1.0 - short), or_slowest(1.0 - short - blown));
     let mut lags: Vec<u16> = pairs().chain(products()).map(|(lag, _)| *lag).collect();
     lags.retain(is_memory);
     lags.sort_unstable();
     lags.dedup();
+    let wakes = model.effects.iter().filter(|e| e.name == SLOW_WAKE.name);
+    let wakes = wakes.filter_map(|wake| match wake.parameters.as_slice() {
+        [time_constant, pull] => Some(Memory {
+            lag_s: *time_constant,
+            weight: -pull,
+            weight_blown: -pull,
+        }),
+        _ => None,
+    });
     lags.iter()
         .map(|lag| {
             let a: f64 = pairs().filter(|(l, _)| *l == lag).map(|(_, a)| a).sum();
@@ -792,5 +805,6 @@ fn memory(model: &Model) -> Vec<Memory> {
                 weight_blown: (a + c) / rate_blown,
             }
         })
+        .chain(wakes)
         .collect()
 }

@@ -50,7 +50,7 @@ pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) 
     for candidate in &table.candidates {
         let name = match &candidate.term {
             Term::Effect { spec, .. } => spec.name.to_owned(),
-            Term::Memory(_) => FLOW_MEMORY.to_owned(),
+            Term::Memory(_) | Term::Wake(_) => FLOW_MEMORY.to_owned(),
             Term::Inertia(_) => FLOW_LAG.to_owned(),
             Term::State(_) | Term::Product(_) | Term::Offset | Term::LevelRate => {
                 continue;

@@ -16,6 +16,8 @@ rules! {
     rival: f64 = 2.0, "times the best error", "rigs with memory: the right first step was never further behind";
     /// Delays between samples are rounded where that costs no more than this.
     rounding: f64 = 0.015, "share of the rms error", "what an effect must take to be named";
+    /// An effect with a parameter so near to the end of its range stands in for something else.
+    bound: f64 = 0.01, "share of the range", "a ring of 0.95 of critical damping was named where the flow has a second lag";
     /// Rounds of screening and refitting.
     rounds: usize = 6, "", "two effects and two memories take three";
     /// Rounds without a gain that end the search.

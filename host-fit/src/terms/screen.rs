@@ -20,7 +20,7 @@ use crate::fit::sensitivities;
 use crate::linalg::{dot, solve_symmetric};
 use crate::model::{Delay, Model};
 use model_core::effect::{Place, Sign, Spec};
-use model_core::effects::{LEVEL_RATE, ZERO_OFFSET};
+use model_core::effects::{LEVEL_RATE, SLOW_WAKE, ZERO_OFFSET};
 use model_core::recursion::Grading;
 use rayon::prelude::*;
 
@@ -45,7 +45,9 @@ const PAIRED: usize = 24;
 const SHORT_LAGS: [u16; 6] = [3, 5, 8, 12, 16, 20];
 /// Second lags of the flow that are screened, samples.
 const SERIES: [f64; 6] = [1.5, 3.0, 6.0, 12.0, 24.0, 48.0];
-/// Change of the rate with the level by which its effect is seen.
+/// Slow wakes that are screened, inner seconds.
+const WAKES_S: [f64; 5] = [0.1, 0.2, 0.4, 0.8, 1.6];
+/// Change of the rate with the level, and pull of a wake, by which their effect is seen.
 const SLOPE: f64 = 0.1;
 /// Lags whose derivatives are carried by one run, two each.
 const LAGS_AT_ONCE: usize = 4;
@@ -353,6 +355,21 @@ impl<'a> Screen<'a> {
         changes.collect()
     }
 
+    /// Changes by a slow wake, per pull.
+    fn wakes(&self) -> Vec<(Term, Vec<f64>)> {
+        if self.model.effects.iter().any(|e| e.name == SLOW_WAKE.name) {
+            return Vec::new();
+        }
+        let changes = WAKES_S.into_par_iter().filter_map(|time_constant| {
+            let term = Term::Wake(time_constant);
+            let mut column = self.change(&term.added_to(self.model, &[SLOPE]))?;
+            column.iter_mut().for_each(|x| *x /= SLOPE);
+            self.residualise(&mut column);
+            Some((term, column))
+        });
+        changes.collect()
+    }
+
     /// Changes by a rate that depends on the level, without jets and under them.
     fn level_rate(&self) -> Option<[Vec<f64>; 2]> {
         if self.model.effects.iter().any(|e| e.name == LEVEL_RATE.name) {
@@ -379,6 +396,10 @@ impl<'a> Screen<'a> {
             all.push((Term::Product(lag), vec![at + 1]));
         }
         for (term, column) in self.series() {
+            all.push((term, vec![columns.len()]));
+            columns.push(column);
+        }
+        for (term, column) in self.wakes() {
             all.push((term, vec![columns.len()]));
             columns.push(column);
         }

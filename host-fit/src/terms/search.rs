@@ -393,6 +393,9 @@ impl Search<'_> {
         let fitted = fit(&brief.model, &learning, &options).ok()?;
         let fitted = self.settle_lags(fitted, &mut terms);
         let fitted = settle_fixed_delay(fitted, &learning, &options).ok()?;
+        if at_a_bound(&fitted.model, &terms) {
+            return None;
+        }
         let judged = self.judge.judged_from(fitted).ok()?;
         Some(Hypothesis {
             terms,
@@ -492,6 +495,24 @@ impl Search<'_> {
             }
         }
     }
+}
+
+/// Whether an effect was bent as far as its card lets it: it stands in for something
+/// else then. Delay laws are exempt: levels that y hardly visits leave them open.
+fn at_a_bound(model: &Model, terms: &[Term]) -> bool {
+    terms.iter().filter_map(Term::effect).any(|spec| {
+        let added = model.effects.iter().find(|added| added.name == spec.name);
+        let values = added.map_or(&[][..], |added| &added.parameters);
+        values.iter().zip(spec.parameters).any(|(value, card)| {
+            let place = |x: f64| if card.is_logarithmic() { x.ln() } else { x };
+            let (low, high) = (place(card.low), place(card.high));
+            let near = RULES.bound * (high - low);
+            // An amplitude may be small.
+            let low_end = card.is_logarithmic() || card.low != 0.0;
+            let at_low = low_end && place(*value) < low + near;
+            card.low < card.high && (place(*value) > high - near || at_low)
+        })
+    })
 }
 
 /// What the key of a term looks like.

@@ -2,7 +2,7 @@
 
 use crate::model::Model;
 use model_core::effect::{Place, Spec};
-use model_core::effects::{LEVEL_RATE, ZERO_OFFSET};
+use model_core::effects::{LEVEL_RATE, SLOW_WAKE, ZERO_OFFSET};
 use model_core::recursion::Grading;
 
 /// An addition to a model.
@@ -18,6 +18,8 @@ pub enum Term {
     Inertia(f64),
     /// The rate of the flow depends on its level, which is no missing physics.
     LevelRate,
+    /// A slow wake of so many inner seconds, a memory of the flow.
+    Wake(f64),
     /// The sensor's zero, which is no missing physics.
     Offset,
     /// A physical effect, with the values from which it is fitted.
@@ -78,7 +80,11 @@ impl Term {
     pub fn cost(&self) -> usize {
         match self {
             Self::Memory(_) => 3,
-            Self::State(_) | Self::Product(_) | Self::Inertia(_) | Self::LevelRate => 2,
+            Self::State(_)
+            | Self::Product(_)
+            | Self::Inertia(_)
+            | Self::LevelRate
+            | Self::Wake(_) => 2,
             Self::Offset => 1,
             Self::Effect { spec, .. } => spec.parameters.iter().filter(|p| p.low < p.high).count(),
         }
@@ -93,6 +99,7 @@ impl Term {
             Self::Product(lag) => format!("lag of {lag} samples under the jet"),
             Self::Inertia(_) => "second order".to_owned(),
             Self::LevelRate => LEVEL_RATE.name.to_owned(),
+            Self::Wake(_) => SLOW_WAKE.name.to_owned(),
             Self::Offset => ZERO_OFFSET.name.to_owned(),
             Self::Effect { spec, .. } => spec.name.to_owned(),
         }
@@ -146,6 +153,12 @@ impl Term {
                 };
                 model.add(LEVEL_RATE, &[slope(0), slope(1)], None);
             }
+            Self::Wake(time_constant) => {
+                let pull = coefficients.first().copied().unwrap_or(0.0);
+                let range = &SLOW_WAKE.parameters[1];
+                let pull = pull.clamp(range.low, range.high);
+                model.add(SLOW_WAKE, &[*time_constant, pull], None);
+            }
             Self::Inertia(samples) => in_series(&mut model, *samples),
             lags => {
                 let Some(lag) = lags.lag() else {
@@ -182,6 +195,7 @@ impl Term {
             Self::Effect { spec, .. } => model.effects.retain(|e| e.name != spec.name),
             Self::Offset => model.effects.retain(|e| e.name != ZERO_OFFSET.name),
             Self::LevelRate => model.effects.retain(|e| e.name != LEVEL_RATE.name),
+            Self::Wake(_) => model.effects.retain(|e| e.name != SLOW_WAKE.name),
             Self::Inertia(_) => out_of_series(&mut model),
             lags => {
                 let of = |all: &[u16]| all.iter().position(|lag| Some(*lag) == lags.lag());
@@ -333,6 +347,7 @@ mod tests {
             Term::State(30),
             Term::Product(40),
             Term::LevelRate,
+            Term::Wake(0.3),
             Term::Offset,
         ] {
             let with = term.added_to(&model, &[0.01, -0.02]);
@@ -381,7 +396,7 @@ mod tests {
             .map(|k| f64::from(u8::from(k % 100 < 50)))
             .collect();
         let record =
-            crate::data::Record::new("r", crate::data::Use::Identify, 0.001, u, vec![0.0; 400]);
+            crate::data::Record::new("r", crate::data::Use::Identify, 0.001, u, vec![1.0; 400]);
         let mut later = Term::Inertia(8.0).added_to(&model, &[]);
         later.delay_later(8.0);
         let (flow, film) = (

@@ -4,8 +4,7 @@
 //! model, so that nothing else is bent to imitate it.
 
 use crate::effect::{
-    Amplitude, Effect, Flow, Instant, Needs, Parameter, Physics, Place, RustType, Setting, Spec,
-    Starts, Unit, take,
+    Amplitude, Effect, Flow, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -35,7 +34,6 @@ impl<T: Real> Physics<T> for LevelRate<T> {
     const SPEC: Spec = Spec {
         name: "level-rate",
         rust: "level_rate::LevelRate",
-        rust_type: RustType::Numbers,
         place: Place::Flow,
         summary: "the rate of the flow depends on its level",
         equation: "adds (p + (q − p)·j)·s_k·(s_{k+1} − s_k)",
@@ -43,16 +41,13 @@ impl<T: Real> Physics<T> for LevelRate<T> {
             Parameter::new("separating", Unit::PerY, [-3.0, 3.0], &[0.0]),
             Parameter::new("attaching", Unit::PerY, [-3.0, 3.0], &[0.0]),
         ],
-        starts: Starts::Grid,
         amplitude: Some(Amplitude::new(
             "separating",
             "a rate that changes with the level",
         )),
-        channel: None,
-        needs: Needs::Nothing,
         base: true,
-        law: None,
         source: "expansion of the rate of eq. (3) to first order in y",
+        ..Spec::PLAIN
     };
 
     fn new(parameters: &[T], _setting: &Setting<T>) -> Self {

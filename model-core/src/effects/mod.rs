@@ -23,6 +23,7 @@ pub mod plenum_droop;
 pub mod quadratic_drag;
 pub mod rectifying_sensor;
 pub mod sensor_saturation;
+pub mod slow_wake;
 pub mod starting_vortex;
 pub mod state_dependent_delay;
 pub mod stopping_vortex;
@@ -193,6 +194,7 @@ catalogue! {
     bouc_wen_hysteresis::BoucWenHysteresis: BoucWenHysteresis<T>,
     vortex_shedding::VortexShedding: VortexShedding<T>,
     level_rate::LevelRate: LevelRate<T>,
+    slow_wake::SlowWake: SlowWake<T>,
     rectifying_sensor::RectifyingSensor: RectifyingSensor,
     hot_film_nonlinearity::HotFilmNonlinearity: HotFilmNonlinearity<T>,
     hot_film_lag::HotFilmLag: HotFilmLag<T>,
@@ -213,8 +215,11 @@ pub const ZERO_OFFSET: &Spec = &<ZeroOffset<f64> as Physics<f64>>::SPEC;
 /// The card of a rate that depends on the level: another one.
 pub const LEVEL_RATE: &Spec = &<LevelRate<f64> as Physics<f64>>::SPEC;
 
+/// The card of a slow wake: a third one.
+pub const SLOW_WAKE: &Spec = &<SlowWake<f64> as Physics<f64>>::SPEC;
+
 /// The nuisances that a base model may have.
-pub const NUISANCES: [&Spec; 2] = [LEVEL_RATE, ZERO_OFFSET];
+pub const NUISANCES: [&Spec; 3] = [LEVEL_RATE, SLOW_WAKE, ZERO_OFFSET];
 
 /// How many of `specs` a model can lack.
 const fn lacking(specs: &[Spec]) -> usize {
@@ -313,7 +318,7 @@ mod tests {
         names.retain(|name| !lacking.contains(name));
         assert_eq!(
             names,
-            ["level-rate", "zero-offset", "constant-delay"],
+            ["level-rate", "slow-wake", "zero-offset", "constant-delay"],
             "of base models"
         );
         assert!(spec("constant-delay").is_none() && law("constant-delay").is_some());

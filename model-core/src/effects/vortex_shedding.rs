@@ -55,7 +55,8 @@ impl<T: Real> Physics<T> for VortexShedding<T> {
                 [1.0, 200.0],
                 &[3.0, 6.0, 10.0, 16.0, 25.0, 40.0],
             ),
-            Parameter::new("damping_ratio", Unit::None, [0.005, 0.95], &[0.05, 0.2]),
+            // More would be no ringing, but a lag.
+            Parameter::new("damping_ratio", Unit::None, [0.005, 0.6], &[0.05, 0.2]),
             Parameter::new("gain", Unit::Y, [-2.0, 2.0], &[0.15]),
         ],
         amplitude: Some(Amplitude::new("gain", "vortex shedding").linear()),

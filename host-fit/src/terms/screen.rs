@@ -444,8 +444,10 @@ impl<'a> Screen<'a> {
                 (Some(a), Some(b)) => (i32::from(a) - i32::from(b)).abs() <= APART,
                 _ => true,
             };
+            // Time constants say different things: which one shows beside an effect.
             let alike: Vec<&Candidate> = kept.iter().filter(same_kind).collect();
-            if alike.len() < KEPT_LAGS && !alike.iter().any(|k| near(k)) {
+            let has_time = matches!(candidate.term, Term::Inertia(_) | Term::Wake(_));
+            if has_time || (alike.len() < KEPT_LAGS && !alike.iter().any(|k| near(k))) {
                 kept.push(candidate);
             }
         }
@@ -718,6 +720,7 @@ fn clash(a: &Candidate, b: &Candidate) -> bool {
             let both = |place: Place| x.place == place && y.place == place;
             x.name == y.name || both(Place::Delay) || (both(Place::Jet) && g != h)
         }
+        (Term::Inertia(_), Term::Inertia(_)) | (Term::Wake(_), Term::Wake(_)) => true,
         _ => a.columns.iter().any(|column| b.columns.contains(column)),
     }
 }

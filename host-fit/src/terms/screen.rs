@@ -44,7 +44,7 @@ const PAIRED: usize = 24;
 /// Lags that are screened below the regular steps.
 const SHORT_LAGS: [u16; 6] = [3, 5, 8, 12, 16, 20];
 /// Second lags of the flow that are screened, samples.
-const SERIES: [f64; 6] = [1.5, 3.0, 6.0, 12.0, 24.0, 48.0];
+pub(super) const SERIES: [f64; 5] = [1.5, 4.0, 10.0, 20.0, 40.0];
 /// Slow wakes that are screened, inner seconds.
 const WAKES_S: [f64; 5] = [0.1, 0.2, 0.4, 0.8, 1.6];
 /// Change of the rate with the level, and pull of a wake, by which their effect is seen.

@@ -4,7 +4,7 @@ use super::RULES;
 use super::evidence::p_value;
 use super::grid::{Known, longest_lag};
 use super::judge::{Judge, Judged};
-use super::screen::{GRADINGS, Proposal, Screen, has_jet_effect};
+use super::screen::{GRADINGS, Proposal, SERIES, Screen, has_jet_effect};
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit, lean_base, settle_fixed_delay};
 use crate::model::{Model, Start};
@@ -369,9 +369,34 @@ impl Search<'_> {
         proposal: &Proposal,
         iterations: usize,
     ) -> Option<Fit> {
+        let is_inertia = |term: &Term| matches!(term, Term::Inertia(_));
+        if !proposal.terms.iter().any(is_inertia) {
+            return self.set_out_from(model, proposal, &proposal.terms, iterations);
+        }
+        // A second order has more than one valley: from several second lags.
+        let starts = SERIES.into_par_iter().filter_map(|samples| {
+            let other = |term: &Term| match term {
+                Term::Inertia(_) => Term::Inertia(samples),
+                term => term.clone(),
+            };
+            let terms: Vec<Term> = proposal.terms.iter().map(other).collect();
+            self.set_out_from(model, proposal, &terms, iterations)
+        });
+        let fits: Vec<Fit> = starts.collect();
+        fits.into_iter()
+            .min_by(|a, b| a.mean_square().total_cmp(&b.mean_square()))
+    }
+
+    fn set_out_from(
+        &self,
+        model: &Model,
+        proposal: &Proposal,
+        terms: &[Term],
+        iterations: usize,
+    ) -> Option<Fit> {
         let learning = self.judge.learning(0);
         let with = |bold: bool| {
-            let pairs = proposal.terms.iter().zip(&proposal.coefficients);
+            let pairs = terms.iter().zip(&proposal.coefficients);
             let all = pairs.fold(model.clone(), |model, (term, coefficients)| {
                 term.added_to(&model, if bold { coefficients } else { &[] })
             });

@@ -1,6 +1,6 @@
 //! What can be added to a model: the moves of the search.
 
-use crate::model::Model;
+use crate::model::{Delay, Model};
 use model_core::effect::{Place, Spec};
 use model_core::effects::{LEVEL_RATE, SLOW_WAKE, ZERO_OFFSET};
 use model_core::recursion::Grading;
@@ -190,7 +190,12 @@ impl Term {
         let mut model = model.clone();
         match self {
             Self::Effect { spec, .. } if spec.place == Place::Delay => {
+                // The base's law about where this one was: it may have been fitted
+                // beside quite other terms.
+                let level = |delay: &Delay| delay.present(MIDDLE, base.sample_period_s);
+                let later = level(&model.delay) - level(&base.delay);
                 model.delay = base.delay.clone();
+                model.delay_later(later);
             }
             Self::Effect { spec, .. } => model.effects.retain(|e| e.name != spec.name),
             Self::Offset => model.effects.retain(|e| e.name != ZERO_OFFSET.name),
@@ -240,6 +245,9 @@ impl Term {
         Some(model)
     }
 }
+
+/// A level in the middle of y, at which delay laws are compared.
+const MIDDLE: f64 = 0.5;
 
 /// The newest lag, and the one before.
 const NEWEST: u16 = 1;
@@ -361,14 +369,14 @@ mod tests {
     #[test]
     fn a_lag_in_series_is_found_again() {
         let mut model = base();
-        model.delay = crate::model::Delay::Fixed {
+        model.delay = Delay::Fixed {
             delays: vec![40, 40],
         };
         let with = Term::Inertia(8.0).added_to(&model, &[]);
         assert_eq!((with.state_lags.len(), with.product_lags.len()), (2, 2));
         assert_eq!(
             with.delay,
-            crate::model::Delay::Fixed {
+            Delay::Fixed {
                 delays: vec![32, 32]
             }
         );
@@ -389,7 +397,7 @@ mod tests {
             a: vec![0.9],
             b: vec![0.1],
             c: vec![-0.05],
-            delay: crate::model::Delay::Fixed { delays: vec![20] },
+            delay: Delay::Fixed { delays: vec![20] },
             ..Model::default()
         };
         let u: Vec<f64> = (0..400)

@@ -90,7 +90,11 @@ pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) 
         judged: None,
         promised: before,
     }));
-    rated.sort_by(|a, b| a.rmse().total_cmp(&b.rmse()));
+    // What was fitted comes before what is only promised.
+    rated.sort_by(|a, b| {
+        let fitted = a.judged.is_none().cmp(&b.judged.is_none());
+        fitted.then(a.rmse().total_cmp(&b.rmse()))
+    });
     rated
 }
 

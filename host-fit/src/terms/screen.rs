@@ -18,7 +18,7 @@ use super::term::Term;
 use crate::data::Record;
 use crate::fit::sensitivities;
 use crate::linalg::{dot, solve_symmetric};
-use crate::model::{Delay, Model};
+use crate::model::{Delay, Model, Start};
 use model_core::effect::{Place, Sign, Spec};
 use model_core::effects::{LEVEL_RATE, SLOW_WAKE, ZERO_OFFSET};
 use model_core::recursion::Grading;
@@ -357,7 +357,9 @@ impl<'a> Screen<'a> {
 
     /// Changes by a slow wake, per pull.
     fn wakes(&self) -> Vec<(Term, Vec<f64>)> {
-        if self.model.effects.iter().any(|e| e.name == SLOW_WAKE.name) {
+        // Nobody knows the wake of a flow that was blown before.
+        let present = self.model.effects.iter().any(|e| e.name == SLOW_WAKE.name);
+        if present || self.model.start == Start::Measured {
             return Vec::new();
         }
         let changes = WAKES_S.into_par_iter().filter_map(|time_constant| {

@@ -34,6 +34,9 @@ const DECOYS: usize = 19;
 /// A lag below this many samples is the order of the flow, not a memory.
 const SHORTEST_MEMORY: usize = 20;
 
+/// A rate below this share of that of the way back is what lags leave that cancel.
+const CANCELLED: f64 = 0.01;
+
 /// What a diagnosis says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -778,9 +781,15 @@ fn memory(model: &Model) -> Vec<Memory> {
         .filter(|(lag, _)| !is_memory(lag))
         .map(|(_, c)| c)
         .sum();
-    // Where lags nearly cancel, the rate is that of the slowest way back.
+    // Where lags cancel, what is left of them is no rate: that of the way back is.
     let slowest = model.sample_period_s / model.time_constant();
-    let or_slowest = |rate: f64| if rate > slowest { rate } else { slowest };
+    let or_slowest = |rate: f64| {
+        if rate > CANCELLED * slowest {
+            rate
+        } else {
+            slowest
+        }
+    };
     let (rate, rate_blown) = (or_slowest(1.0 - short), or_slowest(1.0 - short - blown));
     let mut lags: Vec<u16> = pairs().chain(products()).map(|(lag, _)| *lag).collect();
     lags.retain(is_memory);

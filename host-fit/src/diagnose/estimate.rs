@@ -1,0 +1,57 @@
+//! Fitted parameters as they are reported.
+
+use crate::fit::Fit;
+use crate::terms::Units;
+use model_core::effect::Spec;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A fitted physical parameter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterEstimate {
+    /// The estimate.
+    pub value: f64,
+    /// Its unit.
+    pub unit: String,
+    /// Lower end of the 95 % confidence interval.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// Estimates of an effect's parameters with 95 % intervals, of a fit in inner `units`.
+pub(crate) fn estimates(
+    fit: &Fit,
+    spec: &Spec,
+    units: &Units,
+) -> BTreeMap<String, ParameterEstimate> {
+    let values = fit.model.values();
+    let coordinates = fit.model.coordinates();
+    let own = coordinates
+        .iter()
+        .enumerate()
+        .filter_map(|(index, coordinate)| {
+            let parameter = coordinate.parameter()?;
+            let of_spec = coordinate.name == format!("{}.{}", spec.name, parameter.name);
+            of_spec.then_some((index, parameter))
+        });
+    own.map(|(index, parameter)| {
+        let value = values[index];
+        let half = 1.96 * fit.standard_error(index).unwrap_or(f64::INFINITY);
+        let (low, high) = if parameter.is_logarithmic() {
+            let factor = (half / value).exp();
+            (value / factor, value * factor)
+        } else {
+            (value - half, value + half)
+        };
+        let out = |value: f64| units.value_out(parameter.unit, value);
+        let estimate = ParameterEstimate {
+            value: out(value),
+            unit: parameter.unit.symbol().to_owned(),
+            low: out(low.max(parameter.low.min(value))),
+            high: out(high.min(parameter.high.max(value))),
+        };
+        (parameter.name.to_owned(), estimate)
+    })
+    .collect()
+}

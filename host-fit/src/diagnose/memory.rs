@@ -1,0 +1,131 @@
+//! What the flow feels of its own past.
+
+use super::RULES;
+use crate::model::Model;
+use model_core::effects::SLOW_WAKE;
+use serde::Serialize;
+
+/// What the flow feels of its own past.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Memory {
+    /// How long ago, s.
+    pub lag_s: f64,
+    /// The level that the flow tends to, per y of then, without jets.
+    pub weight: f64,
+    /// The same under full jets.
+    pub weight_blown: f64,
+}
+
+/// What the flow of `model` feels of its own past: a term a·y(t − τ) of the recursion
+/// over the rate at which the flow forgets; and a slow wake.
+pub(super) fn memory(model: &Model) -> Vec<Memory> {
+    let behind = |lag: &u16| model.convention.behind_newest(*lag);
+    let is_memory = |lag: &u16| behind(lag) >= RULES.shortest_memory;
+    let pairs = || model.state_lags.iter().zip(&model.a);
+    let products = || model.product_lags.iter().zip(&model.c);
+    let short: f64 = pairs()
+        .filter(|(lag, _)| !is_memory(lag))
+        .map(|(_, a)| a)
+        .sum();
+    let blown: f64 = products()
+        .filter(|(lag, _)| !is_memory(lag))
+        .map(|(_, c)| c)
+        .sum();
+    // Where lags cancel, what is left of them is no rate: that of the way back is. A
+    // strong memory hides the way back behind its own: then nothing is known against
+    // the rate of the short lags.
+    let slowest = model.sample_period_s / model.time_constant();
+    let or_slowest = |rate: f64| {
+        if slowest.is_finite() && rate <= RULES.cancelled * slowest {
+            slowest
+        } else {
+            rate
+        }
+    };
+    let (rate, rate_blown) = (or_slowest(1.0 - short), or_slowest(1.0 - short - blown));
+    let mut lags: Vec<u16> = pairs().chain(products()).map(|(lag, _)| *lag).collect();
+    lags.retain(is_memory);
+    lags.sort_unstable();
+    lags.dedup();
+    let wakes = model.effects.iter().filter(|e| e.name == SLOW_WAKE.name);
+    let wakes = wakes.filter_map(|wake| match wake.parameters.as_slice() {
+        [time_constant, pull] => Some(Memory {
+            lag_s: *time_constant,
+            weight: -pull,
+            weight_blown: -pull,
+        }),
+        _ => None,
+    });
+    lags.iter()
+        .map(|lag| {
+            let a: f64 = pairs().filter(|(l, _)| *l == lag).map(|(_, a)| a).sum();
+            let c: f64 = products().filter(|(l, _)| *l == lag).map(|(_, c)| c).sum();
+            Memory {
+                lag_s: behind(lag) as f64 * model.sample_period_s,
+                weight: a / rate,
+                weight_blown: (a + c) / rate_blown,
+            }
+        })
+        .chain(wakes)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Added;
+
+    /// A flow with these lags and gains of y and of u·y.
+    fn model(a: &[(u16, f64)], c: &[(u16, f64)]) -> Model {
+        let (state_lags, a) = a.iter().copied().unzip();
+        let (product_lags, c) = c.iter().copied().unzip();
+        Model {
+            state_lags,
+            a,
+            product_lags,
+            c,
+            ..Model::default()
+        }
+    }
+
+    #[test]
+    fn a_late_lag_is_a_memory_weighed_by_the_rate_of_the_flow_and_a_short_one_is_none() {
+        let only_short = model(&[(1, 0.8), (6, 0.1)], &[(1, -0.1)]);
+        assert_eq!(memory(&only_short), []);
+        let found = memory(&model(&[(1, 0.9), (201, -0.02)], &[(1, -0.1), (201, 0.06)]));
+        let [one] = found.as_slice() else {
+            panic!("{found:?}")
+        };
+        assert!((one.lag_s - 0.2).abs() < 1e-12);
+        // At rest the flow forgets a tenth in a sample, under jets a fifth.
+        assert!((one.weight + 0.2).abs() < 1e-9, "{one:?}");
+        assert!((one.weight_blown - 0.2).abs() < 1e-9, "{one:?}");
+    }
+
+    #[test]
+    fn lags_that_cancel_leave_no_rate_to_weigh_by() {
+        // The newest y is kept whole; what is forgotten, 0.02 in 1 − 31·0.02 samples, the far lag takes.
+        let found = memory(&model(&[(1, 1.0), (31, -0.02)], &[]));
+        let [one] = found.as_slice() else {
+            panic!("{found:?}")
+        };
+        assert!((one.weight + 0.38).abs() < 1e-9, "{one:?}");
+    }
+
+    #[test]
+    fn a_slow_wake_is_a_memory_that_pulls_back() {
+        let mut model = model(&[(1, 0.9)], &[]);
+        model.effects.push(Added {
+            name: SLOW_WAKE.name.to_owned(),
+            parameters: vec![0.4, 0.3],
+            channel: None,
+            reference: None,
+        });
+        let wake = Memory {
+            lag_s: 0.4,
+            weight: -0.3,
+            weight_blown: -0.3,
+        };
+        assert_eq!(memory(&model), [wake]);
+    }
+}

@@ -1,0 +1,98 @@
+//! What a diagnosis hands over.
+
+use super::{Memory, ParameterEstimate, Separation, Verdict};
+use crate::model::Model;
+use crate::residual::NoiseSource;
+use crate::terms::HeldOutBy;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Held-out error after adding effects.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Rung {
+    /// The effects added so far, in their order; those of the given model are not among them.
+    pub effects: Vec<String>,
+    /// Root mean square error of the free run on the held-out records, y.
+    pub validate_rmse: f64,
+    /// FIT on the held-out records, %.
+    pub validate_fit_percent: f64,
+    /// The noise floor, y; none without y_sd.
+    pub noise_rmse: Option<f64>,
+    /// What was done to get here, in words.
+    pub step: String,
+}
+
+/// A candidate, judged against the model it was added to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Ranked {
+    /// Its name.
+    pub effect: String,
+    /// Held-out error with it, y.
+    pub validate_rmse: f64,
+    /// By how much the held-out error falls, %.
+    pub error_reduction_percent: f64,
+    /// p-value of the gain, corrected for the number of candidates (Holm).
+    pub p_value: f64,
+    /// The best that chance did with time-shifted and swapped versions of it:
+    /// reduction of the held-out error, %; none where it was only screened.
+    pub best_decoy_percent: Option<f64>,
+    /// Fitted parameters by name.
+    pub parameters: BTreeMap<String, ParameterEstimate>,
+    /// Candidates that the held-out records cannot tell from it.
+    pub confounded_with: Vec<String>,
+    /// Whether the gain counts as real: significant, worthwhile, better than chance.
+    pub significant: bool,
+    /// Whether everything was refitted with it; otherwise its numbers are what the
+    /// screening promises.
+    pub refitted: bool,
+}
+
+/// A candidate that was not tried, and why.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NotTried {
+    /// Its name.
+    pub effect: String,
+    /// Why not.
+    pub reason: String,
+}
+
+/// The outcome.
+#[derive(Clone, Debug)]
+pub struct Diagnosis {
+    /// What it says.
+    pub verdict: Verdict,
+    /// The missing effects in the order added; none where the verdict is
+    /// "unexplained" or "partly explained", though the ladder shows what was tried.
+    pub missing: Vec<String>,
+    /// Effects that describe part of the misfit without being proven.
+    pub stand_ins: Vec<String>,
+    /// For each of `missing` all that the records cannot tell from it, itself first.
+    pub sets: Vec<Vec<String>>,
+    /// What the flow feels of its own past, in the final model.
+    pub memory: Vec<Memory>,
+    /// Models that were refitted in full on the way.
+    pub tried: usize,
+    /// How the errors were held out.
+    pub held_out_by: HeldOutBy,
+    /// After how many seconds free runs started anew from the measurement, for rigs
+    /// that drift: see [`restart_after`].
+    pub restarted_s: Option<f64>,
+    /// Where the noise floor comes from.
+    pub noise_source: NoiseSource,
+    /// The noise floor on what was judged, y rms: measured or estimated.
+    pub noise_estimate: f64,
+    /// Held-out errors from the model as given to the last one.
+    pub ladder: Vec<Rung>,
+    /// All candidates for the final model without effects, best first.
+    pub ranking: Vec<Ranked>,
+    /// Parameters of the missing effects, or of the stand-ins, in the final model.
+    pub parameters: BTreeMap<String, BTreeMap<String, ParameterEstimate>>,
+    /// Candidates that could not be tried.
+    pub not_tried: Vec<NotTried>,
+    /// The experiment for effects that the data cannot tell apart.
+    pub separation: Option<Separation>,
+    /// The final model.
+    pub model: Model,
+    /// The base model that effects were added to.
+    pub base: Model,
+}

@@ -1,0 +1,198 @@
+//! A diagnosis in the making: from what the search found to what is handed over.
+
+use super::memory::memory;
+use super::ranking::{not_tried, ranked, rivals};
+use super::verdict::Conclusion;
+use super::{DiagnoseError, Diagnosis, Options, RULES, Rung, Verdict, estimates};
+use crate::model::Model;
+use crate::residual::NoiseSource;
+use crate::terms::{Found, HeldOut, Hypothesis, Judge, Search, Term, Units, p_value};
+use model_core::effect::Spec;
+use std::collections::BTreeMap;
+
+/// A diagnosis in the making.
+pub(super) struct Session<'a> {
+    pub(super) search: &'a Search<'a>,
+    pub(super) units: Units,
+    pub(super) options: &'a Options,
+}
+
+impl Session<'_> {
+    pub(super) fn judge(&self) -> &Judge {
+        self.search.judge
+    }
+
+    pub(super) fn rung(&self, held_out: &HeldOut, effects: &[String], step: &str) -> Rung {
+        let judge = self.judge();
+        let measured = judge.noise_source == NoiseSource::Measured;
+        Rung {
+            effects: effects.to_vec(),
+            validate_rmse: held_out.rmse() * self.units.y,
+            validate_fit_percent: 100.0 * (1.0 - judge.unexplained_share(held_out).sqrt()),
+            noise_rmse: measured.then(|| judge.noise_rmse() * self.units.y),
+            step: step.to_owned(),
+        }
+    }
+
+    /// Decoys' shifts, as fractions of a record.
+    fn shifts(&self) -> Vec<f64> {
+        use rand::{RngExt, SeedableRng};
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(self.options.seed);
+        (0..RULES.decoys)
+            .map(|_| rng.random_range(0.1..0.9))
+            .collect()
+    }
+
+    /// The given model's own structure, for rigs whose dynamics is the user's choice of
+    /// lags; with the product u·y where it has none and gains by it: that term is in
+    /// the base class and never counts as missing.
+    pub(super) fn root_of_given(
+        &self,
+        given: &Model,
+        as_given: &HeldOut,
+    ) -> Result<(Hypothesis, &'static str), DiagnoseError> {
+        let mut model = given.clone();
+        model.delay_between_samples();
+        let plain = self.judge().refitted(&model)?;
+        if given.product_lags.is_empty() {
+            let bilinear = Model {
+                product_lags: vec![1],
+                c: vec![0.0; given.b.len()],
+                ..plain.model().clone()
+            };
+            if let Ok(bilinear) = self.judge().refitted(&bilinear) {
+                let before = plain.rmse().min(as_given.rmse());
+                let gain = 1.0 - bilinear.rmse() / before;
+                let p = p_value(&plain.held_out, &bilinear.held_out);
+                if gain > RULES.worthwhile && p < RULES.level {
+                    return Ok((
+                        Hypothesis::new(bilinear),
+                        "refitted with the product of input and output",
+                    ));
+                }
+            }
+        }
+        Ok((Hypothesis::new(plain), "refitted in free run"))
+    }
+
+    pub(super) fn conclude(
+        &self,
+        found: Found,
+        first: [Rung; 2],
+        as_given: &HeldOut,
+        restarted_s: Option<f64>,
+    ) -> Diagnosis {
+        let (search, judge, units) = (self.search, self.judge(), &self.units);
+        let Conclusion {
+            verdict,
+            model: last,
+            effects,
+        } = self.conclusion(&found, as_given);
+        (search.progress)("what else it could be");
+        let mut context = last.clone();
+        while let Some(index) = context.terms.iter().rposition(|t| t.effect().is_some()) {
+            match search.without(&context, index, &found.root) {
+                Some(lesser) => context = lesser,
+                None => break,
+            }
+        }
+        let names: Vec<&str> = effects.iter().map(|spec| spec.name).collect();
+        let others = rivals(search, &context, &names);
+        let mut order = effects.clone();
+        // The best single effect leads: the ladder falls as the ranking does.
+        let place = |spec: &Spec| others.iter().position(|r| r.name == spec.name);
+        order.sort_by_key(|spec| place(spec).unwrap_or(usize::MAX));
+        let mut ladder = first.to_vec();
+        if !context.terms.is_empty() {
+            let step = format!("with {}", context.words());
+            ladder.push(self.rung(&context.judged.held_out, &[], &step));
+        }
+        ladder.extend(self.rungs(&last, &order, &found.root));
+        let sets = self.sets(&last, &order, &others, &found.root);
+        let alternatives: Vec<Model> = sets
+            .iter()
+            .flat_map(|set| &set.models)
+            .map(|model| units.model_out(model))
+            .collect();
+        let end = judge.final_fit(&last.judged);
+        let model = units.model_out(&end.model);
+        let parameters: BTreeMap<_, _> = order
+            .iter()
+            .map(|spec| (spec.name.to_owned(), estimates(&end, spec, units)))
+            .collect();
+        let mut ranking = ranked(judge, units, &context, &others, &self.shifts());
+        for entry in &mut ranking {
+            // The ranking shows what the effects are in the final model, and only what
+            // still cannot be told apart there.
+            if let Some(own) = parameters.get(&entry.effect) {
+                entry.parameters.clone_from(own);
+                let set = sets
+                    .iter()
+                    .find(|set| set.names.first() == Some(&entry.effect));
+                entry.confounded_with = set.map(|s| s.names[1..].to_vec()).unwrap_or_default();
+            }
+        }
+        let separated: Vec<String> = {
+            let mut names: Vec<String> = Vec::new();
+            for set in sets.iter().filter(|set| !set.models.is_empty()) {
+                for name in &set.names {
+                    if !names.contains(name) {
+                        names.push(name.clone());
+                    }
+                }
+            }
+            names
+        };
+        let separation = self.separation(&model, alternatives, separated);
+        let names: Vec<String> = order.iter().map(|spec| spec.name.to_owned()).collect();
+        let (missing, stand_ins) = match verdict {
+            Verdict::EffectMissing => (names, Vec::new()),
+            Verdict::PartlyExplained => (Vec::new(), names),
+            Verdict::NothingMissing | Verdict::Unexplained => (Vec::new(), Vec::new()),
+        };
+        Diagnosis {
+            verdict,
+            sets: if missing.is_empty() {
+                Vec::new()
+            } else {
+                sets.into_iter().map(|set| set.names).collect()
+            },
+            missing,
+            stand_ins,
+            memory: memory(&model),
+            tried: found.tried,
+            held_out_by: judge.held_out_by,
+            restarted_s,
+            noise_source: judge.noise_source,
+            noise_estimate: judge.noise_rmse() * units.y,
+            ladder,
+            ranking,
+            parameters,
+            not_tried: not_tried(search, found.root.judged.model()),
+            separation,
+            base: units.model_out(&judge.final_fit(&found.bare.judged).model),
+            model,
+        }
+    }
+
+    /// The rungs from the first effect to the last, each with one effect more.
+    fn rungs(&self, last: &Hypothesis, order: &[&'static Spec], root: &Hypothesis) -> Vec<Rung> {
+        let mut rungs = Vec::new();
+        let mut current = last.clone();
+        for count in (1..=order.len()).rev() {
+            let names: Vec<String> = order[..count].iter().map(|s| s.name.to_owned()).collect();
+            let step = format!("with {}", order[count - 1].name);
+            rungs.push(self.rung(&current.judged.held_out, &names, &step));
+            if count > 1 {
+                let of = |t: &Term| t.effect().is_some_and(|s| s.name == order[count - 1].name);
+                let without = current.terms.iter().position(of);
+                match without.and_then(|index| self.search.without(&current, index, root)) {
+                    Some(lesser) => current = lesser,
+                    None => break,
+                }
+            }
+        }
+        rungs.reverse();
+        rungs
+    }
+}

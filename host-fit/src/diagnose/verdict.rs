@@ -1,0 +1,215 @@
+//! Whether anything is missing, and whether it has earned to be named.
+
+use super::memory::memory;
+use super::ranking::not_tried;
+use super::session::Session;
+use super::{Diagnosis, RULES, Rung};
+use crate::model::Model;
+use crate::residual::{FailureCoordinate, NoiseSource, examine};
+use crate::terms::{Found, HeldOut, Hypothesis, Judged, Screen, Term, p_value};
+use model_core::effect::Spec;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// What a diagnosis says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// The held-out error is at the repeat scatter.
+    NothingMissing,
+    /// One effect or several account for most of the misfit.
+    EffectMissing,
+    /// Effects describe part of the misfit without being proven: stand-ins.
+    PartlyExplained,
+    /// A repeatable misfit that the catalogue does not explain.
+    Unexplained,
+}
+
+/// What is said, and of which hypothesis.
+pub(super) struct Conclusion {
+    pub(super) verdict: Verdict,
+    /// The model that is handed over, inner units.
+    pub(super) model: Hypothesis,
+    pub(super) effects: Vec<&'static Spec>,
+}
+
+impl Session<'_> {
+    /// The answer for a given model that is at the noise floor already, unless a
+    /// single effect promises to do clearly better.
+    pub(super) fn nothing_at_once(
+        &self,
+        given: &Model,
+        given_inside: &Model,
+        as_given: &HeldOut,
+        first: &Rung,
+    ) -> Option<Diagnosis> {
+        let judge = self.judge();
+        let over = judge.over_noise(as_given.rmse());
+        if over > RULES.floor_margin
+            || judge.p_above_noise(as_given, RULES.floor_margin) < RULES.level
+        {
+            return None;
+        }
+        let screen = Screen::new(judge, given_inside)?;
+        let table = screen.table(&self.search.known, over > crate::terms::RULES.at_the_floor);
+        let promised = table
+            .candidates
+            .iter()
+            .filter(|candidate| candidate.term.effect().is_some())
+            .map(|candidate| 1.0 - (1.0 - candidate.held_out).max(0.0).sqrt())
+            .fold(0.0, f64::max);
+        if promised > RULES.promising {
+            return None;
+        }
+        Some(Diagnosis {
+            verdict: Verdict::NothingMissing,
+            missing: Vec::new(),
+            stand_ins: Vec::new(),
+            sets: Vec::new(),
+            memory: memory(given),
+            tried: 0,
+            held_out_by: judge.held_out_by,
+            restarted_s: None,
+            noise_source: judge.noise_source,
+            noise_estimate: judge.noise_rmse() * self.units.y,
+            ladder: vec![first.clone()],
+            ranking: Vec::new(),
+            parameters: BTreeMap::new(),
+            not_tried: not_tried(self.search, given_inside),
+            separation: None,
+            model: given.clone(),
+            base: given.clone(),
+        })
+    }
+
+    /// Whether an error is no more than the noise, or than the noise is known.
+    fn fits(&self, judged: &Judged) -> bool {
+        let judge = self.judge();
+        if judge.p_above_noise(&judged.held_out, RULES.floor_margin) >= RULES.level {
+            return true;
+        }
+        match judge.noise_source {
+            NoiseSource::Measured | NoiseSource::Repeats => {
+                judge.over_noise(judged.rmse()) <= RULES.floor_margin
+            }
+            NoiseSource::Scatter => {
+                judge.unexplained_share(&judged.held_out) <= RULES.too_much && !self.depends(judged)
+            }
+        }
+    }
+
+    /// Whether the held-out error depends on anything but its own frequency.
+    fn depends(&self, judged: &Judged) -> bool {
+        let (mut records, mut runs) = (Vec::new(), Vec::new());
+        for (fold, fit) in self.judge().folds.iter().zip(&judged.fits) {
+            for judging in &fold.judging {
+                let Ok(run) = fit.model.free_run(&judging.record) else {
+                    return true;
+                };
+                records.push(&judging.record);
+                runs.push(run);
+            }
+        }
+        let model = judged.model();
+        let failures = examine(&records, runs, model.warm_up(), model.longest_delay());
+        failures
+            .by
+            .iter()
+            .filter(|place| place.coordinate != FailureCoordinate::FrequencyBand)
+            .any(|place| place.explained_fraction > RULES.depends)
+    }
+
+    /// Whether effects have earned to be named or to stand in: they beat what lags can
+    /// do, or do as well with fewer parameters.
+    fn earned(&self, best: &Hypothesis, bare: &Hypothesis) -> bool {
+        let (with, without) = (best.judged.rmse(), bare.judged.rmse());
+        let scatter = self.judge().noise_source == NoiseSource::Scatter;
+        let in_the_dark = scatter && self.fits(&bare.judged);
+        // The best of so many alternatives is often good by chance. Where the base
+        // errs far beyond what scatters from sample to sample, records are few and
+        // short as a rule: one test for each effect has to do.
+        let alternatives = if scatter && !in_the_dark {
+            best.judged.model().candidates().count() as f64
+        } else {
+            RULES.alternatives
+        };
+        let p = alternatives * p_value(&bare.judged.held_out, &best.judged.held_out);
+        let worthwhile = if in_the_dark {
+            RULES.worthwhile_in_the_dark
+        } else {
+            RULES.worthwhile
+        };
+        let better = with < (1.0 - worthwhile) * without && p < RULES.level;
+        let leaner = with < (1.0 + RULES.alike) * without && best.cost() < bare.cost();
+        let drifts = self.judge().drifts_more(&best.judged, &bare.judged);
+        (better || (leaner && !scatter)) && !drifts
+    }
+
+    /// A hypothesis without the effects that the rest of it does as well without, for
+    /// all that one test for each effect says.
+    fn proven(&self, found: &Found) -> Hypothesis {
+        let mut best = found.best.clone();
+        let mut index = 0;
+        while index < best.terms.len() {
+            let lesser = match best.terms[index].effect() {
+                Some(_) => self.search.without(&best, index, &found.root),
+                None => None,
+            };
+            let chance = lesser.filter(|lesser| {
+                let p = p_value(&lesser.judged.held_out, &best.judged.held_out);
+                let count = best.judged.model().candidates().count() as f64;
+                count * p >= RULES.level
+            });
+            match chance {
+                Some(lesser) => best = lesser,
+                None => index += 1,
+            }
+        }
+        best
+    }
+
+    pub(super) fn conclusion(&self, found: &Found, as_given: &HeldOut) -> Conclusion {
+        let scatter = self.judge().noise_source == NoiseSource::Scatter;
+        let dark = scatter
+            && self.judge().unexplained_share(&found.bare.judged.held_out) <= RULES.too_much;
+        let proven = if dark {
+            self.proven(found)
+        } else {
+            found.best.clone()
+        };
+        let (best, bare) = (&proven, &found.bare);
+        let effects: Vec<&'static Spec> = best.terms.iter().filter_map(Term::effect).collect();
+        let judge = self.judge();
+        let of = |verdict: Verdict, model: &Hypothesis, effects: Vec<&'static Spec>| Conclusion {
+            verdict,
+            model: model.clone(),
+            effects,
+        };
+        if effects.is_empty() || !self.earned(best, bare) {
+            let verdict = if self.fits(&bare.judged) {
+                Verdict::NothingMissing
+            } else {
+                Verdict::Unexplained
+            };
+            return of(verdict, bare, Vec::new());
+        }
+        let left = judge.excess(&best.judged.held_out)
+            / judge.excess(&bare.judged.held_out).max(f64::MIN_POSITIVE);
+        let fits = self.fits(&best.judged);
+        let explained = match judge.noise_source {
+            NoiseSource::Scatter => 1.0 - left >= RULES.explained_in_unknown_noise,
+            NoiseSource::Measured | NoiseSource::Repeats => {
+                1.0 - left >= RULES.explained
+                    && judge.over_noise(best.judged.rmse()) <= RULES.nearly
+            }
+        };
+        // Effects on a base that is worse than what was given explain nothing.
+        let no_better = best.judged.rmse() >= as_given.rmse();
+        match () {
+            () if no_better => of(Verdict::Unexplained, bare, Vec::new()),
+            () if fits || explained => of(Verdict::EffectMissing, best, effects),
+            () if 1.0 - left >= RULES.stands_in => of(Verdict::PartlyExplained, best, effects),
+            () => of(Verdict::Unexplained, bare, Vec::new()),
+        }
+    }
+}

@@ -114,6 +114,18 @@ impl Command {
         }
     }
 
+    /// The same kind of command with levels from `low` to 1.
+    #[must_use]
+    pub(crate) fn graded(self, low: f64, rng: &mut ChaCha8Rng) -> Self {
+        if self.name.starts_with("random") {
+            let name = self.name.replace("random", "levels");
+            return Self::random_levels(&name, low, 1.0, rng);
+        }
+        let size = rng.random_range(0.4..1.0);
+        let turned = low < 0.0 && rng.random_bool(0.5);
+        self.map(|u| if turned { -size * u } else { size * u })
+    }
+
     /// The same sequence with every level mapped.
     pub fn map(mut self, level: impl Fn(f64) -> f64) -> Self {
         for u in &mut self.levels {

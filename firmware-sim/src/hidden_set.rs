@@ -1,41 +1,14 @@
 //! Data sets with something hidden in them, and the truth kept apart.
 
-use std::collections::BTreeMap;
-
 use rand::RngExt;
-use recordings::{DataError, DataSet, Record, Use};
-use thiserror::Error;
+use recordings::Use;
 
 use crate::command::Command;
-use crate::instrument::{Instrument, InstrumentError};
-use crate::plant::{
-    BasePlant, Effect, EffectError, Fault, FreeStream, PlantError, PlantSpec, Rig, SAMPLE_PERIOD_S,
-    ShowsWith,
-};
+use crate::family::{Nuisances, Units};
+use crate::instrument::Instrument;
+use crate::plant::{BasePlant, Effect, Fault, PlantSpec};
+use crate::recording::{Recorded, RigError, Session, with_levels};
 use crate::stream::{Stream, stream};
-
-/// Why a data set could not be made.
-#[derive(Debug, Error)]
-pub enum HiddenSetError {
-    /// An effect is unknown.
-    #[error(transparent)]
-    Effect(#[from] EffectError),
-    /// The rig is impossible.
-    #[error(transparent)]
-    Plant(#[from] PlantError),
-    /// The instrument is impossible.
-    #[error(transparent)]
-    Instrument(#[from] InstrumentError),
-    /// What the rig gave is no recording.
-    #[error(transparent)]
-    Data(#[from] DataError),
-    /// No fault of that name.
-    #[error("there is no fault `{0}`; the names are: {names}", names = Fault::NAMES.join(", "))]
-    UnknownFault(String),
-    /// Two effects want the same part of the rig.
-    #[error("`{0}` and `{1}` exclude each other; hide one of them")]
-    Exclusive(&'static str, &'static str),
-}
 
 /// Everything that determines a data set, bit for bit.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,15 +30,15 @@ impl HiddenSetPlan {
     /// stream wanders when an effect needs it, and in a quarter of the other cases to no effect.
     ///
     /// # Errors
-    /// [`HiddenSetError`] for unknown names and for effects that exclude each other.
-    pub fn draw(effects: &[&str], faults: &[&str], seed: u64) -> Result<Self, HiddenSetError> {
+    /// [`RigError`] for unknown names and for effects that exclude each other.
+    pub fn draw(effects: &[&str], faults: &[&str], seed: u64) -> Result<Self, RigError> {
         let mut base = BasePlant::draw(&mut stream(seed, Stream::Base));
         let mut rng = stream(seed, Stream::Effects);
         let mut hidden: Vec<Effect> = Vec::new();
         for name in effects {
             let effect = Effect::draw(name, &base, &mut rng)?;
             if let Some(other) = hidden.iter().find(|e| e.excludes(&effect)) {
-                return Err(HiddenSetError::Exclusive(other.name(), effect.name()));
+                return Err(RigError::Exclusive(other.name(), effect.name()));
             }
             hidden.push(effect);
         }
@@ -76,7 +49,7 @@ impl HiddenSetPlan {
             .iter()
             .map(|name| {
                 Fault::draw(name, &mut rng)
-                    .ok_or_else(|| HiddenSetError::UnknownFault((*name).to_owned()))
+                    .ok_or_else(|| RigError::UnknownFault((*name).to_owned()))
             })
             .collect::<Result<Vec<_>, _>>()?;
         let wanders = hidden.iter().any(|e| e.channel().is_some());
@@ -106,103 +79,28 @@ impl HiddenSetPlan {
             (Command::square(2.0, 0.3), Use::Validate),
             (second, Use::Validate),
         ];
-        let effects = &self.plant.effects;
-        if !effects.iter().any(Effect::needs_levels) {
-            return on_off.into();
-        }
-        let signed = (effects.iter()).any(|e| e.shows_with() == ShowsWith::SignedLevels);
-        let low = if signed { -1.0 } else { 0.0 };
-        on_off
-            .into_iter()
-            .map(|(command, role)| {
-                let command = if command.name.starts_with("random") {
-                    let name = command.name.replace("random", "levels");
-                    Command::random_levels(&name, low, 1.0, &mut rng)
-                } else {
-                    let size = rng.random_range(0.4..1.0);
-                    let turned = signed && rng.random_bool(0.5);
-                    let level = if turned { -size } else { size };
-                    command.map(|u| u * level)
-                };
-                (command, role)
-            })
-            .collect()
+        with_levels(on_off.into(), &self.plant.effects, false, &mut rng)
     }
 
     /// Runs the rig through every command and measures it.
     ///
     /// # Errors
-    /// [`HiddenSetError`] when an effect's parameters or the instrument are impossible.
-    pub fn build(&self) -> Result<HiddenSet, HiddenSetError> {
-        let mut records = Vec::new();
-        let mut noise_free = Vec::new();
-        let mut tunnel = stream(self.seed, Stream::Tunnel);
-        let mut noise = stream(self.seed, Stream::Noise);
-        for (command, role) in self.commands() {
-            let n = command.levels.len();
-            let free_stream = self.free_stream.then(|| FreeStream::draw(&mut tunnel, n));
-            let truth = Rig::new(&self.plant, free_stream.clone())?.play(&command.levels);
-            let measured = self.instrument.measure(&truth, noise.random())?;
-            let channels = free_stream
-                .map(|stream| {
-                    let times = (0..n).map(|k| k as f64 * SAMPLE_PERIOD_S);
-                    let u_inf = times.map(|t| stream.velocity(t)).collect();
-                    BTreeMap::from([("u_inf".to_owned(), u_inf)])
-                })
-                .unwrap_or_default();
-            records.push(Record {
-                y_sd: Some(measured.standard_error),
-                y_min: Some(measured.min),
-                y_max: Some(measured.max),
-                channels,
-                ..Record::new(
-                    &command.name,
-                    role,
-                    SAMPLE_PERIOD_S,
-                    command.levels,
-                    measured.mean,
-                )
-            });
-            noise_free.push(truth);
-        }
-        Ok(HiddenSet {
-            // The title says nothing about what is hidden.
-            data: DataSet::from_records(
-                Some(format!("Simulated ramp, run {}", self.seed)),
-                records,
-            )?,
-            truth: Truth {
-                plant: self.plant.clone(),
-                seed: self.seed,
-                noise_free,
-            },
-        })
+    /// [`RigError`] when an effect's parameters or the instrument are impossible.
+    pub fn build(&self) -> Result<Recorded, RigError> {
+        let session = Session {
+            plant: &self.plant,
+            instrument: &self.instrument,
+            nuisances: Nuisances::default(),
+            free_stream: self.free_stream,
+            units: Units::OWN,
+            title: format!("Simulated ramp, run {}", self.seed),
+            seed: self.seed,
+        };
+        session.record(self.commands())
     }
-}
 
-/// A data set and what is really behind it.
-#[derive(Debug, Clone)]
-pub struct HiddenSet {
-    /// What a user of the tool would have.
-    pub data: DataSet,
-    /// What the tool must find out.
-    pub truth: Truth,
-}
-
-/// The answer to a hidden set; never given to the diagnosis.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Truth {
-    /// The rig with its effects and faults.
-    pub plant: PlantSpec,
-    /// Seed of the set.
-    pub seed: u64,
-    /// The readings without noise, per record in the order of the data set (y).
-    pub noise_free: Vec<Vec<f64>>,
-}
-
-impl Truth {
-    /// The truth as TOML text for people and scoring scripts.
-    pub fn to_toml(&self) -> String {
+    /// The answer as TOML text for people and scoring scripts; never given to the diagnosis.
+    pub fn answer(&self) -> String {
         format!("seed = {}\n\n{}", self.seed, self.plant.to_toml())
     }
 }
@@ -224,7 +122,7 @@ mod tests {
         );
         let held_out = set.data.records.iter().filter(|r| r.role == Use::Validate);
         assert_eq!(held_out.count(), 3);
-        for (record, truth) in set.data.records.iter().zip(&set.truth.noise_free) {
+        for (record, truth) in set.data.records.iter().zip(&set.noise_free) {
             assert_eq!(record.y.len(), 10_000);
             let sd = record.y_sd.as_deref().unwrap();
             let floor = (sd.iter().map(|s| s * s).sum::<f64>() / 1e4).sqrt();
@@ -250,7 +148,7 @@ mod tests {
         for name in Effect::NAMES {
             let plan = HiddenSetPlan::draw(&[name], &[], 3).unwrap();
             let set = plan.build().unwrap();
-            assert!(set.truth.to_toml().contains(name));
+            assert!(plan.answer().contains(name));
             assert_eq!(
                 set.data.is_on_off(),
                 !plan.plant.effects[0].needs_levels(),
@@ -260,11 +158,9 @@ mod tests {
             assert!(has_channel || *name != "free-stream-variation");
         }
         for name in Fault::NAMES {
-            let set = HiddenSetPlan::draw(&[], &[name], 3)
-                .unwrap()
-                .build()
-                .unwrap();
-            assert!(set.truth.to_toml().contains(name));
+            let plan = HiddenSetPlan::draw(&[], &[name], 3).unwrap();
+            plan.build().unwrap();
+            assert!(plan.answer().contains(name));
         }
     }
 

@@ -12,3 +12,4 @@ pub mod hidden_set;
 pub mod instrument;
 pub mod paper_like;
 pub mod plant;
+pub mod recording;

@@ -163,10 +163,9 @@ fn run(command: Command) -> Result<()> {
                 Rate::Bilinear => RateLaw::Bilinear,
             };
             plan.instrument.repeats = repeats;
-            let hidden = plan.build()?;
-            save(&hidden.data, &out)?;
+            save(&plan.build()?.data, &out)?;
             if let Some(path) = truth {
-                let text = hidden.truth.to_toml();
+                let text = plan.answer();
                 write_atomic(&path, |file| file.write_all(text.as_bytes()))?;
             }
         }

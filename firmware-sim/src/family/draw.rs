@@ -5,13 +5,14 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::weight::Weight;
-use super::{Family, NoiseKind, RigError, RigPlan};
+use super::{Family, NoiseKind, RigPlan};
 use crate::command::Command;
 use crate::instrument::{Instrument, Noise, Unrest};
 use crate::plant::{
     Altered, BasePlant, Character, Effect, EffectError, Fault, FlowDelay, FreeStream, PastTerm,
     Place, PlantSpec, RateLaw, log_uniform,
 };
+use crate::recording::RigError;
 use crate::stream::{Stream, stream};
 
 /// Draws of an effect before the heaviest so far is taken.
@@ -83,7 +84,7 @@ impl RigPlan {
                 other.1 == resembles || both_transport
             });
             if let Some((other, _, _)) = clash {
-                return Err(RigError::Exclusive(other.to_owned(), own.to_owned()));
+                return Err(RigError::Exclusive(other, own));
             }
             kinds.push(kind);
         }
@@ -327,15 +328,4 @@ pub(super) fn squares(rng: &mut ChaCha8Rng) -> Vec<(f64, f64)> {
 pub(super) fn telegraph(name: &str, rng: &mut ChaCha8Rng) -> Command {
     let [on, off] = [(); 2].map(|()| rng.random_range(200..=600));
     Command::telegraph(name, on, off, rng)
-}
-
-/// The same kind of command with levels from `low` to 1.
-pub(super) fn graded(command: Command, low: f64, rng: &mut ChaCha8Rng) -> Command {
-    if command.name.starts_with("random") {
-        let name = command.name.replace("random", "levels");
-        return Command::random_levels(&name, low, 1.0, rng);
-    }
-    let size = rng.random_range(0.4..1.0);
-    let turned = low < 0.0 && rng.random_bool(0.5);
-    command.map(|u| if turned { -size * u } else { size * u })
 }

@@ -7,19 +7,14 @@ mod draw;
 mod nuisance;
 mod weight;
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use rand::RngExt;
-use recordings::{DataError, DataSet, Record, Use};
-use thiserror::Error;
+use recordings::Use;
 
-use crate::command::{Command, LEAD_SAMPLES};
-use crate::instrument::{Instrument, InstrumentError};
-use crate::plant::{
-    Effect, EffectError, FlowDelay, FreeStream, Parameter, PlantError, PlantSpec, Rig,
-    SAMPLE_PERIOD_S, ShowsWith,
-};
+use crate::command::Command;
+use crate::instrument::Instrument;
+use crate::plant::{Effect, Parameter, PlantSpec};
+use crate::recording::{Recorded, RigError, Session, with_levels};
 use crate::stream::{Stream, stream};
 
 pub use nuisance::{Nuisance, Nuisances};
@@ -116,26 +111,6 @@ impl NoiseKind {
     }
 }
 
-/// Why a rig could not be drawn or recorded.
-#[derive(Debug, Error)]
-pub enum RigError {
-    /// An effect is unknown or impossible.
-    #[error(transparent)]
-    Effect(#[from] EffectError),
-    /// The rig is impossible.
-    #[error(transparent)]
-    Plant(#[from] PlantError),
-    /// The instrument is impossible.
-    #[error(transparent)]
-    Instrument(#[from] InstrumentError),
-    /// What the rig gave is no recording.
-    #[error(transparent)]
-    Data(#[from] DataError),
-    /// Two effects want the same part of the rig.
-    #[error("`{0}` and `{1}` exclude each other; hide one of them")]
-    Exclusive(String, String),
-}
-
 /// In which units the rig is written down: the same samples, other numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Units {
@@ -178,15 +153,6 @@ pub struct RigPlan {
     pub weight: f64,
     /// Seed of commands, free stream and noise.
     pub seed: u64,
-}
-
-/// A data set and what is really behind it.
-#[derive(Debug, Clone)]
-pub struct Recorded {
-    /// What a user of the tool would have.
-    pub data: DataSet,
-    /// The readings without noise, per record in the order of the data set (recorded y).
-    pub noise_free: Vec<Vec<f64>>,
 }
 
 impl RigPlan {
@@ -270,15 +236,8 @@ impl RigPlan {
 
     /// Names that would be no error beside the hidden ones: true of the rig, though nobody hid them.
     pub fn also_right(&self) -> Vec<&'static str> {
-        let delay = match self.plant.delay() {
-            FlowDelay::Fixed { .. } => None,
-            FlowDelay::StateDependent { .. } | FlowDelay::Clamped { .. } => {
-                Some("state-dependent-delay")
-            }
-            FlowDelay::EdgeDependent { .. } => Some("edge-dependent-delay"),
-        };
-        let drift = (self.nuisances.drift != 0.0).then_some("thermal-drift");
-        delay.into_iter().chain(drift).collect()
+        let delay = self.plant.delay().effect();
+        delay.into_iter().chain(self.nuisances.effect()).collect()
     }
 
     /// Effects of the catalogue with their true parameters, in the rig's own units; those in other laws
@@ -303,16 +262,7 @@ impl RigPlan {
         all.insert(4, (first, Use::Identify));
         all.push((second, Use::Validate));
 
-        let shows_with = |wanted| self.plant.effects.iter().any(|e| e.shows_with() == wanted);
-        let signed = shows_with(ShowsWith::SignedLevels);
-        if signed || self.nuisances.graded || shows_with(ShowsWith::Levels) {
-            let low = if signed { -1.0 } else { 0.0 };
-            all = all
-                .into_iter()
-                .map(|(command, role)| (draw::graded(command, low, &mut rng), role))
-                .collect();
-        }
-        all
+        with_levels(all, &self.plant.effects, self.nuisances.graded, &mut rng)
     }
 
     /// Runs the rig through every command and measures it.
@@ -320,59 +270,16 @@ impl RigPlan {
     /// # Errors
     /// [`RigError`] when an effect's parameters or the instrument are impossible.
     pub fn build(&self) -> Result<Recorded, RigError> {
-        let mut tunnel = stream(self.seed, Stream::Tunnel);
-        let mut noise = stream(self.seed, Stream::Noise);
-        let mut nuisance = stream(self.seed, Stream::Nuisances);
-        let (mut records, mut noise_free) = (Vec::new(), Vec::new());
-        for (index, (command, role)) in self.commands().into_iter().enumerate() {
-            let n = command.levels.len();
-            // What happened before a record that begins in mid-run, which nobody wrote down.
-            let lead = self.nuisances.lead_samples;
-            let mut levels = Vec::with_capacity(lead + n);
-            let mut u = command.levels;
-            if lead > 0 {
-                let before = Command::random("before", &mut nuisance).levels;
-                levels.extend(before.into_iter().skip(LEAD_SAMPLES).take(lead));
-                u.rotate_left(LEAD_SAMPLES);
-            }
-            let lead = levels.len();
-            levels.extend(&u);
-            let stream = (self.free_stream).then(|| FreeStream::draw(&mut tunnel, levels.len()));
-            let readings = Rig::new(&self.plant, stream.clone())?.play(&levels);
-            let truth: Vec<f64> = readings
-                .into_iter()
-                .skip(lead)
-                .enumerate()
-                .map(|(k, y)| y + self.nuisances.zero(index * n + k, 8 * n))
-                .collect();
-            let measured = self.instrument.measure(&truth, noise.random())?;
-            let time = |k: usize| (lead + k) as f64 * SAMPLE_PERIOD_S;
-            let channels = stream.map_or_else(BTreeMap::new, |stream| {
-                let u_inf = (0..n).map(|k| stream.velocity(time(k))).collect();
-                BTreeMap::from([("u_inf".to_owned(), u_inf)])
-            });
-            let scaled = |x: Vec<f64>| -> Vec<f64> { x.iter().map(|y| y * self.units.y).collect() };
-            records.push(Record {
-                y_sd: Some(scaled(measured.standard_error)),
-                y_min: Some(scaled(measured.min)),
-                y_max: Some(scaled(measured.max)),
-                channels,
-                ..Record::new(
-                    &command.name,
-                    role,
-                    SAMPLE_PERIOD_S * self.units.time,
-                    u,
-                    scaled(measured.mean),
-                )
-            });
-            noise_free.push(scaled(truth));
-        }
-        // The title says nothing about what is hidden.
-        let title = Some(format!("Simulated rig {}", self.seed));
-        Ok(Recorded {
-            data: DataSet::from_records(title, records)?,
-            noise_free,
-        })
+        let session = Session {
+            plant: &self.plant,
+            instrument: &self.instrument,
+            nuisances: self.nuisances,
+            free_stream: self.free_stream,
+            units: self.units,
+            title: format!("Simulated rig {}", self.seed),
+            seed: self.seed,
+        };
+        session.record(self.commands())
     }
 
     /// The answer as TOML text for people and scoring scripts.
@@ -414,7 +321,7 @@ impl RigPlan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::Altered;
+    use crate::plant::{Altered, Rig};
 
     #[test]
     fn every_family_records_eight_runs_near_its_truth_and_repeats_bit_for_bit() {

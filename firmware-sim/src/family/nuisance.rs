@@ -5,6 +5,8 @@ use std::fmt::Write as _;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use crate::plant::effects::{Physics, ThermalDrift};
+
 /// A kind of nuisance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Nuisance {
@@ -71,8 +73,13 @@ impl Nuisances {
         all
     }
 
+    /// The effect that would be no wrong name for one of them, though nobody hid it.
+    pub(super) fn effect(&self) -> Option<&'static str> {
+        (self.drift != 0.0).then_some(ThermalDrift::NAME)
+    }
+
     /// The sensor's zero at sample `k` of a session of `samples` (y).
-    pub(super) fn zero(&self, k: usize, samples: usize) -> f64 {
+    pub(crate) fn zero(&self, k: usize, samples: usize) -> f64 {
         self.offset + self.drift * k as f64 / samples as f64
     }
 

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use crate::plant::{BasePlant, FlowDelay, FreeStream, PlantError, PlantSpec, Rig, SAMPLE_PERIOD_S};
+use crate::plant::{BasePlant, FreeStream, PlantError, PlantSpec, Rig, SAMPLE_PERIOD_S};
 
 /// An effect should change the readings by this many standard errors …
 const TOTAL: f64 = 4.0;
@@ -108,7 +108,7 @@ impl Weight {
 
     /// What a little memory of each length adds, alone and times the jet: it drives the flow as the jet does.
     fn memories_of(&self, base: &BasePlant) -> Vec<Vec<f64>> {
-        let delay = (middle(base.delay) / SAMPLE_PERIOD_S).round() as usize;
+        let delay = (base.delay.at(MIDDLE) / SAMPLE_PERIOD_S).round() as usize;
         let past = |x: &[f64], k: usize, lag: usize| k.checked_sub(lag).map_or(0.0, |k| x[k]);
         let lags = (1..=MEMORIES).map(|number| number * BETWEEN_MEMORIES);
         let each = lags.flat_map(|lag| [(lag, false), (lag, true)]);
@@ -128,24 +128,6 @@ impl Weight {
                 .collect()
         })
         .collect()
-    }
-}
-
-/// The delay of a half attached flow (s).
-fn middle(law: FlowDelay) -> f64 {
-    match law {
-        FlowDelay::Fixed { delay_s } => delay_s,
-        FlowDelay::StateDependent {
-            floor_s,
-            rise_s,
-            rate,
-        } => floor_s + rise_s * (-rate * MIDDLE).exp(),
-        FlowDelay::Clamped {
-            floor_s,
-            rise_s,
-            level,
-        } => floor_s + rise_s * (1.0 - MIDDLE / level).max(0.0),
-        FlowDelay::EdgeDependent { rise_s, fall_s } => (rise_s + fall_s) / 2.0,
     }
 }
 

@@ -4,6 +4,8 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
+use super::effects::{EdgeDependentDelay, Physics, StateDependentDelay};
+
 /// A property of the base plant that no rig can have.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error("the base plant's `{property}` is {value}; it must be {requirement}")]
@@ -53,6 +55,34 @@ pub enum FlowDelay {
 }
 
 impl FlowDelay {
+    /// The effect of the catalogue that it is, or is nearest to; none for a delay that is always the same.
+    pub fn effect(self) -> Option<&'static str> {
+        match self {
+            Self::Fixed { .. } => None,
+            Self::StateDependent { .. } | Self::Clamped { .. } => Some(StateDependentDelay::NAME),
+            Self::EdgeDependent { .. } => Some(EdgeDependentDelay::NAME),
+        }
+    }
+
+    /// The delay at mean friction `mean` (s), of both edges on average where they differ; reversed flow is
+    /// no more separated than none.
+    pub fn at(self, mean: f64) -> f64 {
+        match self {
+            Self::Fixed { delay_s } => delay_s,
+            Self::StateDependent {
+                floor_s,
+                rise_s,
+                rate,
+            } => floor_s + rise_s * (-rate * mean.max(0.0)).exp(),
+            Self::Clamped {
+                floor_s,
+                rise_s,
+                level,
+            } => floor_s + rise_s * (1.0 - mean.max(0.0) / level).max(0.0),
+            Self::EdgeDependent { rise_s, fall_s } => (rise_s + fall_s) / 2.0,
+        }
+    }
+
     /// The same law with every delay `factor` times as long.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {

@@ -63,22 +63,12 @@ impl ArrivalClock {
         clock
     }
 
-    /// The delay at mean friction `mean` (s); reversed flow is no more separated than none.
+    /// The delay at mean friction `mean` (s).
     pub(crate) fn delay(&self, mean: f64) -> f64 {
         match self.law {
-            FlowDelay::Fixed { delay_s } => delay_s,
-            FlowDelay::StateDependent {
-                floor_s,
-                rise_s,
-                rate,
-            } => floor_s + rise_s * (-rate * mean.max(0.0)).exp(),
-            FlowDelay::Clamped {
-                floor_s,
-                rise_s,
-                level,
-            } => floor_s + rise_s * (1.0 - mean.max(0.0) / level).max(0.0),
             // The edges have been re-timed before they reached the valve.
             FlowDelay::EdgeDependent { .. } => 0.0,
+            law => law.at(mean),
         }
     }
 

@@ -2,8 +2,9 @@
 
 use std::fmt;
 
-use firmware_sim::family::{Family, NoiseKind, Nuisance, RigError, RigPlan, Units};
+use firmware_sim::family::{Family, NoiseKind, Nuisance, RigPlan, Units};
 use firmware_sim::plant::{Altered, Effect, Fault, ShowsWith};
+use firmware_sim::recording::RigError;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

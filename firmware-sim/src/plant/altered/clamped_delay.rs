@@ -4,7 +4,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plant::base::{BasePlant, FlowDelay};
-use crate::plant::effects::{Card, Limits, Physics};
+use crate::plant::effects::{Card, Limits, Physics, StateDependentDelay};
 use crate::plant::part::{Part, Place, Surroundings};
 
 /// h = floor + rise·max(1 − ỹ/level, 0); replaces the base plant's delay.
@@ -20,7 +20,7 @@ pub struct ClampedDelay {
 
 impl Physics for ClampedDelay {
     const NAME: &'static str = "clamped-delay";
-    const RESEMBLES: &'static str = "state-dependent-delay";
+    const RESEMBLES: &'static str = StateDependentDelay::NAME;
     const PLACE: Place = Place::Transport;
     const PARAMETERS: &'static [Card<Self>] = &[
         Card::new("floor", "s", Limits::TRAVEL, |e| &mut e.floor),

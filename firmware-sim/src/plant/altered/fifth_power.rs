@@ -4,7 +4,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plant::base::BasePlant;
-use crate::plant::effects::{Card, Limits, Physics};
+use crate::plant::effects::{AmplitudeSaturation, Card, Limits, Physics};
 use crate::plant::part::{FlowPart, Part, Place, Surroundings};
 
 /// −γ·s⁵ in the drive.
@@ -16,7 +16,7 @@ pub struct FifthPower {
 
 impl Physics for FifthPower {
     const NAME: &'static str = "fifth-power";
-    const RESEMBLES: &'static str = "amplitude-saturation";
+    const RESEMBLES: &'static str = AmplitudeSaturation::NAME;
     const PLACE: Place = Place::Flow;
     const PARAMETERS: &'static [Card<Self>] =
         &[Card::new("coefficient", "1/y⁴", Limits::FINITE, |e| {

@@ -4,7 +4,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
+use crate::plant::effects::{Card, HotFilmNonlinearity, Limits, Physics};
 use crate::plant::part::{Part, Place, SensorPart, Surroundings};
 
 /// E = √(1 + κ·(s + s0)ⁿ), normalised to keep 0 and 1.
@@ -20,7 +20,7 @@ pub struct KingExponent {
 
 impl Physics for KingExponent {
     const NAME: &'static str = "king-exponent";
-    const RESEMBLES: &'static str = "hot-film-nonlinearity";
+    const RESEMBLES: &'static str = HotFilmNonlinearity::NAME;
     const PLACE: Place = Place::Film;
     const PARAMETERS: &'static [Card<Self>] = &[
         Card::new("king_ratio", "-", Limits::POSITIVE, |e| &mut e.king_ratio),

@@ -6,7 +6,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plant::base::BasePlant;
-use crate::plant::effects::{Card, Limits, Physics};
+use crate::plant::effects::{Card, Limits, Physics, ValveLag};
 use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
 
 /// After a dead time the opening goes to where it is told at a constant speed.
@@ -22,7 +22,7 @@ pub struct RampValve {
 
 impl Physics for RampValve {
     const NAME: &'static str = "ramp-valve";
-    const RESEMBLES: &'static str = "valve-lag";
+    const RESEMBLES: &'static str = ValveLag::NAME;
     const PLACE: Place = Place::Valve;
     const PARAMETERS: &'static [Card<Self>] = &[
         Card::new("dead_time", "s", Limits::TRAVEL, |e| &mut e.dead_time),

@@ -6,7 +6,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plant::base::BasePlant;
-use crate::plant::effects::{Card, Limits, Physics};
+use crate::plant::effects::{Card, Limits, Physics, ValveLag};
 use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
 
 /// v̈ = ω²·(u − v) − 2ζω·v̇.
@@ -20,7 +20,7 @@ pub struct SecondOrderValve {
 
 impl Physics for SecondOrderValve {
     const NAME: &'static str = "second-order-valve";
-    const RESEMBLES: &'static str = "valve-lag";
+    const RESEMBLES: &'static str = ValveLag::NAME;
     const PLACE: Place = Place::Valve;
     const PARAMETERS: &'static [Card<Self>] = &[
         Card::new("frequency", "Hz", Limits::POSITIVE, |e| &mut e.frequency),

@@ -4,7 +4,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
+use crate::plant::effects::{Card, Limits, Physics, StartingVortex};
 use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
 
 /// Each rise of the jet adds gain·(e^(−t/τ) − e^(−t/τ_r)) per rise.
@@ -20,7 +20,7 @@ pub struct SlowVortex {
 
 impl Physics for SlowVortex {
     const NAME: &'static str = "slow-vortex";
-    const RESEMBLES: &'static str = "starting-vortex";
+    const RESEMBLES: &'static str = StartingVortex::NAME;
     const PLACE: Place = Place::Shedding;
     const PARAMETERS: &'static [Card<Self>] = &[
         Card::new("gain", "-", Limits::FINITE, |e| &mut e.gain),

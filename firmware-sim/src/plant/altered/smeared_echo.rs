@@ -4,7 +4,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::plant::LONGEST_DELAY_S;
 use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics, signed};
+use crate::plant::effects::{Card, EchoPath, Limits, Physics, signed};
 use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
 use crate::waveform::{Cursor, Waveform};
 
@@ -21,7 +21,7 @@ pub struct SmearedEcho {
 
 impl Physics for SmearedEcho {
     const NAME: &'static str = "smeared-echo";
-    const RESEMBLES: &'static str = "echo-path";
+    const RESEMBLES: &'static str = EchoPath::NAME;
     const PLACE: Place = Place::Path;
     const PARAMETERS: &'static [Card<Self>] = &[
         Card::new("gain", "-", Limits::FINITE, |e| &mut e.gain),

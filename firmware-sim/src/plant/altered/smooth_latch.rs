@@ -4,7 +4,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plant::base::BasePlant;
-use crate::plant::effects::{Card, Limits, Physics};
+use crate::plant::effects::{AttachmentHysteresis, Card, Limits, Physics};
 use crate::plant::part::{FlowPart, Part, Place, Surroundings};
 
 /// settling·λ̇ = ½ + ½·tanh((s − centre + half·(2λ − 1))/width) − λ; gain·λ is added to the drive.
@@ -24,7 +24,7 @@ pub struct SmoothLatch {
 
 impl Physics for SmoothLatch {
     const NAME: &'static str = "smooth-latch";
-    const RESEMBLES: &'static str = "attachment-hysteresis";
+    const RESEMBLES: &'static str = AttachmentHysteresis::NAME;
     const PLACE: Place = Place::Flow;
     const PARAMETERS: &'static [Card<Self>] = &[
         Card::new("centre", "y", Limits::FINITE, |e| &mut e.centre),

@@ -4,7 +4,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plant::base::BasePlant;
-use crate::plant::effects::{Card, Limits, Physics};
+use crate::plant::effects::{Card, Limits, Physics, SensorSaturation};
 use crate::plant::part::{Moment, Part, Place, SensorPart, Surroundings};
 
 /// Above the knee the reading is knee + room·tanh((x − knee)/room).
@@ -18,7 +18,7 @@ pub struct SoftRails {
 
 impl Physics for SoftRails {
     const NAME: &'static str = "soft-rails";
-    const RESEMBLES: &'static str = "sensor-saturation";
+    const RESEMBLES: &'static str = SensorSaturation::NAME;
     const PLACE: Place = Place::Rails;
     const PARAMETERS: &'static [Card<Self>] = &[
         Card::new("knee", "y", Limits::FINITE, |e| &mut e.knee),

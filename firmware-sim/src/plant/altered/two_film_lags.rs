@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 
 use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
+use crate::plant::effects::{Card, HotFilmLag, Limits, Physics};
 use crate::plant::part::{Part, Piece, Place, SensorPart, Surroundings};
 
 /// τ₁·ẋ = felt − x, τ₂·ẏ = x − y.
@@ -17,7 +17,7 @@ pub struct TwoFilmLags {
 
 impl Physics for TwoFilmLags {
     const NAME: &'static str = "two-film-lags";
-    const RESEMBLES: &'static str = "hot-film-lag";
+    const RESEMBLES: &'static str = HotFilmLag::NAME;
     const PLACE: Place = Place::FilmLag;
     const PARAMETERS: &'static [Card<Self>] = &[
         Card::new("first_time", "s", Limits::TIME, |e| &mut e.first_time),

@@ -4,7 +4,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
+use crate::plant::effects::{Card, Limits, Physics, PlenumDroop};
 use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
 
 /// Ṗ = (B − P)/τ_p − κ·v·P, Ḃ = (1 − B)/τ_b − ρ·(B − P)/τ_p; j = v·P, both full at the start.
@@ -22,7 +22,7 @@ pub struct TwoReservoirs {
 
 impl Physics for TwoReservoirs {
     const NAME: &'static str = "two-reservoirs";
-    const RESEMBLES: &'static str = "plenum-droop";
+    const RESEMBLES: &'static str = PlenumDroop::NAME;
     const PLACE: Place = Place::Plenum;
     const PARAMETERS: &'static [Card<Self>] = &[
         Card::new("recovery_time", "s", Limits::TIME, |e| &mut e.recovery_time),

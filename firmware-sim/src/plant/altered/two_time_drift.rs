@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 
 use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics, signed};
+use crate::plant::effects::{Card, Limits, Physics, ThermalDrift, signed};
 use crate::plant::part::{Moment, Part, Place, SensorPart, Surroundings};
 
 /// Half the amplitude with each of two time constants.
@@ -19,7 +19,7 @@ pub struct TwoTimeDrift {
 
 impl Physics for TwoTimeDrift {
     const NAME: &'static str = "two-time-drift";
-    const RESEMBLES: &'static str = "thermal-drift";
+    const RESEMBLES: &'static str = ThermalDrift::NAME;
     const PLACE: Place = Place::Zero;
     const PARAMETERS: &'static [Card<Self>] = &[
         Card::new("amplitude", "y", Limits::FINITE, |e| &mut e.amplitude),

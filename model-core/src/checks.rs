@@ -77,7 +77,7 @@ pub const fn law(law: &Tracking<f32>) -> bool {
 
 /// Samples that a tracking law looks ahead when the first arrival is `delay` away.
 #[must_use]
-pub const fn look_ahead(law: &Tracking<f32>, delay: usize) -> usize {
+pub const fn look_ahead<T>(law: &Tracking<T>, delay: usize) -> usize {
     let HoldTimes { on, off } = law.hold;
     let hold = if on > off { on } else { off } as usize;
     let valve = if law.opening > law.closing {

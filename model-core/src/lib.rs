@@ -24,6 +24,8 @@ pub mod effects;
 pub mod frozen;
 pub mod history;
 pub mod model;
+#[cfg(test)]
+mod paper;
 pub mod real;
 pub mod recursion;
 pub mod self_test;

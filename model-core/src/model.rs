@@ -431,40 +431,7 @@ mod tests {
     use crate::delay::{FixedDelay, ScaledDelay};
     use crate::effect::{Physics, Setting};
     use crate::effects::{HotFilmLag, StateDependentDelay, ValveLag};
-
-    /// Table II of the paper, state-dependent delays.
-    fn table_two<T: Real>(
-        convention: LagConvention,
-    ) -> Params<T, 5, 10, 1, ScaledDelay<StateDependentDelay<T>, [T; 1], true>, ()> {
-        let number = T::from_f64;
-        Params {
-            convention,
-            averaging: Averaging {
-                window: 250,
-                averaged_model: false,
-            },
-            grading: Grading::Proportional,
-            constant: T::ZERO,
-            state_lags: [1, 44, 123, 479, 496],
-            a: SVector::from([0.9759, 0.0141, 0.0025, -0.0042, 0.0055].map(number)),
-            product_lags: [1, 73, 242, 264, 299, 335, 414, 477, 494, 500],
-            b: SVector::from([0.0080].map(number)),
-            c: SMatrix::from([[
-                -0.0228, 0.0138, 0.0621, -0.0286, -0.0186, -0.0121, -0.0035, -0.0056, 0.0189,
-                -0.0049,
-            ]
-            .map(number)]),
-            delay: ScaledDelay {
-                law: StateDependentDelay {
-                    floor: number(47.35),
-                    rise: number(12.69),
-                    rate: number(20.18),
-                },
-                factors: [T::ONE],
-            },
-            effects: (),
-        }
-    }
+    use crate::paper::table_two;
 
     fn step_response<T: Real>(convention: LagConvention, samples: usize) -> T {
         let model = table_two::<T>(convention);

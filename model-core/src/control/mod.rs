@@ -7,6 +7,7 @@
 
 pub mod ahead;
 pub mod budget;
+mod correction;
 pub mod golden;
 pub mod hold;
 pub mod pulses;

@@ -98,24 +98,14 @@ pub fn ramp<T: Real>(now: T, goal: T, slope: T) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Parts;
+    use crate::paper::table_two;
     use crate::recursion::LagConvention;
 
     #[test]
     fn the_papers_model_reaches_1_067() {
-        let recursion = Bilinear {
-            convention: LagConvention::OneStep,
-            grading: crate::recursion::Grading::Proportional,
-            constant: 0.0_f64,
-            state_lags: &[1, 44, 123, 479, 496],
-            a: &[0.9759, 0.0141, 0.0025, -0.0042, 0.0055],
-            product_lags: &[1, 73, 242, 264, 299, 335, 414, 477, 494, 500],
-            b: &[0.0080],
-            c: &[
-                -0.0228, 0.0138, 0.0621, -0.0286, -0.0186, -0.0121, -0.0035, -0.0056, 0.0189,
-                -0.0049,
-            ],
-        };
-        let reachable = Reachable::of(&recursion).unwrap();
+        let model = table_two::<f64>(LagConvention::OneStep);
+        let reachable = Reachable::of(&model.recursion()).unwrap();
         assert_eq!(reachable.low, 0.0);
         assert!((reachable.high - 0.0080 / 0.0075).abs() < 1e-9);
         assert!(reachable.check(1.05).is_ok());

@@ -10,16 +10,17 @@
 //! choice u = 1 ⇔ y* − F > G/2.
 //!
 //! Three corrections make it hold on a flow that is not the model: an observer
-//! moves the estimate by a share of each residual; the error of predictions made
-//! a delay ago, low-pass filtered, is added to those made now (Smith's
-//! correction); and a slow integral removes what remains.
+//! moves the estimate by a share of each residual, and bias and integral move
+//! what is asked for.
 
+use crate::checks::look_ahead;
 use crate::control::ahead::{self, Foreknown};
 use crate::control::budget::{Budget, Purse};
+use crate::control::correction::{Correction, limited};
 use crate::control::hold::{Hold, HoldTimes};
 use crate::control::reference::{Reachable, Unreachable, ramp};
 use crate::effect::Effect;
-use crate::history::{DelayLine, Memory, Past};
+use crate::history::Memory;
 use crate::model::{Input, Parts, StateOf, observe};
 use crate::real::Real;
 use core::fmt;
@@ -98,17 +99,10 @@ pub struct TrackingState<T, S, const A: usize> {
     /// Room to look ahead.
     ahead: [T; A],
     foreknown: Foreknown<T>,
-    /// Predictions `lead` ahead, the newest made last.
-    predictions: DelayLine<T, A>,
+    correction: Correction<T, A>,
     hold: Hold,
     purse: Purse,
     reference: T,
-    bias: T,
-    integral: T,
-    /// Samples since the start, saturating.
-    age: u32,
-    /// Consecutive samples without a reading, saturating.
-    lost: u32,
 }
 
 /// What the law decided at a sample, and why.
@@ -167,12 +161,7 @@ impl<T: Real> Tracking<T> {
         if self.lead == 0 {
             return Err(Unusable::Constant("lead"));
         }
-        let half_hold = self.hold.of(true).max(self.hold.of(false)).div_ceil(2) as usize;
-        let needed = usize::from(longest_delay)
-            + usize::from(self.opening.max(self.closing))
-            + half_hold
-            + 2;
-        if needed > A || usize::from(self.lead) >= A {
+        if look_ahead(self, usize::from(longest_delay)) > A {
             return Err(Unusable::LookAhead);
         }
         Ok(())
@@ -186,14 +175,10 @@ impl<T: Real> Tracking<T> {
             model: model_state,
             ahead: [T::ZERO; A],
             foreknown: Foreknown::new(),
-            predictions: DelayLine::new(),
+            correction: Correction::none(),
             hold: Hold::closed(),
             purse: self.budget.full(),
             reference: T::ZERO,
-            bias: T::ZERO,
-            integral: T::ZERO,
-            age: 0,
-            lost: 0,
         }
     }
 
@@ -227,7 +212,7 @@ impl<T: Real> Tracking<T> {
     {
         state.reference = ramp(state.reference, self.reference, self.slope);
         let was_on = state.hold.is_on();
-        let target = state.reference + state.integral - state.bias;
+        let target = state.reference + state.correction.integral - state.correction.bias;
         let may_switch = state.hold.may_switch(&self.hold);
         // The position to judge: the other one, where the valve is free to take it.
         let look = self.look_ahead(model, state, was_on != may_switch, channels);
@@ -252,18 +237,27 @@ impl<T: Real> Tracking<T> {
         let residual = measured
             .filter(|y| y.abs() < T::from_f64(f64::MAX))
             .map(|y| limited(y - output.measured, self.residual_limit));
-        self.correct(state, output.flow, residual, look.at_lead);
+        let stands = (state.hold.is_on(), state.hold.since());
+        let correction = &mut state.correction;
+        correction.update(
+            self,
+            state.reference,
+            output.flow,
+            residual,
+            look.at_lead,
+            stands,
+        );
         let next = output.next + self.observer * residual.unwrap_or(T::ZERO);
         state.model.advance(next, model.averaging().window);
         Decision {
             on,
             reference: state.reference,
-            foreseen: look.foreseen + state.bias - state.integral,
+            foreseen: look.foreseen + correction.bias - correction.integral,
             delay: look.delay,
             estimate: output.flow,
             residual: residual.unwrap_or(T::ZERO),
-            bias: state.bias,
-            lost: state.lost,
+            bias: correction.bias,
+            lost: correction.lost,
         }
     }
 
@@ -327,40 +321,6 @@ impl<T: Real> Tracking<T> {
         );
         look
     }
-
-    /// Bias and integral from the reading of this sample.
-    fn correct<S, const A: usize>(
-        &self,
-        state: &mut TrackingState<T, S, A>,
-        estimate: T,
-        residual: Option<T>,
-        at_lead: T,
-    ) {
-        state.predictions.push(at_lead);
-        state.age = state.age.saturating_add(1);
-        let Some(residual) = residual else {
-            state.lost = state.lost.saturating_add(1);
-            return;
-        };
-        state.lost = 0;
-        // Predictions begin to come due `lead` samples after the start.
-        if state.age <= u32::from(self.lead) {
-            return;
-        }
-        let flow = estimate + residual;
-        let missed = flow - state.predictions.back(usize::from(self.lead));
-        let bias = state.bias + self.bias_rate * (missed - state.bias);
-        state.bias = limited(bias, self.correction_limit);
-        // A valve that stands still and is already where the integral pushes it
-        // can give no more: the integral waits.
-        let error = state.reference - flow;
-        let pushes_on = error > T::ZERO;
-        let still = state.hold.since() >= 4 * u32::from(self.lead);
-        if !(still && pushes_on == state.hold.is_on()) {
-            let integral = state.integral + self.integral_rate * error;
-            state.integral = limited(integral, self.correction_limit);
-        }
-    }
 }
 
 /// What looking ahead found.
@@ -373,53 +333,13 @@ struct Look<T> {
     delay: u16,
 }
 
-#[inline]
-fn limited<T: Real>(value: T, limit: T) -> T {
-    value.at_most(limit).at_least(-limit)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::delay::ScaledDelay;
-    use crate::effects::StateDependentDelay;
-    use crate::model::{Averaging, Params};
+    use crate::history::Past;
+    use crate::paper::table_two;
     use crate::recursion::LagConvention;
     use crate::step;
-    use nalgebra::{SMatrix, SVector};
-
-    type TableTwo<T> = Params<T, 5, 10, 1, ScaledDelay<StateDependentDelay<T>, [T; 1], true>, ()>;
-
-    fn table_two<T: Real>(convention: LagConvention) -> TableTwo<T> {
-        let number = T::from_f64;
-        Params {
-            convention,
-            averaging: Averaging {
-                window: 250,
-                averaged_model: false,
-            },
-            grading: crate::recursion::Grading::Proportional,
-            constant: T::ZERO,
-            state_lags: [1, 44, 123, 479, 496],
-            a: SVector::from([0.9759, 0.0141, 0.0025, -0.0042, 0.0055].map(number)),
-            product_lags: [1, 73, 242, 264, 299, 335, 414, 477, 494, 500],
-            b: SVector::from([number(0.0080)]),
-            c: SMatrix::from([[
-                -0.0228, 0.0138, 0.0621, -0.0286, -0.0186, -0.0121, -0.0035, -0.0056, 0.0189,
-                -0.0049,
-            ]
-            .map(number)]),
-            delay: ScaledDelay {
-                law: StateDependentDelay {
-                    floor: number(47.35),
-                    rise: number(12.69),
-                    rate: number(20.18),
-                },
-                factors: [T::ONE],
-            },
-            effects: (),
-        }
-    }
 
     fn law<T: Real>(reference: f64, dwell: u32) -> Tracking<T> {
         Tracking {
@@ -445,6 +365,31 @@ mod tests {
         }
     }
 
+    /// The law on its own model. `each` is told sample, friction, law and decision, and
+    /// says what is read next where that is not the friction.
+    fn on_its_model<T: Real>(
+        convention: LagConvention,
+        mut law: Tracking<T>,
+        samples: usize,
+        mut each: impl FnMut(usize, f64, &mut Tracking<T>, Decision<T>) -> Option<Measurement<T>>,
+    ) {
+        let model = table_two::<T>(convention);
+        law.validate::<_, 96>(&model, 60).unwrap();
+        let mut plant = model.on_off_state::<512, 4>();
+        let mut state = law.start::<_, 96>(model.on_off_state::<512, 4>());
+        let mut other = None;
+        for k in 0..samples {
+            let y = plant.outputs.back(0);
+            let decision = law.step(&model, &mut state, other.unwrap_or(Some(y)), &[]);
+            let input = Input {
+                command: if decision.on { T::ONE } else { T::ZERO },
+                channels: &[],
+            };
+            step(&model, &mut plant, &input);
+            other = each(k, y.value(), &mut law, decision);
+        }
+    }
+
     struct Run {
         rms: f64,
         mean: f64,
@@ -455,27 +400,12 @@ mod tests {
 
     /// The law on its own model, judged from 5 s to 20 s.
     fn run<T: Real>(convention: LagConvention, reference: f64, dwell: u32) -> Run {
-        let model = table_two::<T>(convention);
         let law = law::<T>(reference, dwell);
-        law.validate::<_, 96>(&model, 60).unwrap();
-        let mut plant = model.on_off_state::<512, 4>();
-        let mut state = law.start::<_, 96>(model.on_off_state::<512, 4>());
         let (mut sum, mut squares, mut low, mut high) = (0.0, 0.0, f64::MAX, f64::MIN);
         let (mut switches, mut open, mut before, mut count) = (0.0, 0.0, false, 0.0);
-        for k in 0..20_000 {
-            let y = plant.outputs.back(0);
-            let on = law.step(&model, &mut state, Some(y), &[]).on;
-            let command = if on { T::ONE } else { T::ZERO };
-            step(
-                &model,
-                &mut plant,
-                &Input {
-                    command,
-                    channels: &[],
-                },
-            );
+        on_its_model(convention, law, 20_000, |k, y, _, decision| {
+            let on = decision.on;
             if k >= 5000 {
-                let y = y.value();
                 sum += y;
                 squares += (y - reference) * (y - reference);
                 low = low.min(y);
@@ -485,7 +415,8 @@ mod tests {
                 count += 1.0;
             }
             before = on;
-        }
+            None
+        });
         Run {
             rms: (squares / count).sqrt(),
             mean: sum / count,
@@ -574,80 +505,53 @@ mod tests {
     /// A level that the flow goes down to and comes back from without readings.
     #[test]
     fn without_readings_the_model_keeps_the_flow_where_it_is() {
-        let model = table_two::<f64>(LagConvention::OneStep);
-        let law = law::<f64>(0.8, 10);
-        let mut plant = model.on_off_state::<512, 4>();
-        let mut state = law.start::<_, 96>(model.on_off_state::<512, 4>());
         let mut worst = 0.0_f64;
-        for k in 0..10_000 {
-            let y = plant.outputs.back(0);
-            let reading = match k {
-                5000..5500 => None,
-                5500..6000 => Some(f64::NAN),
-                6000..6005 => Some(1e30),
-                _ => Some(y),
-            };
-            let decision = law.step(&model, &mut state, reading, &[]);
+        let law = law::<f64>(0.8, 10);
+        on_its_model(LagConvention::OneStep, law, 10_000, |k, y, _, decision| {
             assert_eq!(decision.lost > 0, (5000..6000).contains(&k));
-            let command = f64::from(u8::from(decision.on));
-            step(
-                &model,
-                &mut plant,
-                &Input {
-                    command,
-                    channels: &[],
-                },
-            );
             if k > 4000 {
                 worst = worst.max((y - 0.8).abs());
             }
-        }
+            match k + 1 {
+                5000..5500 => Some(None),
+                5500..6000 => Some(Some(f64::NAN)),
+                6000..6005 => Some(Some(1e30)),
+                _ => None,
+            }
+        });
         assert!(worst < 0.06, "{worst}");
     }
 
     #[test]
     fn reference_steps_and_saturation() {
-        let model = table_two::<f64>(LagConvention::OneStep);
         let mut law = law::<f64>(0.9, 10);
         assert!(law.set_reference(1.2).is_err());
         assert_eq!(law.reference, 0.9);
         // Above what blowing gives: steadily on, nothing winds up.
         law.reference = 1.5;
-        let mut plant = model.on_off_state::<512, 4>();
-        let mut state = law.start::<_, 96>(model.on_off_state::<512, 4>());
-        let mut back_at = None;
-        for k in 0..9000 {
-            if k == 5000 {
-                law.reference = 0.5;
-            }
-            let y = plant.outputs.back(0);
-            let decision = law.step(&model, &mut state, Some(y), &[]);
+        let (mut back_at, mut last) = (None, 0.0);
+        on_its_model(LagConvention::OneStep, law, 9000, |k, y, law, decision| {
             if (200..5000).contains(&k) {
                 assert!(decision.on, "sample {k}");
             }
-            let command = f64::from(u8::from(decision.on));
-            step(
-                &model,
-                &mut plant,
-                &Input {
-                    command,
-                    channels: &[],
-                },
-            );
+            if k == 4999 {
+                law.reference = 0.5;
+            }
             if k > 5000 && y < 0.5 && back_at.is_none() {
                 back_at = Some(k - 5000);
             }
-        }
+            last = y;
+            None
+        });
         // Falling from 1.05 to 0.5 on 0.6 s takes the model 0.4 s; the valve
         // closes at once.
         assert!(back_at.is_some_and(|k| k < 700), "{back_at:?}");
-        assert!((plant.outputs.back(0) - 0.5).abs() < 0.05);
+        assert!((last - 0.5).abs() < 0.05);
     }
 
     #[test]
     fn budgets_bind_the_law() {
         use crate::control::{Air, Switches};
-        let model = table_two::<f64>(LagConvention::OneStep);
         let mut law = law::<f64>(0.8, 10);
         law.budget = Budget {
             switches: Some(Switches {
@@ -659,25 +563,13 @@ mod tests {
                 saved: 500,
             }),
         };
-        let mut plant = model.on_off_state::<512, 4>();
-        let mut state = law.start::<_, 96>(model.on_off_state::<512, 4>());
         let (mut open, mut switches, mut before) = (0, 0, false);
-        for _ in 0..20_000 {
-            let y = plant.outputs.back(0);
-            let on = law.step(&model, &mut state, Some(y), &[]).on;
-            open += u32::from(on);
-            switches += u32::from(on != before);
-            before = on;
-            let command = f64::from(u8::from(on));
-            step(
-                &model,
-                &mut plant,
-                &Input {
-                    command,
-                    channels: &[],
-                },
-            );
-        }
+        on_its_model(LagConvention::OneStep, law, 20_000, |_, _, _, decision| {
+            open += u32::from(decision.on);
+            switches += u32::from(decision.on != before);
+            before = decision.on;
+            None
+        });
         assert!(open <= 12_000 + 510, "{open}");
         assert!(switches <= 400 + 12, "{switches}");
     }

@@ -1,0 +1,145 @@
+//! What makes a tracking law hold on a flow that is not its model: the error of
+//! predictions made a delay ago, low-pass filtered, is added to those made now
+//! (Smith's correction), and a slow integral removes what remains.
+
+use crate::control::tracking::Tracking;
+use crate::history::{DelayLine, Memory, Past};
+use crate::real::Real;
+
+/// Bias and integral of a law that predicts fewer than `A` samples ahead.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Correction<T, const A: usize> {
+    /// Filtered error of past predictions.
+    pub(crate) bias: T,
+    pub(crate) integral: T,
+    /// Consecutive samples without a reading, saturating.
+    pub(crate) lost: u32,
+    /// Predictions `lead` ahead, the newest made last.
+    predictions: DelayLine<T, A>,
+    /// Samples since the start, saturating.
+    age: u32,
+}
+
+impl<T: Real, const A: usize> Correction<T, A> {
+    /// Nothing is known against the model yet.
+    pub(crate) fn none() -> Self {
+        Self {
+            bias: T::ZERO,
+            integral: T::ZERO,
+            lost: 0,
+            predictions: DelayLine::new(),
+            age: 0,
+        }
+    }
+
+    /// Takes in the reading of a sample, as the residual of the `estimate`, and
+    /// what is predicted `lead` samples ahead. The valve has stood at `on` for
+    /// `since` samples.
+    pub(crate) fn update(
+        &mut self,
+        law: &Tracking<T>,
+        reference: T,
+        estimate: T,
+        residual: Option<T>,
+        at_lead: T,
+        (on, since): (bool, u32),
+    ) {
+        self.predictions.push(at_lead);
+        self.age = self.age.saturating_add(1);
+        let Some(residual) = residual else {
+            self.lost = self.lost.saturating_add(1);
+            return;
+        };
+        self.lost = 0;
+        // Predictions begin to come due `lead` samples after the start.
+        if self.age <= u32::from(law.lead) {
+            return;
+        }
+        let flow = estimate + residual;
+        let missed = flow - self.predictions.back(usize::from(law.lead));
+        let bias = self.bias + law.bias_rate * (missed - self.bias);
+        self.bias = limited(bias, law.correction_limit);
+        // A valve that stands still and is already where the integral pushes it
+        // can give no more: the integral waits.
+        let error = reference - flow;
+        let pushes_on = error > T::ZERO;
+        let still = since >= 4 * u32::from(law.lead);
+        if !(still && pushes_on == on) {
+            let integral = self.integral + law.integral_rate * error;
+            self.integral = limited(integral, law.correction_limit);
+        }
+    }
+}
+
+/// `value` within ±`limit`.
+#[inline]
+pub(crate) fn limited<T: Real>(value: T, limit: T) -> T {
+    value.at_most(limit).at_least(-limit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::budget::Budget;
+    use crate::control::{HoldTimes, Reachable};
+
+    const LAW: Tracking<f64> = Tracking {
+        reference: 0.5,
+        reachable: Reachable {
+            low: 0.0,
+            high: 1.0,
+        },
+        slope: 0.0,
+        hold: HoldTimes { on: 1, off: 1 },
+        budget: Budget {
+            switches: None,
+            air: None,
+        },
+        lead: 3,
+        opening: 0,
+        closing: 0,
+        observer: 0.0,
+        bias_rate: 0.5,
+        integral_rate: 0.01,
+        correction_limit: 0.3,
+        residual_limit: 1.0,
+    };
+
+    /// Predictions that are always 0.1 too low, of a flow at 0.6 that has to be at 0.5.
+    fn after(samples: u32, since: u32, on: bool) -> Correction<f64, 8> {
+        let mut correction = Correction::none();
+        for _ in 0..samples {
+            correction.update(&LAW, LAW.reference, 0.55, Some(0.05), 0.5, (on, since));
+        }
+        correction
+    }
+
+    #[test]
+    fn the_bias_becomes_the_error_of_predictions_once_they_come_due() {
+        assert_eq!(after(LAW.lead.into(), 0, true).bias, 0.0);
+        assert!((after(4, 0, true).bias - 0.05).abs() < 1e-12);
+        assert!((after(60, 0, true).bias - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_integral_grows_to_its_limit_and_waits_for_a_valve_that_can_give_no_more() {
+        assert!((after(13, 0, false).integral + 0.01).abs() < 1e-12);
+        assert_eq!(after(1000, 0, false).integral, -0.3);
+        // Too much flow, and the valve has long been closed; not so where it is open.
+        assert_eq!(after(1000, 12, false).integral, 0.0);
+        assert_eq!(after(1000, 12, true).integral, -0.3);
+    }
+
+    #[test]
+    fn without_a_reading_nothing_is_learnt_and_the_gap_is_counted() {
+        let mut correction = after(60, 0, true);
+        let (bias, integral) = (correction.bias, correction.integral);
+        for _ in 0..5 {
+            correction.update(&LAW, LAW.reference, 0.55, None, 0.5, (true, 0));
+        }
+        assert_eq!((correction.bias, correction.integral), (bias, integral));
+        assert_eq!(correction.lost, 5);
+        correction.update(&LAW, LAW.reference, 0.55, Some(0.05), 0.5, (true, 0));
+        assert_eq!(correction.lost, 0);
+    }
+}

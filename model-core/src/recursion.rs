@@ -45,6 +45,9 @@ pub enum Grading {
 const SWITCHING_SLOPE: f64 = 10.0;
 
 impl Grading {
+    /// Every response.
+    pub const ALL: [Self; 3] = [Self::Proportional, Self::Interpolated, Self::Switched];
+
     /// The share of the attached flow's rate, 0–1 for jets of 0–1.
     #[inline]
     fn share<T: Real>(self, jet: T) -> T {

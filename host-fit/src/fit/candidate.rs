@@ -12,13 +12,6 @@ use rayon::prelude::*;
 use std::cmp::Ordering;
 use thiserror::Error;
 
-/// The responses to jets of part strength.
-const GRADINGS: [Grading; 3] = [
-    Grading::Proportional,
-    Grading::Interpolated,
-    Grading::Switched,
-];
-
 /// Why an effect could not be tried.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
@@ -76,7 +69,7 @@ pub fn fit_with_effect(
     if spec.place == Place::Jet {
         // How the flow takes jets of part strength shows only once there are some.
         let regraded = tried.iter().take(RULES.regraded).flat_map(|fit| {
-            let others = GRADINGS.into_iter().filter(|g| *g != base.grading);
+            let others = Grading::ALL.into_iter().filter(|g| *g != base.grading);
             others.map(|grading| Model {
                 grading,
                 ..fit.model.clone()

@@ -29,11 +29,7 @@ const LONGEST: usize = 24_000;
 /// Grid points of a jet effect that are tried with every response to part jets.
 const REGRADED: usize = 3;
 /// The responses to jets of part strength.
-pub(super) const GRADINGS: [Grading; 3] = [
-    Grading::Proportional,
-    Grading::Interpolated,
-    Grading::Switched,
-];
+pub(super) const GRADINGS: [Grading; 3] = Grading::ALL;
 /// Grid points of an effect that are kept for sets.
 const KEPT_POINTS: usize = 2;
 /// Lags of a kind that are kept for sets, and how far apart they are.

@@ -29,6 +29,7 @@ pub mod state_dependent_delay;
 pub mod stopping_vortex;
 pub mod thermal_drift;
 pub mod valve_lag;
+mod vortex;
 pub mod vortex_shedding;
 pub mod zero_offset;
 

@@ -3,43 +3,23 @@
 use crate::effect::{
     Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
+use crate::effects::vortex::{Shedding, Vortex};
 use crate::real::Real;
 
 /// ẇ = −w/τ + max(dj/dt, 0); the flow receives j + g·w.
-///
-/// `strength` is the mean of w over the sample, which is what a flow that
-/// integrates its drive receives; so a change within a sample or at its start
-/// gives the same vortex.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartingVortex<T> {
-    gain: T,
-    /// Decay over a sample.
-    kept: T,
-    /// Mean over a sample of a vortex born at its start.
-    mean: T,
-}
-
-/// The vortex and the jet that made it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Vortex<T> {
-    strength: T,
-    jet: T,
+    shedding: Shedding<T>,
 }
 
 impl<T: Real> Effect<T> for StartingVortex<T> {
     type State = Vortex<T>;
     fn start(&self) -> Vortex<T> {
-        Vortex {
-            strength: T::ZERO,
-            jet: T::ZERO,
-        }
+        Vortex::none()
     }
     #[inline]
     fn jet(&self, vortex: &mut Vortex<T>, jet: T, _at: &Instant<'_, T>) -> T {
-        let change = (jet - vortex.jet).at_least(T::ZERO);
-        vortex.jet = jet;
-        vortex.strength = vortex.strength * self.kept + change * self.mean;
-        jet + self.gain * vortex.strength
+        jet + self.shedding.step(vortex, jet, |change| change)
     }
 }
 
@@ -66,11 +46,8 @@ impl<T: Real> Physics<T> for StartingVortex<T> {
 
     fn new(parameters: &[T], setting: &Setting<T>) -> Self {
         let [gain, decay] = take(parameters);
-        let kept = (-setting.period / decay).exp();
         Self {
-            gain,
-            kept,
-            mean: (T::ONE - kept) * decay / setting.period,
+            shedding: Shedding::new(gain, decay, setting.period),
         }
     }
 }
@@ -78,20 +55,15 @@ impl<T: Real> Physics<T> for StartingVortex<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::bench::{jets, prepared};
+    use crate::effects::bench::prepared;
+    use crate::effects::vortex::areas;
 
-    /// ∫w dt = τ for an edge of 1, however long the samples are.
     #[test]
     fn the_vortex_of_an_edge_has_the_area_of_its_decay() {
         let vortex: StartingVortex<f64> = prepared(&[0.5, 0.030]);
-        let jet = |k| if (100..600).contains(&k) { 1.0 } else { 0.0 };
-        let j = jets(&vortex, jet);
-        let added = |from: usize, to: usize| -> f64 {
-            (from..to).map(|k| j[k] - jet(k)).sum::<f64>() * 0.001
-        };
-        let (rising, falling) = (added(100, 600), added(600, 1000));
-        let area = 0.5 * 0.030;
-        assert!((rising - area).abs() < 1e-6, "{rising} {falling}");
-        assert!(falling.abs() < 1e-6);
+        let apart = areas(&vortex).into_iter().zip([0.5 * 0.030, 0.0]);
+        for (found, expected) in apart {
+            assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+        }
     }
 }

@@ -1,0 +1,64 @@
+//! What starting and stopping vortices have in common: fed by one kind of edge, decaying, added to the jet.
+
+use crate::real::Real;
+
+/// ẇ = −w/τ + edges; the flow receives g·w.
+///
+/// `strength` is the mean of w over the sample, which is what a flow that
+/// integrates its drive receives; so a change within a sample or at its start
+/// gives the same vortex.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Shedding<T> {
+    gain: T,
+    /// Decay over a sample.
+    kept: T,
+    /// Mean over a sample of a vortex born at its start.
+    mean: T,
+}
+
+/// The vortex and the jet that made it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vortex<T> {
+    strength: T,
+    jet: T,
+}
+
+impl<T: Real> Shedding<T> {
+    /// A vortex with `gain` g that decays in τ = `decay`, s.
+    pub(super) fn new(gain: T, decay: T, period: T) -> Self {
+        let kept = (-period / decay).exp();
+        Self {
+            gain,
+            kept,
+            mean: (T::ONE - kept) * decay / period,
+        }
+    }
+
+    /// What the flow receives after a sample in which the jet comes to `jet`;
+    /// `edge` is what of a change of the jet makes a vortex.
+    #[inline]
+    pub(super) fn step(&self, vortex: &mut Vortex<T>, jet: T, edge: impl Fn(T) -> T) -> T {
+        let fed = edge(jet - vortex.jet).at_least(T::ZERO);
+        vortex.jet = jet;
+        vortex.strength = vortex.strength * self.kept + fed * self.mean;
+        self.gain * vortex.strength
+    }
+}
+
+impl<T: Real> Vortex<T> {
+    pub(super) fn none() -> Self {
+        Self {
+            strength: T::ZERO,
+            jet: T::ZERO,
+        }
+    }
+}
+
+/// ∫w dt = τ for an edge of 1, however long the samples are: what the rising and
+/// the falling edge of a pulse add to the jet, in all.
+#[cfg(test)]
+pub(super) fn areas(effect: &impl crate::Effect<f64>) -> [f64; 2] {
+    let jet = |k| if (100..600).contains(&k) { 1.0 } else { 0.0 };
+    let j = super::bench::jets(effect, jet);
+    [100..600, 600..1000].map(|part| part.map(|k| j[k] - jet(k)).sum::<f64>() * 0.001)
+}

@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 use crate::data::{Record, Use};
 use crate::diagnose::ParameterEstimate;
 use crate::fit::{
-    CandidateError, Fit, FitOptions, RULES, fit, fit_with_effect, lean_base, pieces, restart_after,
+    CandidateError, Fit, FitOptions, RULES, channel_reference, fit, fit_with_effect, lean_base,
+    pieces, restart_after,
 };
 use crate::model::{Model, Start};
 use crate::simulate::SimulateError;
@@ -132,17 +133,9 @@ pub fn extend(
         return Err(ExtendError::NothingToLearnFrom);
     }
     // A held-out record without the channel could not be judged afterwards.
+    let all: Vec<&Record> = records.iter().collect();
     for spec in &specs {
-        let Some(channel) = spec.channel else {
-            continue;
-        };
-        if let Some(record) = records.iter().find(|r| !r.channels.contains_key(channel)) {
-            return Err(ExtendError::Candidate(CandidateError::MissingChannel {
-                effect: spec.name.to_owned(),
-                channel: channel.to_owned(),
-                record: record.name.clone(),
-            }));
-        }
+        channel_reference(spec, &all)?;
     }
     let options = FitOptions {
         constant: model.constant != 0.0,

@@ -7,7 +7,8 @@
 
 use crate::data::{Record, Use};
 use crate::dual::Dual;
-use crate::linalg::dot;
+use crate::fit::channel_reference;
+use crate::linalg::{dot, take_away};
 use crate::model::{Delay, Model, Rounding};
 use crate::picture::significant;
 use crate::rules;
@@ -71,10 +72,7 @@ pub fn detectable(model: &Model, records: &[Record]) -> Result<Vec<Detectable>, 
     let found: Vec<Option<Detectable>> = SPECS
         .par_iter()
         .filter(|spec| !present.iter().any(|name| name == spec.name))
-        .filter(|spec| {
-            spec.channel
-                .is_none_or(|c| judged.iter().all(|r| r.channels.contains_key(c)))
-        })
+        .filter(|spec| channel_reference(spec, &judged).is_ok())
         .map(|spec| bench.smallest(spec))
         .collect();
     Ok(found.into_iter().flatten().collect())
@@ -246,15 +244,7 @@ impl<'a> Detector<'a> {
     /// The amplitude seen with 80 % power, from the change that `parameters` make.
     fn seen(&self, spec: &'static Spec, parameters: &[f64], size: f64) -> Option<f64> {
         let mut model = self.model.clone();
-        let reference = spec.channel.map(|channel| {
-            let values = self
-                .records
-                .iter()
-                .filter_map(|r| r.channels.get(channel))
-                .flatten();
-            let (sum, n) = values.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
-            sum / f64::max(n, 1.0)
-        });
+        let reference = channel_reference(spec, self.records).ok()?;
         model.add(spec, parameters, reference);
         let with: Option<Vec<Vec<f64>>> = self
             .records
@@ -268,10 +258,7 @@ impl<'a> Detector<'a> {
             .map(|(a, b)| (a - b) / size)
             .collect();
         for direction in &self.imitated {
-            let along = dot(&z, direction);
-            z.iter_mut()
-                .zip(direction)
-                .for_each(|(z, d)| *z -= along * d);
+            take_away(direction, &mut z);
         }
         let norm = dot(&z, &z).sqrt();
         // Σ_l γ(l)·Σ_k z_k z_{k+l}/‖z‖²: the variance of the error seen through z.
@@ -301,11 +288,7 @@ fn orthonormal(columns: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         let size = dot(&column, &column).sqrt();
         for _ in 0..2 {
             for direction in &basis {
-                let along = dot(&column, direction);
-                column
-                    .iter_mut()
-                    .zip(direction)
-                    .for_each(|(c, d)| *c -= along * d);
+                take_away(direction, &mut column);
             }
         }
         let left = dot(&column, &column).sqrt();
@@ -365,10 +348,7 @@ mod tests {
             .map(|((y, b), z)| y - b + z)
             .collect();
         for direction in &bench.imitated {
-            let along = dot(&z, direction);
-            z.iter_mut()
-                .zip(direction)
-                .for_each(|(z, d)| *z -= along * d);
+            take_away(direction, &mut z);
         }
         let norm = dot(&z, &z).sqrt();
         dot(&e, &z) / norm / (x * norm / (times * x) / RULES.deviations)

@@ -27,22 +27,31 @@ fn asked(case: &Case) -> Row {
     row
 }
 
+fn is_found(row: &Row) {
+    assert!(row.is_found(), "{}", row.said());
+    assert!(row.is_at_floor(), "{:?}", row.over_floor);
+}
+
+fn is_found_with_its_parameters(row: &Row) {
+    assert!(row.is_right(), "{}", row.said());
+    assert!(row.is_at_floor(), "{:?}", row.over_floor);
+    assert_eq!(row.parameters_hit(), Some(true), "{:?}", row.parameters);
+}
+
 #[test]
 fn bad_delays_in_the_given_model_are_no_missing_effect() {
     let row = asked(&Case {
         given: Given::BadDelays,
         ..Case::new(Group::Nothing, Family::FirstOrder, &[], 708)
     });
-    assert!(row.is_found(), "{}", row.said());
-    assert!(row.is_at_floor(), "{:?}", row.over_floor);
+    is_found(&row);
 }
 
 /// What `identify` makes of it has the memory; so nothing is missing.
 #[test]
 fn a_memory_of_the_flow_is_no_missing_effect() {
     let row = asked(&Case::new(Group::Nothing, Family::Memory1, &[], 713));
-    assert!(row.is_found(), "{}", row.said());
-    assert!(row.is_at_floor(), "{:?}", row.over_floor);
+    is_found(&row);
 }
 
 #[test]
@@ -53,9 +62,7 @@ fn an_effect_beside_a_memory_of_the_flow_is_found_alone() {
         &["plenum-droop"],
         714,
     ));
-    assert!(row.is_right(), "{}", row.said());
-    assert!(row.is_at_floor(), "{:?}", row.over_floor);
-    assert_eq!(row.parameters_hit(), Some(true), "{:?}", row.parameters);
+    is_found_with_its_parameters(&row);
 }
 
 /// The same samples, twenty times as slow and fifty times as small.
@@ -76,9 +83,7 @@ fn other_units_change_no_name_and_transform_the_parameters() {
         })
     });
     let [own, twin] = &rows;
-    assert!(own.is_right(), "{}", own.said());
-    assert!(own.is_at_floor(), "{:?}", own.over_floor);
-    assert_eq!(own.parameters_hit(), Some(true), "{:?}", own.parameters);
+    is_found_with_its_parameters(own);
     assert_eq!(own.missing, twin.missing);
     for (own, twin) in own.parameters.iter().zip(&twin.parameters) {
         let change = twin.truth / own.truth;
@@ -98,17 +103,14 @@ fn a_state_dependent_delay_is_the_first_hidden_effect() {
         &["state-dependent-delay"],
         709,
     );
+    is_found_with_its_parameters(&row);
     assert_eq!(row.missing, ["state-dependent-delay"]);
-    assert!(row.is_at_floor(), "{:?}", row.over_floor);
-    assert_eq!(row.parameters_hit(), Some(true), "{:?}", row.parameters);
 }
 
 #[test]
 fn an_effect_of_the_flow_is_found_with_its_parameters() {
     let row = diagnosed(Group::Single, Family::FirstOrder, &["quadratic-drag"], 710);
-    assert!(row.is_right(), "{}", row.said());
-    assert!(row.is_at_floor(), "{:?}", row.over_floor);
-    assert_eq!(row.parameters_hit(), Some(true), "{:?}", row.parameters);
+    is_found_with_its_parameters(&row);
 }
 
 /// Hysteresis alone bends to imitate the friction as well, and friction added to it
@@ -117,8 +119,7 @@ fn an_effect_of_the_flow_is_found_with_its_parameters() {
 fn two_effects_of_which_one_imitates_both_are_found() {
     let names = ["dry-friction", "bouc-wen-hysteresis"];
     let row = diagnosed(Group::Pair, Family::FirstOrder, &names, 712);
-    assert!(row.is_found(), "{}", row.said());
-    assert!(row.is_at_floor(), "{:?}", row.over_floor);
+    is_found(&row);
 }
 
 #[test]

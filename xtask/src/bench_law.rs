@@ -1,21 +1,10 @@
 //! The designed law against what people use, on plants that are not its model.
 
 use crate::Task;
-use crate::shell::{cargo, run};
+use crate::shell::{run, scenario};
 
 pub(crate) const TASK: Task = Task {
     name: "bench-law",
     does: "the designed law against relay, PI, Smith predictor and open loop: one table",
-    run: bench_law,
+    run: |_| run(&mut scenario("bench-law")),
 };
-
-fn bench_law(_arguments: &[String]) -> anyhow::Result<()> {
-    run(&mut cargo(&[
-        "run",
-        "--release",
-        "--package",
-        "scenarios",
-        "--bin",
-        "bench-law",
-    ]))
-}

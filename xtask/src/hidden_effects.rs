@@ -1,7 +1,7 @@
 //! The hidden-effects campaign: what the diagnosis finds in rigs that hide something.
 
 use crate::Task;
-use crate::shell::{cargo, run};
+use crate::shell::{cargo, run, scenario};
 
 pub(crate) const TASK: Task = Task {
     name: "hidden-effects",
@@ -11,15 +11,5 @@ pub(crate) const TASK: Task = Task {
 
 fn hidden_effects(arguments: &[String]) -> anyhow::Result<()> {
     run(&mut cargo(&["build", "--release", "--package", "host-fit"]))?;
-    let mut all = vec![
-        "run",
-        "--release",
-        "--package",
-        "scenarios",
-        "--bin",
-        "hidden-effects",
-        "--",
-    ];
-    all.extend(arguments.iter().map(String::as_str));
-    run(&mut cargo(&all))
+    run(scenario("hidden-effects").args(arguments))
 }

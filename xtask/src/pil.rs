@@ -4,12 +4,11 @@
 
 use crate::Task;
 use crate::firmware::{Size, build, qemu, size};
-use crate::shell::{cargo, firmware_target, run};
+use crate::shell::{firmware_target, run, scenario};
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 pub(crate) const TASK: Task = Task {
     name: "pil",
@@ -62,7 +61,7 @@ pub(crate) fn pil(arguments: &[String]) -> Result<Outcome> {
     };
     let size = size(&elf)?;
     let report = firmware_target().join("pil.toml");
-    let mut host = program();
+    let mut host = scenario("pil");
     host.arg("run").arg("--report").arg(&report).args(passed);
     if let Some(model) = &model {
         host.arg("--model").arg(model);
@@ -89,20 +88,6 @@ fn constants(model: Option<&Path>) -> Result<PathBuf> {
     }
     let folder = firmware_target().join("cases");
     std::fs::create_dir_all(&folder)?;
-    run(program().arg("constants").arg(&folder))?;
+    run(scenario("pil").arg("constants").arg(&folder))?;
     Ok(folder)
-}
-
-/// The host's side.
-fn program() -> Command {
-    cargo(&[
-        "run",
-        "--release",
-        "--quiet",
-        "--package",
-        "scenarios",
-        "--bin",
-        "pil",
-        "--",
-    ])
 }

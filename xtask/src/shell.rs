@@ -23,6 +23,13 @@ pub(crate) fn cargo(arguments: &[&str]) -> Command {
     command(&program, arguments)
 }
 
+/// A program of the scenarios, its arguments to follow.
+pub(crate) fn scenario(program: &str) -> Command {
+    let mut command = cargo(&["run", "--release", "--quiet", "--package", "scenarios"]);
+    command.args(["--bin", program, "--"]);
+    command
+}
+
 /// `cargo` in the firmware's workspace, with a target folder of its own: the
 /// two workspaces build the same crates with other features.
 pub(crate) fn firmware_cargo(arguments: &[&str]) -> Command {

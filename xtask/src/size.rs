@@ -2,7 +2,7 @@
 
 use crate::Task;
 use crate::elf::{Elf, Symbol};
-use crate::firmware::{BOARDS, Chosen};
+use crate::firmware::{self, BOARDS, Chosen, Size};
 use anyhow::Result;
 use std::collections::BTreeMap;
 
@@ -18,19 +18,9 @@ const LARGEST: usize = 20;
 fn size(arguments: &[String]) -> Result<()> {
     let chosen = Chosen::read(arguments)?;
     let board = chosen.board.unwrap_or(BOARDS[0]);
-    let elf = Elf::read(&chosen.build(board)?)?;
-    let flash: u64 = elf
-        .sections
-        .iter()
-        .filter(|s| s.stored)
-        .map(|s| s.size)
-        .sum();
-    let ram: u64 = elf
-        .sections
-        .iter()
-        .filter(|s| s.writable)
-        .map(|s| s.size)
-        .sum();
+    let path = chosen.build(board)?;
+    let elf = Elf::read(&path)?;
+    let Size { flash, ram } = firmware::size(&path)?;
     println!("{board}: flash {flash} bytes, static RAM {ram} bytes");
 
     let mut stored: Vec<(&Symbol, String)> = elf

@@ -128,8 +128,15 @@ fn best_first(a: &Fit, b: &Fit) -> Ordering {
     a.mean_square().total_cmp(&b.mean_square())
 }
 
-/// The mean of the effect's channel over the records.
-fn channel_reference(spec: &Spec, records: &[&Record]) -> Result<Option<f64>, CandidateError> {
+/// The mean of the effect's channel over the records, in its unit; `None` for an effect
+/// without one.
+///
+/// # Errors
+/// [`CandidateError::MissingChannel`] for the first record that lacks it.
+pub(crate) fn channel_reference(
+    spec: &Spec,
+    records: &[&Record],
+) -> Result<Option<f64>, CandidateError> {
     let Some(channel) = spec.channel else {
         return Ok(None);
     };
@@ -142,8 +149,10 @@ fn channel_reference(spec: &Spec, records: &[&Record]) -> Result<Option<f64>, Ca
                 record: record.name.clone(),
             });
         };
-        sum += values.iter().sum::<f64>();
-        count += values.len() as f64;
+        for value in values {
+            sum += value;
+            count += 1.0;
+        }
     }
     Ok(Some(sum / f64::max(count, 1.0)))
 }

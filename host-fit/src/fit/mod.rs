@@ -8,6 +8,7 @@ mod levenberg;
 mod rules;
 mod starts;
 
+pub(crate) use candidate::channel_reference;
 pub use candidate::{CandidateError, fit_with_effect};
 pub(crate) use drift::pieces;
 pub use drift::restart_after;

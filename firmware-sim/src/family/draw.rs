@@ -8,6 +8,7 @@ use super::weight::Weight;
 use super::{Family, NoiseKind, RigPlan};
 use crate::command::Command;
 use crate::instrument::{Instrument, Noise, Unrest};
+use crate::plant::effects::exclude;
 use crate::plant::{
     Altered, BasePlant, Character, Effect, EffectError, Fault, FlowDelay, FreeStream, PastTerm,
     Place, PlantSpec, RateLaw, log_uniform,
@@ -79,10 +80,8 @@ impl RigPlan {
         for name in names {
             let kind = Drawn::draw(name, &base, &mut rng)?;
             let (own, resembles, place) = kind.identity();
-            let clash = kinds.iter().map(Drawn::identity).find(|other| {
-                let both_transport = [other.2, place] == [Place::Transport; 2];
-                other.1 == resembles || both_transport
-            });
+            let mut others = kinds.iter().map(Drawn::identity);
+            let clash = others.find(|other| exclude((other.1, other.2), (resembles, place)));
             if let Some((other, _, _)) = clash {
                 return Err(RigError::Exclusive(other, own));
             }

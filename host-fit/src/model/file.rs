@@ -68,7 +68,8 @@ pub enum ModelError {
 struct File {
     format_version: u32,
     sample_period_s: f64,
-    lag_convention: Convention,
+    #[serde(with = "Convention")]
+    lag_convention: LagConvention,
     #[serde(default)]
     start: Start,
     structure: StructureTable,
@@ -85,17 +86,18 @@ struct File {
     law: Option<Law>,
 }
 
+/// How a file calls it.
 #[derive(Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[serde(remote = "LagConvention", rename_all = "kebab-case")]
 enum Convention {
     Literal,
     OneStep,
 }
 
-#[derive(Clone, Copy, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+/// How a file calls it.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Grading", rename_all = "kebab-case")]
 enum JetResponse {
-    #[default]
     Proportional,
     Interpolated,
     Switched,
@@ -106,8 +108,8 @@ enum JetResponse {
 struct StructureTable {
     averaged: bool,
     window: u32,
-    #[serde(default)]
-    jet_response: JetResponse,
+    #[serde(default, with = "JetResponse")]
+    jet_response: Grading,
     state_lags: Vec<u16>,
     product_lags: Vec<u16>,
 }
@@ -223,19 +225,12 @@ impl File {
         Self {
             format_version: FORMAT_VERSION,
             sample_period_s: model.sample_period_s,
-            lag_convention: match model.convention {
-                LagConvention::Literal => Convention::Literal,
-                LagConvention::OneStep => Convention::OneStep,
-            },
+            lag_convention: model.convention,
             start: model.start,
             structure: StructureTable {
                 averaged: model.averaging.averaged_model,
                 window: model.averaging.window,
-                jet_response: match model.grading {
-                    Grading::Proportional => JetResponse::Proportional,
-                    Grading::Interpolated => JetResponse::Interpolated,
-                    Grading::Switched => JetResponse::Switched,
-                },
+                jet_response: model.grading,
                 state_lags: model.state_lags.clone(),
                 product_lags: model.product_lags.clone(),
             },
@@ -329,15 +324,11 @@ impl File {
         finite("coefficients.b", &coefficients.b)?;
         let c: Vec<f64> = coefficients.c.iter().flatten().copied().collect();
         finite("coefficients.c", &c)?;
-        let convention = match self.lag_convention {
-            Convention::Literal => LagConvention::Literal,
-            Convention::OneStep => LagConvention::OneStep,
-        };
         for (key, lags) in [
             ("structure.state_lags", &structure.state_lags),
             ("structure.product_lags", &structure.product_lags),
         ] {
-            if convention == LagConvention::OneStep && lags.contains(&0) {
+            if self.lag_convention == LagConvention::OneStep && lags.contains(&0) {
                 return wrong(
                     key,
                     "a lag of 0 is the future; one-step lags begin at 1".into(),
@@ -349,17 +340,13 @@ impl File {
         }
         let mut model = Model {
             sample_period_s: self.sample_period_s,
-            convention,
+            convention: self.lag_convention,
             averaging: Averaging {
                 window: self.structure.window,
                 averaged_model: self.structure.averaged,
             },
             start: self.start,
-            grading: match self.structure.jet_response {
-                JetResponse::Proportional => Grading::Proportional,
-                JetResponse::Interpolated => Grading::Interpolated,
-                JetResponse::Switched => Grading::Switched,
-            },
+            grading: self.structure.jet_response,
             constant: self.coefficients.constant,
             state_lags: self.structure.state_lags,
             a: self.coefficients.a,

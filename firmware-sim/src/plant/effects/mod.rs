@@ -379,9 +379,16 @@ impl Effect {
 
     /// Whether `other` acts on the same part of the rig so that the two exclude each other.
     pub fn excludes(&self, other: &Self) -> bool {
-        let transport = |e: &Self| e.place() == Place::Transport;
-        self.name() == other.name() || (transport(self) && transport(other))
+        exclude(
+            (self.resembles(), self.place()),
+            (other.resembles(), other.place()),
+        )
     }
+}
+
+/// Whether two effects, by what they resemble and where they sit, want the same part of a rig.
+pub(crate) fn exclude(a: (&str, Place), b: (&str, Place)) -> bool {
+    a.0 == b.0 || [a.1, b.1] == [Place::Transport; 2]
 }
 
 /// A size of either sign.

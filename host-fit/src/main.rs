@@ -26,6 +26,7 @@ struct Cli {
 enum Command {
     Demo(commands::demo::Args),
     Average(commands::average::Args),
+    Import(Box<commands::import::Args>),
     Delay(commands::delay::Args),
     Design(commands::design::Args),
     Identify(Box<commands::identify::Args>),
@@ -44,6 +45,7 @@ fn main() -> ExitCode {
     let result = match &cli.command {
         Command::Demo(args) => commands::demo::run(args, console),
         Command::Average(args) => commands::average::run(args, console),
+        Command::Import(args) => commands::import::run(args, console),
         Command::Delay(args) => commands::delay::run(args, console),
         Command::Design(args) => commands::design::run(args, console),
         Command::Identify(args) => commands::identify::run(args, console),

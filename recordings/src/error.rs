@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use crate::import::ImportProblem;
+
 /// Where in the user's data a fault lies: every part that is known is printed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct FilePlace {
@@ -16,6 +18,8 @@ pub struct FilePlace {
     pub sample: Option<usize>,
     /// Name of the CSV column or channel.
     pub column: Option<String>,
+    /// Name of the variable of a binary file.
+    pub variable: Option<String>,
     /// Key in `dataset.toml`.
     pub key: Option<String>,
 }
@@ -41,6 +45,13 @@ impl FilePlace {
     #[must_use]
     pub fn in_column(mut self, column: &str) -> Self {
         self.column = Some(column.to_owned());
+        self
+    }
+
+    /// The same file and column, without a line or sample.
+    #[must_use]
+    pub(crate) fn whole(mut self) -> Self {
+        (self.line, self.sample) = (None, None);
         self
     }
 
@@ -70,6 +81,10 @@ impl fmt::Display for FilePlace {
         }
         if let Some(record) = &self.record {
             write!(f, "{separator}record `{}`", printable(record))?;
+            separator = ", ";
+        }
+        if let Some(variable) = &self.variable {
+            write!(f, "{separator}variable `{}`", printable(variable))?;
             separator = ", ";
         }
         if let Some(line) = self.line {
@@ -132,6 +147,9 @@ impl DataError {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DataProblem {
+    /// A file that is to be imported.
+    #[error(transparent)]
+    Import(#[from] ImportProblem),
     /// The operating system refused to open or read it.
     #[error("cannot be read ({0}); check the path and its permissions")]
     Unreadable(std::io::Error),
@@ -161,7 +179,7 @@ pub enum DataProblem {
     BadHeader(String),
     /// Semicolons or tabs instead of commas.
     #[error(
-        "the header has no comma but {0}; separate columns with commas and write decimals with a point"
+        "the header has no comma but {0}; separate columns with commas and write decimals with a point, or let `host-fit import` read the file"
     )]
     WrongSeparator(&'static str),
     /// A column that has to be there is not.

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
 
 use crate::error::{DataError, DataProblem, FilePlace, printable};
+use crate::import::{From, ImportProblem, Mapping};
 use crate::output::{OutputError, Staging};
 use crate::record::{Origin, Record, Use};
 use crate::set::DataSet;
@@ -40,6 +41,9 @@ struct Entry {
     file: String,
     #[serde(rename = "use")]
     role: Use,
+    /// For people and for `host-fit import --like`; loading does not need it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    from: Option<From>,
 }
 
 impl DataSet {
@@ -78,9 +82,14 @@ impl DataSet {
     /// # Errors
     /// [`OutputError`] when the folder cannot be written; nothing is left behind then.
     pub fn save(&self, dir: &Path) -> Result<(), OutputError> {
+        self.save_from(dir, &[])
+    }
+
+    /// As [`DataSet::save`], with where each record came from.
+    pub(crate) fn save_from(&self, dir: &Path, from: &[From]) -> Result<(), OutputError> {
         let mut staging = Staging::new(dir)?;
         let mut entries: Vec<Entry> = Vec::with_capacity(self.records.len());
-        for record in &self.records {
+        for (index, record) in self.records.iter().enumerate() {
             let stem = file_stem(&record.name);
             let file = (1..)
                 .map(|i| match i {
@@ -94,6 +103,7 @@ impl DataSet {
                 name: record.name.clone(),
                 file,
                 role: record.role,
+                from: from.get(index).cloned(),
             });
         }
         let manifest = Manifest {
@@ -119,7 +129,23 @@ fn folder_of(manifest: &Path) -> &Path {
     }
 }
 
-fn load_folder(folder: &Path) -> Result<DataSet, DataError> {
+/// The mapping that the records of an imported data set were made with; the first where they differ.
+///
+/// # Errors
+/// [`DataError`] when there is no readable `dataset.toml`, or it holds no mapping.
+pub(crate) fn mapping_of(folder: &Path) -> Result<Mapping, DataError> {
+    let folder = match folder.file_name().is_some_and(|n| n == MANIFEST) {
+        true => folder_of(folder),
+        false => folder,
+    };
+    let (path, manifest) = read_manifest(folder)?;
+    let mut from = manifest.record.into_iter().filter_map(|entry| entry.from);
+    from.next()
+        .map(|from| from.mapping)
+        .ok_or_else(|| FilePlace::file(&path).error(ImportProblem::NoMapping.into()))
+}
+
+fn read_manifest(folder: &Path) -> Result<(PathBuf, Manifest), DataError> {
     let path = folder.join(MANIFEST);
     let bytes = match fs::read(&path) {
         Ok(bytes) => bytes,
@@ -129,9 +155,15 @@ fn load_folder(folder: &Path) -> Result<DataSet, DataError> {
         Err(e) => return Err(DataError::unreadable(&path, e)),
     };
     let place = FilePlace::file(&path);
-    let text = String::from_utf8(bytes).map_err(|_| place.clone().error(DataProblem::NotText))?;
+    let text = String::from_utf8(bytes).map_err(|_| place.error(DataProblem::NotText))?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
-    let manifest: Manifest = toml::from_str(text).map_err(|e| manifest_error(&path, text, &e))?;
+    let manifest = toml::from_str(text).map_err(|e| manifest_error(&path, text, &e))?;
+    Ok((path, manifest))
+}
+
+fn load_folder(folder: &Path) -> Result<DataSet, DataError> {
+    let (path, manifest) = read_manifest(folder)?;
+    let place = FilePlace::file(&path);
     if !(manifest.sample_period_s.is_finite() && manifest.sample_period_s > 0.0) {
         return Err(place
             .at_key("sample_period_s")

@@ -3,7 +3,7 @@
 //! A data set is a folder with `dataset.toml` and CSV files, or one CSV file. Everything is checked when it is loaded
 //! ([`DataSet::load`]) or put together in memory ([`DataSet::from_records`]); every fault is one paragraph that names
 //! file, line and column, or the TOML key, and the remedy ([`DataError`]). Whatever is written appears whole or not at
-//! all ([`output`]).
+//! all ([`output`]). Other formats are made into data sets by [`mod@import`].
 
 mod average;
 mod averaging;
@@ -11,6 +11,7 @@ mod error;
 mod folder;
 mod folding;
 mod hash;
+pub mod import;
 pub mod output;
 mod raw;
 mod record;

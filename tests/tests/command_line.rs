@@ -406,3 +406,25 @@ fn a_law_is_designed_for_a_model_with_an_effect_of_ones_own() {
     assert_eq!(names, ["supply-line-ringing", "state-dependent-delay"]);
     assert!(model.law.is_some());
 }
+
+#[test]
+fn files_of_other_programs_become_a_data_set() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("set");
+    let made = |name: &str| data("..").join("recordings/tests/import").join(name);
+    let file = made("v7.mat");
+    let threshold = [p("--u-threshold"), p("2.5")];
+    let mut arguments = vec![p("import"), &file, p("-o"), &out];
+    arguments.extend(threshold);
+    let found = json(&arguments);
+    keys(&found, &["dataset", "hash", "sample_period_s", "files"]);
+    assert_eq!(found["files"][0]["mapping"]["u"], "valve");
+    let set = host_fit::data::DataSet::load(&out).expect("a data set");
+    assert_eq!(found["hash"], set.hash);
+    assert!(set.is_on_off());
+    // The next run of the rig is read as the first was.
+    let (next, other) = (made("german.csv"), folder.path().join("other"));
+    let like = [p("import"), &next, p("-o"), &other, p("--like"), &out];
+    refused(&like, &["german.csv", "no variable `t`", "`Zeit` (40)"]);
+    assert!(!other.exists(), "nothing half-written");
+}

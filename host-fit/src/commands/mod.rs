@@ -25,6 +25,7 @@ mod effect_files;
 pub(crate) mod effects;
 pub(crate) mod extend;
 pub(crate) mod identify;
+pub(crate) mod import;
 mod interrupt;
 mod load;
 mod page;

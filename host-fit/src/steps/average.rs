@@ -41,15 +41,21 @@ pub fn average(
     averaging: &Averaging,
     progress: &mut dyn FnMut(usize, u64),
 ) -> Result<Average, StepError> {
-    let stems: Vec<_> = recordings.iter().filter_map(|p| p.file_stem()).collect();
-    let unknown = |name: &&String| !stems.iter().any(|stem| *stem == name.as_str());
-    if let Some(name) = validate.iter().find(unknown) {
-        return Err(StepError::NoSuchRecording(name.clone()));
-    }
+    check_names(recordings, validate)?;
     let (set, recordings) = average_files(recordings, validate, averaging, progress)?;
     Ok(Average {
         hash: set.hash.clone(),
         set,
         recordings,
     })
+}
+
+/// Refuses names of records to hold out that none of the files gives.
+pub(super) fn check_names(files: &[&Path], validate: &[String]) -> Result<(), StepError> {
+    let stems: Vec<_> = files.iter().filter_map(|p| p.file_stem()).collect();
+    let unknown = |name: &&String| !stems.iter().any(|stem| *stem == name.as_str());
+    match validate.iter().find(unknown) {
+        Some(name) => Err(StepError::NoSuchRecording(name.clone())),
+        None => Ok(()),
+    }
 }

@@ -3,6 +3,7 @@
 //! | step | from | to |
 //! |---|---|---|
 //! | [`average`] | raw recordings | a [`DataSet`] |
+//! | [`import`] | files of other programs | a [`DataSet`] |
 //! | [`measure_delays`] | a data set | [`DelayReport`] |
 //! | [`identify`] | a data set | [`Identification`] |
 //! | [`compare`] | a model and a data set | [`Comparison`] |
@@ -29,6 +30,7 @@ mod diagnose;
 mod error;
 mod extend;
 mod identify;
+mod import;
 mod measured_law;
 mod onlooker;
 mod rules;
@@ -45,6 +47,7 @@ pub use diagnose::{Finding, diagnose};
 pub use error::StepError;
 pub use extend::{Extension, RecordChange, extend};
 pub use identify::{DelayKind, Identification, IdentifiedDelays, IdentifyRequest, identify};
+pub use import::{ImportedSet, import};
 pub use onlooker::Onlooker;
 pub use rules::{rulebooks, rules_page};
 pub use simulate::{Simulation, simulate};

@@ -18,7 +18,8 @@ use host_fit::model::{Delay, Law, Model, TransportLaw};
 use host_fit::picture::significant;
 use host_fit::rules::Rulebook;
 use host_fit::steps::{
-    Average, BoardConstants, Comparison, EffectEntry, Extension, Identification, Simulation,
+    Average, BoardConstants, Comparison, EffectEntry, Extension, Identification, ImportedSet,
+    Simulation,
 };
 
 use model_core::effect::Unit;
@@ -37,6 +38,32 @@ fn lines(pieces: impl IntoIterator<Item = String>) -> String {
 impl Words for Average {
     fn words(&self) -> String {
         let each = self.recordings.iter().map(Words::words);
+        lines(each.chain([format!("hash {}", self.hash)]))
+    }
+}
+
+impl Words for ImportedSet {
+    fn words(&self) -> String {
+        let name = |n: &Option<String>| n.clone().unwrap_or_default();
+        let each = self.files.iter().map(|file| {
+            let taken = &file.mapping;
+            let time = match &taken.t {
+                Some(t) => format!("t is `{t}`"),
+                None => format!("{} s per sample", self.sample_period_s),
+            };
+            let mut text = format!(
+                "{}: {}, {} samples; {time}, u is `{}`, y is `{}`",
+                file.name,
+                file.dialect,
+                file.samples,
+                name(&taken.u),
+                name(&taken.y),
+            );
+            for remark in &file.remarks {
+                text.push_str(&format!("\n  {remark}"));
+            }
+            text
+        });
         lines(each.chain([format!("hash {}", self.hash)]))
     }
 }

@@ -1,0 +1,118 @@
+//! `host-fit import`: files of other programs to a data set.
+
+use std::path::{Path, PathBuf};
+
+use host_fit::data::import::{Import, Mapping};
+use host_fit::steps;
+
+use super::Console;
+use super::average::positive;
+
+/// Make a data set of CSV files of any dialect, MATLAB's .mat (v5 to v7), NumPy's .npy and .npz.
+///
+/// Each FILE becomes one record named by the file. Separators, decimal commas, lines before the header and units in it are
+/// recognised. A variable is named as its program would: valve, run.valve, data(:,2), data[:,1]. What is not named is
+/// found by its name (t or time; u, input, command or valve; y, output, shear …). y_sd, y_min, y_max and every other
+/// variable of the same length are kept. The mapping is kept in dataset.toml, for --like.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// Files to read.
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Folder for the data set (dataset.toml and one CSV per record).
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Take the mapping of a data set that was imported before; other options change it.
+    #[arg(long, value_name = "DATASET")]
+    like: Option<PathBuf>,
+    /// Variable that is the time.
+    #[arg(long, value_name = "NAME")]
+    t: Option<String>,
+    /// Seconds in one unit of the time [default: as the header says, otherwise 1].
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    t_scale: Option<f64>,
+    /// Sampling period, where the file has no time (or to check it).
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    period: Option<f64>,
+    /// Variable that is the command.
+    #[arg(long, value_name = "NAME")]
+    u: Option<String>,
+    /// u is this times the variable, plus --u-offset.
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
+    u_scale: Option<f64>,
+    /// Added to u.
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
+    u_offset: Option<f64>,
+    /// u is on (1) above this value and off (0) elsewhere: makes a voltage an on/off command.
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
+    u_threshold: Option<f64>,
+    /// Variable that is the output.
+    #[arg(long, value_name = "NAME")]
+    y: Option<String>,
+    /// y is this times the variable, plus --y-offset; y_sd, y_min and y_max follow.
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
+    y_scale: Option<f64>,
+    /// Added to y.
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
+    y_offset: Option<f64>,
+    /// Keep this variable and no other beside t, u and y; repeatable.
+    #[arg(long, value_name = "NAME")]
+    channel: Vec<String>,
+    /// Keep nothing beside t, u and y.
+    #[arg(long, conflicts_with = "channel")]
+    no_channels: bool,
+    /// Name of a file (without its ending) to hold out for validation; repeatable.
+    #[arg(long, value_name = "NAME")]
+    validate: Vec<String>,
+    /// Hold out what comes from this time of each record on, as a record of its own.
+    #[arg(long, value_name = "SECONDS")]
+    hold_out_from: Option<f64>,
+    /// The input has levels between off and on.
+    #[arg(long)]
+    graded: bool,
+    /// Title of the data set.
+    #[arg(long)]
+    title: Option<String>,
+}
+
+impl Args {
+    fn mapping(&self) -> anyhow::Result<Mapping> {
+        let base = match &self.like {
+            Some(path) => Mapping::of(path)?,
+            None => Mapping::default(),
+        };
+        let channels = match (self.no_channels, self.channel.as_slice()) {
+            (true, _) => Some(Vec::new()),
+            (false, []) => base.channels,
+            (false, names) => Some(names.to_vec()),
+        };
+        Ok(Mapping {
+            t: self.t.clone().or(base.t),
+            t_scale: self.t_scale.or(base.t_scale),
+            period_s: self.period.or(base.period_s),
+            u: self.u.clone().or(base.u),
+            u_scale: self.u_scale.or(base.u_scale),
+            u_offset: self.u_offset.or(base.u_offset),
+            u_threshold: self.u_threshold.or(base.u_threshold),
+            y: self.y.clone().or(base.y),
+            y_scale: self.y_scale.or(base.y_scale),
+            y_offset: self.y_offset.or(base.y_offset),
+            channels,
+        })
+    }
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
+    let files: Vec<&Path> = args.files.iter().map(PathBuf::as_path).collect();
+    let request = Import {
+        mapping: args.mapping()?,
+        title: args.title.clone(),
+        validate: args.validate.clone(),
+        hold_out_from_s: args.hold_out_from,
+        graded: args.graded,
+    };
+    let found = steps::import(&files, &request)?;
+    found.imported.save(&args.output)?;
+    console.show(&found, &[("dataset", &args.output)], &[&args.output])
+}

@@ -1,0 +1,48 @@
+//! Files of other programs to a data set.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::StepError;
+use crate::data::import::{self, Import, Imported, ImportedFile};
+
+/// What an import gave. Serialises to the keys of `import --json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct ImportedSet {
+    /// The data set with its mapping, to be saved.
+    #[serde(skip)]
+    pub imported: Imported,
+    /// Hash of the data set.
+    pub hash: String,
+    /// Sampling period, s.
+    pub sample_period_s: f64,
+    /// What became of each file.
+    pub files: Vec<ImportedFile>,
+}
+
+/// Makes a data set of CSV files of any dialect, MATLAB's `.mat`, NumPy's `.npy` and `.npz`.
+///
+/// ```
+/// use host_fit::data::import::{Import, Mapping};
+/// use host_fit::steps::import;
+///
+/// let mapping = Mapping { u_threshold: Some(2.5), ..Mapping::default() };
+/// let request = Import { mapping, ..Import::default() };
+/// let found = import(&["../recordings/tests/import/v7.mat".as_ref()], &request)?;
+/// assert!(found.imported.set.is_on_off());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`StepError`] naming file, line and column or variable, or the name that no file has.
+pub fn import(files: &[&Path], request: &Import) -> Result<ImportedSet, StepError> {
+    super::average::check_names(files, &request.validate)?;
+    let imported = import::import(files, request)?;
+    Ok(ImportedSet {
+        hash: imported.set.hash.clone(),
+        sample_period_s: imported.set.sample_period_s,
+        files: imported.files.clone(),
+        imported,
+    })
+}

@@ -1,0 +1,97 @@
+//! What can be wrong with a file that is to be imported, and what to do about it.
+
+/// Kinds of fault of an import; each message ends with the remedy.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImportProblem {
+    /// A MATLAB file that is an HDF5 file inside.
+    #[error(
+        "is a MATLAB 7.3 file (HDF5), which is not read here; open it in MATLAB and save it as version 7: load('{name}'); save('{name}', '-v7')",
+        name = .0
+    )]
+    Matlab73(String),
+    /// An HDF5 file.
+    #[error(
+        "is an HDF5 file, which is not read here; save its arrays with numpy.savez(\"run.npz\", t=t, u=u, y=y) or as CSV"
+    )]
+    Hdf5,
+    /// A workbook or another archive.
+    #[error(
+        "is an archive without .npy files (a spreadsheet's workbook is one); save the sheet as CSV"
+    )]
+    NoArrays,
+    /// MATLAB 4, or nothing of MATLAB's.
+    #[error(
+        "is no MATLAB file of version 5 or 7; open it in MATLAB or Octave and save it again: save('run.mat', 't', 'u', 'y', '-v7')"
+    )]
+    NoMatlab,
+    /// Damaged or cut short.
+    #[error("is damaged or cut short ({0}); copy or save it again")]
+    Damaged(&'static str),
+    /// Beyond what is read at once.
+    #[error(
+        "holds more than {0} MB, more than is read at once; save fewer variables, or phase-average with `host-fit average`"
+    )]
+    TooLarge(u64),
+    /// Nothing that could be a table of numbers.
+    #[error(
+        "no rows of numbers were found; a table needs a header line and rows of at least two numbers, separated by commas, semicolons, tabs or blanks"
+    )]
+    NoTable,
+    /// A variable that was asked for is not there.
+    #[error("no variable `{wanted}`; the file has {found}", wanted = .wanted, found = .found)]
+    NoVariable {
+        /// What was asked for.
+        wanted: String,
+        /// What is there.
+        found: String,
+    },
+    /// A variable that was asked for cannot be used.
+    #[error("{0}")]
+    Unusable(String),
+    /// None of the names says which variable is u or y.
+    #[error("which variable is {what}? Say it with --{option} NAME; the file has {found}", what = .what, option = .option, found = .found)]
+    Which {
+        /// `the command u`, `the output y`.
+        what: &'static str,
+        /// The option that says it.
+        option: &'static str,
+        /// What is there.
+        found: String,
+    },
+    /// Neither a time nor a sampling period.
+    #[error(
+        "has no variable that is the time; name it with --t NAME, or give the sampling period with --period SECONDS; the file has {0}"
+    )]
+    NoTime(String),
+    /// A scale that makes everything equal, or no number.
+    #[error("{0} has to be a finite number other than 0")]
+    BadScale(&'static str),
+    /// A threshold or an offset that is no number.
+    #[error("{0} has to be a finite number")]
+    BadNumber(&'static str),
+    /// A threshold that the command never crosses.
+    #[error("u lies between {low} and {high} and never crosses the threshold {threshold}; give one in between", low = .low, high = .high, threshold = .threshold)]
+    NeverCrosses {
+        /// Lowest value of u.
+        low: f64,
+        /// Highest value.
+        high: f64,
+        /// The threshold.
+        threshold: f64,
+    },
+    /// A slip in an on/off command.
+    #[error(
+        "u = {0} in a command that is otherwise 0 or 1; give --u-threshold to make it on/off, or --graded if the input has levels in between"
+    )]
+    StrayInput(f64),
+    /// A channel with a name that a record cannot have.
+    #[error("a channel cannot be named {0} here; leave it out, or rename it in the file")]
+    ChannelName(String),
+    /// A hold-out time outside the record.
+    #[error("--hold-out-from {0} s lies outside the record; give a time within it")]
+    SplitOutside(f64),
+    /// A data set that was not imported.
+    #[error("holds no [record.from]: it was not made by `host-fit import`; name one that was")]
+    NoMapping,
+}

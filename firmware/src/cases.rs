@@ -21,6 +21,7 @@ pub const SETTINGS: Settings = Settings {
         stuck_after: 500,
     },
     channel: None,
+    hold: RELAY.hold,
     // The plant is not what the models are of.
     residual_envelope: f32::INFINITY,
 };

@@ -136,6 +136,7 @@ impl Line {
         match mode {
             Mode::Disarmed => line.text("disarmed"),
             Mode::Armed => line.text("armed"),
+            Mode::Playing => line.text("playing"),
             Mode::Faulted(fault) => {
                 line.text("fault=");
                 line.text(fault.name());

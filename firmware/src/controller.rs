@@ -3,6 +3,7 @@
 use crate::fault::Fault;
 use crate::law::Law;
 use crate::sensor::{Calibration, Channel, Range, Watch};
+use model_core::control::HoldTimes;
 
 /// What the operator set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,6 +13,8 @@ pub enum Mode {
     Disarmed,
     /// The law drives the valves.
     Armed,
+    /// A command drives the valves; the law and its model take note.
+    Playing,
     /// Valves shut until the operator disarms.
     Faulted(Fault),
 }
@@ -25,6 +28,8 @@ pub struct Settings {
     pub range: Range,
     /// The measured channel, where the model needs one.
     pub channel: Option<Channel>,
+    /// The valve's shortest times, samples: a command that is shorter is not played.
+    pub hold: HoldTimes,
     /// Largest residual, averaged over about 64 samples, that the model's
     /// envelope allows, y.
     pub residual_envelope: f32,
@@ -48,6 +53,10 @@ pub struct Tick {
     pub open: bool,
     /// What the model said the sensor would show.
     pub predicted: f32,
+    /// Reading, averaged where the model is, minus that.
+    pub residual: f32,
+    /// What the sensor gave.
+    pub reading: Reading,
     /// The mode after this sample.
     pub mode: Mode,
 }
@@ -67,6 +76,8 @@ pub struct Controller<L> {
     strayed: f32,
     last: f32,
     open: bool,
+    /// Where a command wants the valve.
+    demand: bool,
 }
 
 impl<L: Law> Controller<L> {
@@ -85,6 +96,7 @@ impl<L: Law> Controller<L> {
             strayed: 0.0,
             last: 0.0,
             open: false,
+            demand: false,
         }
     }
 
@@ -96,6 +108,24 @@ impl<L: Law> Controller<L> {
             #[cfg(feature = "defmt")]
             defmt::info!("armed at sample {}", self.samples);
         }
+    }
+
+    /// Lets a command drive the valve ([`Self::demand`]), from shut; whether it does.
+    pub fn play(&mut self) -> bool {
+        if self.mode != Mode::Disarmed {
+            return false;
+        }
+        self.mode = Mode::Playing;
+        self.demand = false;
+        #[cfg(feature = "defmt")]
+        defmt::info!("playing from sample {}", self.samples);
+        true
+    }
+
+    /// Where the command wants the valve at the next samples; without effect
+    /// unless one is played.
+    pub fn demand(&mut self, open: bool) {
+        self.demand = open;
     }
 
     /// Shuts the valve and takes note of a latched fault. A failed self-test is
@@ -118,6 +148,18 @@ impl<L: Law> Controller<L> {
             #[cfg(feature = "defmt")]
             defmt::error!("fault latched: {} at sample {}", fault, self.samples);
         }
+    }
+
+    /// The rig's constants.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// y* in force; NaN for a law without one.
+    #[must_use]
+    pub fn reference(&self) -> f32 {
+        self.law.reference()
     }
 
     /// The mode.
@@ -168,17 +210,19 @@ impl<L: Law> Controller<L> {
         if reading.periods > 1 {
             fault = Some(Fault::Overrun);
         }
-        if let (Some(fault), Mode::Armed) = (fault, self.mode) {
+        if let (Some(fault), Mode::Armed | Mode::Playing) = (fault, self.mode) {
             self.latch(fault);
         }
         let y = self.settings.calibration.value(reading.counts);
         self.last = y;
         // A reading that is no number must not enter the averages.
         let y = if y.is_finite() { y } else { 0.0 };
-        let action = if self.mode == Mode::Armed {
-            self.law.act(y, &channels)
-        } else {
-            self.law.idle(y, &channels)
+        // What is played is there to find out what the model does not know yet, so
+        // the residual shuts nothing then.
+        let action = match self.mode {
+            Mode::Armed => self.law.act(y, &channels),
+            Mode::Playing => self.law.follow(self.demand, y, &channels),
+            Mode::Disarmed | Mode::Faulted(_) => self.law.follow(false, y, &channels),
         };
         self.strayed += (action.residual - self.strayed) * Self::SHARE;
         let strayed = self.strayed.abs();
@@ -191,6 +235,8 @@ impl<L: Law> Controller<L> {
         Tick {
             open: self.open,
             predicted: action.predicted,
+            residual: action.residual,
+            reading,
             mode: self.mode,
         }
     }
@@ -208,7 +254,6 @@ mod tests {
     use crate::relay::Relay;
     use identified::{full, own};
     use model_core::average::MovingAverage;
-    use model_core::control::HoldTimes;
 
     type Law = driven!(Relay, full);
 
@@ -229,6 +274,7 @@ mod tests {
             stuck_after: 200,
         },
         channel: None,
+        hold: RELAY.hold,
         residual_envelope: 0.3,
     };
 
@@ -251,12 +297,8 @@ mod tests {
 
     /// A sensor that shows what the model says, with the last count flickering.
     fn healthy(controller: &mut Controller<Law>, samples: u32) -> Tick {
-        let mut tick = Tick {
-            open: false,
-            predicted: 0.0,
-            mode: controller.mode(),
-        };
-        for k in 0..samples {
+        let mut tick = controller.tick(reading(500.5));
+        for k in 1..samples {
             let counts = (500.0 + tick.predicted / 0.0005).clamp(9.0, 4086.0) + (k % 2) as f32;
             tick = controller.tick(reading(counts));
         }

@@ -16,6 +16,8 @@ pub enum Fault {
     Channel,
     /// The sensor and the model have parted.
     Residual,
+    /// The host that had a command played has not been heard for too long.
+    Link,
     /// The watchdog restarted the board.
     Watchdog,
     /// The constants or the model's answers are not what was generated.
@@ -24,13 +26,14 @@ pub enum Fault {
 
 impl Fault {
     /// All faults.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Overrun,
         Self::NotFinite,
         Self::AtRail,
         Self::Stuck,
         Self::Channel,
         Self::Residual,
+        Self::Link,
         Self::Watchdog,
         Self::SelfTest,
     ];
@@ -45,6 +48,7 @@ impl Fault {
             Self::Stuck => "stuck",
             Self::Channel => "channel",
             Self::Residual => "residual",
+            Self::Link => "link",
             Self::Watchdog => "watchdog",
             Self::SelfTest => "self-test",
         }

@@ -24,8 +24,11 @@ pub trait Law {
     /// Decides with the reading y and the measured channels; the valve will do
     /// what is returned.
     fn act(&mut self, y: f32, channels: &[f32]) -> Action;
-    /// Takes note of a sample at which the valve stays shut.
-    fn idle(&mut self, y: f32, channels: &[f32]) -> Action;
+    /// Takes note of a sample at which the valve is at `open`, whatever the law
+    /// would have.
+    fn follow(&mut self, open: bool, y: f32, channels: &[f32]) -> Action;
+    /// y*, what the law holds the flow at; NaN where it holds nothing.
+    fn reference(&self) -> f32;
 }
 
 /// The constants of a law that runs with model `M`, memories `Y` and `J`, and
@@ -52,8 +55,11 @@ pub trait Designed<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize
         channels: &[f32],
     ) -> bool;
 
-    /// Takes note of a sample at which the valve stays shut.
+    /// Takes note of a sample at which the law does not have the valve.
     fn idle(&self, state: &mut Self::State);
+
+    /// y* in force; NaN for a law without a reference.
+    fn reference(&self, state: &Self::State) -> f32;
 
     /// Whether the law decides what it decided where it was generated.
     fn holds(
@@ -165,9 +171,13 @@ where
     }
 
     #[inline]
-    fn idle(&mut self, y: f32, channels: &[f32]) -> Action {
+    fn follow(&mut self, open: bool, y: f32, channels: &[f32]) -> Action {
         self.design.idle(&mut self.state);
-        self.issue(false, y, channels)
+        self.issue(open, y, channels)
+    }
+
+    fn reference(&self) -> f32 {
+        self.design.reference(&self.state)
     }
 }
 

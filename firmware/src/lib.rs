@@ -17,6 +17,7 @@ pub mod fault;
 pub mod law;
 pub mod link;
 pub mod on_board;
+pub mod player;
 pub mod pulses;
 pub mod relay;
 pub mod rig;

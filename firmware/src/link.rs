@@ -1,5 +1,6 @@
-//! The serial link of the processor-in-the-loop run: frames that find their
-//! beginning again, checksums, and a dialogue in which nothing slips silently.
+//! The serial line: what operator and host say to the loop and see of it, and
+//! the dialogue of the processor-in-the-loop run.
 
-pub mod frame;
+pub mod desk;
 pub mod lockstep;
+pub mod service;

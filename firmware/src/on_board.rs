@@ -2,10 +2,12 @@
 
 use crate::controller::{Controller, Settings};
 use crate::law::{Designed, Driven, driven};
+use crate::link::service::Board;
 use crate::sensor::{Calibration, Channel, Range};
 use crate::start::{self, Failure};
 use identified::on_board as model;
 use model_core::average::MovingAverage;
+use model_core::control::HoldTimes;
 
 /// The rig's constants: measure them before the air is on (`WIRING.md`).
 pub const SETTINGS: Settings = Settings {
@@ -23,7 +25,14 @@ pub const SETTINGS: Settings = Settings {
         [] => None,
         [reference, ..] => Some(Channel::around(*reference)),
     },
+    hold: HoldTimes { on: 4, off: 4 },
     residual_envelope: 0.5,
+};
+
+/// What the board says of itself.
+pub const BOARD: Board = Board {
+    period_us: PERIOD_US,
+    model: model::CHECKSUM,
 };
 
 /// The law with its model.

@@ -38,6 +38,10 @@ where
         state.shut();
     }
 
+    fn reference(&self, _state: &Played) -> f32 {
+        f32::NAN
+    }
+
     fn holds(
         &self,
         golden: &GoldenLaw,

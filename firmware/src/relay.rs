@@ -47,6 +47,11 @@ impl<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize> Designed<M, 
         hold.shut();
     }
 
+    /// The middle of what it switches at.
+    fn reference(&self, _hold: &Hold) -> f32 {
+        0.5 * (self.opens_below + self.shuts_above)
+    }
+
     /// Nothing of it was generated.
     fn holds(
         &self,

@@ -25,7 +25,7 @@ pub struct Rig<L, S, C, V, A> {
     clock: C,
     /// Opens the valves when high.
     valve: V,
-    /// Lit while armed.
+    /// Lit while law or command has the valve.
     lamp: A,
     last: u32,
 }
@@ -82,7 +82,7 @@ where
         } else {
             self.valve.set_low()
         };
-        let _ = if matches!(tick.mode, Mode::Armed) {
+        let _ = if matches!(tick.mode, Mode::Armed | Mode::Playing) {
             self.lamp.set_high()
         } else {
             self.lamp.set_low()

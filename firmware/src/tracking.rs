@@ -48,6 +48,15 @@ impl<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize> Designed<M, 
         state.stale = true;
     }
 
+    #[inline]
+    fn reference(&self, state: &Self::State) -> f32 {
+        if state.stale {
+            self.reference
+        } else {
+            state.law.reference()
+        }
+    }
+
     fn holds(
         &self,
         golden: &GoldenLaw,

@@ -21,9 +21,11 @@ fn dependencies(package: &str) -> BTreeSet<String> {
 }
 
 /// From bottom to top, with what each may know.
-const CRATES: [(&str, &[&str]); 5] = [
+const CRATES: [(&str, &[&str]); 7] = [
     ("model-core", &[]),
+    ("wire", &["model-core"]),
     ("recordings", &[]),
+    ("rig-line", &["recordings", "wire"]),
     ("closed-loop", &["model-core"]),
     ("firmware-sim", &["closed-loop", "recordings"]),
     (

@@ -3,12 +3,12 @@
 use crate::clocks::APB1;
 use core::cell::Cell;
 use critical_section::Mutex;
-use heapless::Deque;
 use heapless::spsc::{Consumer, Producer, Queue};
 use stm32f4xx_hal::gpio::{Input, PA2, PA3};
 use stm32f4xx_hal::interrupt;
 use stm32f4xx_hal::pac::{Interrupt, NVIC, USART2};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
+use wire::Outbox;
 
 const BAUD: u32 = 115_200;
 
@@ -21,7 +21,8 @@ static RECEIVED: Mutex<Cell<Option<Producer<'static, u8>>>> = Mutex::new(Cell::n
 pub struct Uart {
     registers: USART2,
     received: Option<Consumer<'static, u8>>,
-    sending: Deque<u8, 512>,
+    /// What is to be sent.
+    pub outbox: Outbox,
 }
 
 impl Uart {
@@ -32,7 +33,7 @@ impl Uart {
         USART2::enable(rcc);
         USART2::reset(rcc);
         // `None` if this were called twice: there is one line.
-        let queue = cortex_m::singleton!(: Queue<u8, 128> = Queue::new());
+        let queue = cortex_m::singleton!(: Queue<u8, 256> = Queue::new());
         let received = queue.map(|queue| {
             let (producer, consumer) = queue.split();
             critical_section::with(|section| RECEIVED.borrow(section).set(Some(producer)));
@@ -53,7 +54,7 @@ impl Uart {
         Self {
             registers,
             received,
-            sending: Deque::new(),
+            outbox: Outbox::new(),
         }
     }
 
@@ -63,18 +64,11 @@ impl Uart {
         self.received.as_mut()?.dequeue()
     }
 
-    /// Gives `bytes` to be sent; what does not fit is lost.
-    pub fn send(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            let _ = self.sending.push_back(*byte);
-        }
-    }
-
     /// Sends a byte if there is one and the line is free; call it often.
     #[inline]
     pub fn work(&mut self) {
         if self.registers.sr().read().txe().bit_is_set()
-            && let Some(byte) = self.sending.pop_front()
+            && let Some(byte) = self.outbox.pop()
         {
             self.registers.dr().write(|w| w.dr().set(byte.into()));
         }

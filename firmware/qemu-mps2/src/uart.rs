@@ -1,49 +1,111 @@
-//! CMSDK APB UART 0 of the mps2 boards, polled.
+//! CMSDK APB UARTs of the mps2 boards, polled.
 
-const BASE: usize = 0x4000_4000;
-const DATA: *mut u32 = BASE as *mut u32;
-const STATE: *mut u32 = (BASE + 4) as *mut u32;
-const CONTROL: *mut u32 = (BASE + 8) as *mut u32;
-const DIVIDER: *mut u32 = (BASE + 16) as *mut u32;
+use wire::Outbox;
+
 const SEND_FULL: u32 = 1;
 const RECEIVED: u32 = 2;
+/// What a byte takes at 115 200 baud, 8N1, µs · 11 520.
+const A_BYTE: u32 = 1_000_000;
+const BYTES_A_SECOND: u32 = 11_520;
 
-/// The serial line. One owner: it is made from a token that exists once.
-pub struct Uart(());
+/// The serial line to operator and host.
+pub type Line = Uart<0x4000_4000>;
+/// The line to the rig behind the board: what on a real board are converter and pins.
+pub type ToRig = Uart<0x4000_5000>;
 
-impl Uart {
+/// A serial line. One owner: each is made from a token that exists once.
+pub struct Uart<const BASE: usize> {
+    /// What may be sent at once, in µs · 11 520.
+    credit: u32,
+}
+
+impl Line {
     /// Turns sender and receiver on. `_core` is consumed to show that there is
     /// one owner.
     #[must_use]
     pub fn new(_core: cortex_m::peripheral::ITM) -> Self {
-        // SAFETY: registers of UART 0, which nothing else touches.
+        Self::on()
+    }
+}
+
+impl ToRig {
+    /// Turns sender and receiver on. `_core` is consumed to show that there is
+    /// one owner.
+    #[must_use]
+    pub fn new(_core: cortex_m::peripheral::FPB) -> Self {
+        Self::on()
+    }
+}
+
+impl<const BASE: usize> Uart<BASE> {
+    const DATA: *mut u32 = BASE as *mut u32;
+    const STATE: *mut u32 = (BASE + 4) as *mut u32;
+    const CONTROL: *mut u32 = (BASE + 8) as *mut u32;
+    const DIVIDER: *mut u32 = (BASE + 16) as *mut u32;
+
+    fn on() -> Self {
+        // SAFETY: registers of this UART, which nothing else touches.
         unsafe {
-            DIVIDER.write_volatile(16);
-            CONTROL.write_volatile(0b11);
+            Self::DIVIDER.write_volatile(16);
+            Self::CONTROL.write_volatile(0b11);
         }
-        Self(())
+        Self { credit: 0 }
     }
 
     /// A byte, if one has come.
     #[inline]
     pub fn receive(&mut self) -> Option<u8> {
-        // SAFETY: as in `new`.
+        // SAFETY: as in `on`.
         unsafe {
-            if STATE.read_volatile() & RECEIVED == 0 {
+            if Self::STATE.read_volatile() & RECEIVED == 0 {
                 return None;
             }
-            Some(DATA.read_volatile() as u8)
+            Some(Self::DATA.read_volatile() as u8)
         }
     }
 
-    /// Sends all of `bytes`.
+    /// Waits for a byte.
+    pub fn wait(&mut self) -> u8 {
+        loop {
+            if let Some(byte) = self.receive() {
+                return byte;
+            }
+        }
+    }
+
+    /// Sends all of `bytes`, and waits where the line is full.
     pub fn send(&mut self, bytes: &[u8]) {
         for byte in bytes {
-            // SAFETY: as in `new`.
-            unsafe {
-                while STATE.read_volatile() & SEND_FULL != 0 {}
-                DATA.write_volatile(u32::from(*byte));
+            while !self.offer(*byte) {}
+        }
+    }
+
+    fn offer(&mut self, byte: u8) -> bool {
+        // SAFETY: as in `on`.
+        unsafe {
+            let free = Self::STATE.read_volatile() & SEND_FULL == 0;
+            if free {
+                Self::DATA.write_volatile(u32::from(byte));
             }
+            free
+        }
+    }
+
+    /// Sends what a real line would have taken in `period` µs: QEMU's takes
+    /// everything at once. What the other end does not read stays in the outbox.
+    pub fn work(&mut self, outbox: &mut Outbox, period: u32) {
+        // What was not used is lost, but for what a line that is never idle needs.
+        self.credit = self.credit.min(A_BYTE) + period * BYTES_A_SECOND;
+        while self.credit >= A_BYTE {
+            // SAFETY: as in `on`.
+            if unsafe { Self::STATE.read_volatile() } & SEND_FULL != 0 {
+                return;
+            }
+            let Some(byte) = outbox.pop() else {
+                return;
+            };
+            self.offer(byte);
+            self.credit -= A_BYTE;
         }
     }
 }

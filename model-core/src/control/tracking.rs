@@ -105,6 +105,14 @@ pub struct TrackingState<T, S, const A: usize> {
     reference: T,
 }
 
+impl<T: Copy, S, const A: usize> TrackingState<T, S, A> {
+    /// The reference in force at the last sample (ramped).
+    #[inline]
+    pub fn reference(&self) -> T {
+        self.reference
+    }
+}
+
 /// What the law decided at a sample, and why.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decision<T> {

@@ -2,12 +2,12 @@
 //! answered, and bytes that are lost on purpose.
 
 use anyhow::{Context, Result, bail};
-use firmware::link::frame::{Frame, Receiver};
 use firmware::link::lockstep::DAMAGED;
 use std::io::{Read, Write};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver as Channel, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
+use wire::frame::{Frame, Receiver};
 
 /// A request is repeated this often before the link is given up.
 const ATTEMPTS: u32 = 5;

@@ -1,11 +1,11 @@
-//! The loop on the Nucleo-F446RE: `arm`, `disarm`, `status` and telemetry over
-//! the ST-LINK's serial port.
+//! The loop on the Nucleo-F446RE, with operator and host at the ST-LINK's serial
+//! port.
 #![no_std]
 #![no_main]
 
 use board::stack;
 use cortex_m_rt::{entry, exception};
-use firmware::console::Operator;
+use firmware::link::desk::Desk;
 use firmware::rig::Rig;
 use firmware::{on_board, start};
 use nucleo_f446re::sampler::{Periods, Sampler, periods};
@@ -51,7 +51,7 @@ fn main() -> ! {
     );
     let lamp = a.pa5.into_push_pull_output();
     let mut rig = Rig::new(controller, sampler, Periods, valve, lamp);
-    let mut operator = Operator::new();
+    let mut desk = Desk::new(on_board::BOARD);
     let mut sampled = periods();
     loop {
         // No sample, no food: a converter that stands still ends in a restart.
@@ -59,18 +59,15 @@ fn main() -> ! {
             uart.work();
         }
         sampled = periods();
-        rig.sample();
+        desk.before(rig.controller(), &mut uart.outbox);
+        let tick = rig.sample();
         watchdog.feed();
         if button.is_low() {
             rig.controller().disarm();
         }
+        desk.after(&tick, rig.controller(), &mut uart.outbox);
         while let Some(byte) = uart.receive() {
-            if let Some(line) = operator.receive(byte, rig.controller()) {
-                uart.send(line.bytes());
-            }
-        }
-        if let Some(line) = operator.report(rig.controller()) {
-            uart.send(line.bytes());
+            desk.receive(byte, rig.controller(), &mut uart.outbox);
         }
     }
 }

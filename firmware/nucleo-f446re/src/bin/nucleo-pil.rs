@@ -29,7 +29,7 @@ fn main() -> ! {
             loop {
                 uart.work();
                 if let Some(byte) = uart.receive() {
-                    uart.send(server.receive(byte));
+                    let _ = uart.outbox.offer(server.receive(byte));
                 }
             }
         }

@@ -9,7 +9,7 @@ use identified::full;
 use model_core::self_test::command;
 use model_core::{Input, step};
 use qemu_mps2::clock::Ticks;
-use qemu_mps2::uart::Uart;
+use qemu_mps2::uart::Line;
 
 const STEPS: u32 = 20_000;
 
@@ -29,7 +29,7 @@ fn own_step(state: &mut full::IdentifiedState, on: bool) -> f32 {
 #[entry]
 fn main() -> ! {
     if let Some(core) = cortex_m::Peripherals::take() {
-        let mut uart = Uart::new(core.ITM);
+        let mut uart = Line::new(core.ITM);
         let mut ticks = Ticks::new(core.SYST);
         let mut state = full::state(&full::model());
         let (mut own, mut peer, mut apart) = (0_u32, 0_u32, 0.0_f32);

@@ -7,13 +7,13 @@ use board::stack;
 use cortex_m_rt::entry;
 use firmware::link::lockstep::Server;
 use qemu_mps2::clock::Ticks;
-use qemu_mps2::uart::Uart;
+use qemu_mps2::uart::Line;
 
 #[entry]
 fn main() -> ! {
     stack::paint();
     if let Some(core) = cortex_m::Peripherals::take() {
-        let mut uart = Uart::new(core.ITM);
+        let mut uart = Line::new(core.ITM);
         let cases = Measured::new(Ticks::new(core.SYST));
         // In static memory: what the stack is measured for are the calls.
         if let Some(server) = cortex_m::singleton!(: Server<Measured<Ticks>> = Server::new(cases)) {

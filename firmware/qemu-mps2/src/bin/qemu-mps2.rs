@@ -16,7 +16,7 @@ use core::mem::MaybeUninit;
 use core::ptr::{addr_of, addr_of_mut};
 use cortex_m_rt::entry;
 use embedded_hal::digital::{ErrorType, OutputPin};
-use firmware::console::Operator;
+use firmware::link::desk::Desk;
 use firmware::on_board::SETTINGS;
 use firmware::rig::{Clock, Rig, Sensor};
 use firmware::{on_board, start};
@@ -25,8 +25,9 @@ use model_core::model::Averaging;
 use model_core::recursion::Bilinear;
 use model_core::{Input, Parts, step};
 use qemu_mps2::clock::Ticks;
-use qemu_mps2::uart::Uart;
+use qemu_mps2::uart::Line;
 use qemu_mps2::watchdog::{Watchdog, restarted};
+use wire::Outbox;
 
 /// SysTick ticks in a sample, at 25 MHz.
 const TICKS_PER_SAMPLE: u32 = 25 * on_board::PERIOD_US;
@@ -110,7 +111,7 @@ fn main() -> ! {
         }
     };
     let by_watchdog = restarted();
-    let mut uart = Uart::new(core.ITM);
+    let (mut uart, mut outbox) = (Line::new(core.ITM), Outbox::new());
     let mut ticks = Ticks::new(core.SYST);
     let identified = model::model();
     let mut controller = on_board::controller();
@@ -124,20 +125,24 @@ fn main() -> ! {
     };
     let samples = Samples(core::cell::Cell::new(0));
     let mut rig = Rig::new(controller, sensor, &samples, Pin, Pin);
-    let mut operator = Operator::new();
+    let mut desk = Desk::new(on_board::BOARD);
     let mut watchdog = Watchdog::start(core.TPIU, PATIENCE);
     ticks.begin();
     loop {
         let periods = ticks.wait(TICKS_PER_SAMPLE);
         samples.0.set(samples.0.get().wrapping_add(periods));
         rig.sensor().open = rig.controller().is_open();
-        rig.sample();
+        desk.before(rig.controller(), &mut outbox);
+        let tick = rig.sample();
         watchdog.feed();
-        if let Some(line) = operator.report(rig.controller()) {
-            uart.send(line.bytes());
-        }
+        desk.after(&tick, rig.controller(), &mut outbox);
+        uart.work(&mut outbox, on_board::PERIOD_US);
         while let Some(byte) = uart.receive() {
             match byte {
+                // In frames they mean what they mean there.
+                _ if desk.frames_come() => {
+                    desk.receive(byte, rig.controller(), &mut outbox);
+                }
                 b'0'..=b'4' | b'c' => rig.sensor().illness = byte,
                 b'5' => cortex_m::asm::delay(TWO_AND_A_HALF_PERIODS),
                 b'6' => loop {
@@ -146,11 +151,7 @@ fn main() -> ! {
                 b'7' => restart(COEFFICIENT),
                 b'8' => restart(TRAJECTORY),
                 b'9' => restart(0),
-                _ => {
-                    if let Some(line) = operator.receive(byte, rig.controller()) {
-                        uart.send(line.bytes());
-                    }
-                }
+                _ => desk.receive(byte, rig.controller(), &mut outbox),
             }
         }
     }

@@ -6,8 +6,8 @@ use model_core::self_test::Crc32;
 
 /// Longest content of a frame, bytes.
 pub const CONTENT: usize = 248;
-/// Longest frame on the wire: content, checksum, two stuffing bytes, the 0.
-pub const WIRE: usize = CONTENT + 4 + 3;
+/// Longest frame on the wire: a zero, content, checksum, two stuffing bytes, a zero.
+pub const WIRE: usize = CONTENT + 4 + 4;
 
 /// Why bytes between two zeros are no frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,54 +22,99 @@ pub enum Damage {
     Checksum,
 }
 
-fn checksum(content: &[u8]) -> u32 {
-    content
-        .iter()
-        .fold(Crc32::new(), |crc, byte| crc.byte(*byte))
-        .value()
-}
-
-/// A frame ready for the wire.
+/// A frame for the wire, written byte by byte so that no sample pays for a whole one.
+///
+/// ```
+/// use wire::frame::{Frame, Receiver};
+/// let frame = Frame::new(b"valve");
+/// let mut receiver = Receiver::new();
+/// let mut bytes = frame.bytes().iter();
+/// let content = loop {
+///     if let Some(result) = receiver.receive(*bytes.next().unwrap()) {
+///         break result;
+///     }
+/// };
+/// assert_eq!(content, Ok(&b"valve"[..]));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Frame {
     wire: Vec<u8, WIRE>,
+    crc: Crc32,
+    /// Bytes of content so far.
+    content: usize,
+    /// Position of the byte that counts to the next zero.
+    code_at: usize,
+    code: u8,
 }
 
 impl Frame {
     /// Nothing to send.
     #[must_use]
     pub const fn empty() -> Self {
-        Self { wire: Vec::new() }
+        Self {
+            wire: Vec::new(),
+            crc: Crc32::new(),
+            content: 0,
+            code_at: 0,
+            code: 1,
+        }
     }
 
     /// The frame of `content`, of which at most [`CONTENT`] bytes are taken.
     #[must_use]
     pub fn new(content: &[u8]) -> Self {
-        let content = content.get(..CONTENT).unwrap_or(content);
-        let crc = checksum(content).to_le_bytes();
         let mut frame = Self::empty();
-        // Position of the byte that counts to the next zero.
-        let mut code_at = 0;
-        let mut code = 1_u8;
-        frame.put(0);
-        for byte in content.iter().chain(&crc) {
-            if *byte != 0 {
-                frame.put(*byte);
-                code += 1;
-            }
-            if *byte == 0 || code == u8::MAX {
-                frame.set(code_at, code);
-                code_at = frame.wire.len();
-                code = 1;
-                frame.put(0);
-            }
-        }
-        frame.set(code_at, code);
-        frame.put(0);
+        frame.begin();
+        frame.put(content);
+        frame.finish();
         frame
     }
 
-    fn put(&mut self, byte: u8) {
+    /// Begins afresh. A zero goes first: whatever was cut off before ends there.
+    #[inline(never)]
+    pub fn begin(&mut self) {
+        *self = Self::empty();
+        self.push(0);
+        self.code_at = self.wire.len();
+        self.push(0);
+    }
+
+    /// Adds content; what exceeds [`CONTENT`] bytes is left out.
+    #[inline(never)]
+    pub fn put(&mut self, content: &[u8]) {
+        for byte in content {
+            if self.content < CONTENT {
+                self.content += 1;
+                self.crc = self.crc.byte(*byte);
+                self.stuff(*byte);
+            }
+        }
+    }
+
+    /// Adds the checksum and the end.
+    #[inline(never)]
+    pub fn finish(&mut self) {
+        for byte in self.crc.value().to_le_bytes() {
+            self.stuff(byte);
+        }
+        self.set(self.code_at, self.code);
+        self.push(0);
+    }
+
+    fn stuff(&mut self, byte: u8) {
+        if byte != 0 {
+            self.push(byte);
+            self.code = self.code.wrapping_add(1);
+        }
+        if byte == 0 || self.code == u8::MAX {
+            self.set(self.code_at, self.code);
+            self.code_at = self.wire.len();
+            self.code = 1;
+            self.push(0);
+        }
+    }
+
+    fn push(&mut self, byte: u8) {
         let _ = self.wire.push(byte);
     }
 
@@ -161,7 +206,10 @@ impl Receiver {
         let Some((content, crc)) = self.content.split_last_chunk::<4>() else {
             return Some(Err(Damage::Checksum));
         };
-        if checksum(content) == u32::from_le_bytes(*crc) {
+        let found = content
+            .iter()
+            .fold(Crc32::new(), |crc, byte| crc.byte(*byte));
+        if found.value() == u32::from_le_bytes(*crc) {
             Some(Ok(content))
         } else {
             Some(Err(Damage::Checksum))
@@ -204,8 +252,10 @@ mod tests {
         for content in contents() {
             let frame = Frame::new(&content);
             assert!(frame.bytes().len() <= WIRE);
-            let (end, body) = frame.bytes().split_last().expect("a frame");
-            assert!(*end == 0 && !body.contains(&0));
+            let Some((0, [body @ .., 0])) = frame.bytes().split_first() else {
+                panic!("a frame is between zeros");
+            };
+            assert!(!body.contains(&0));
             for byte in body {
                 assert!(receiver.receive(*byte).is_none());
             }
@@ -219,7 +269,7 @@ mod tests {
         let content: Vec<u8> = (0..40).map(|i| i % 7).collect();
         let frame = Frame::new(&content);
         let good = frame.bytes();
-        for at in 0..good.len() - 1 {
+        for at in 1..good.len() - 1 {
             for change in [None, Some(0x01_u8), Some(0x80)] {
                 let mut receiver = Receiver::new();
                 let mut damaged = 0;
@@ -241,6 +291,58 @@ mod tests {
                 }
                 assert_eq!(after, Some(Ok(content.clone())));
             }
+        }
+    }
+
+    use proptest::prelude::*;
+
+    fn received(bytes: &[u8]) -> Vec<Result<Vec<u8>, Damage>> {
+        let mut receiver = Receiver::new();
+        let mut all = Vec::new();
+        for byte in bytes {
+            all.extend(receiver.receive(*byte).map(|r| r.map(<[u8]>::to_vec)));
+        }
+        all
+    }
+
+    proptest! {
+        /// Whatever came before, noise or half a frame: frames after it arrive whole.
+        #[test]
+        fn garbage_and_half_frames_harm_nothing_that_follows(
+            garbage in prop::collection::vec(any::<u8>(), 0..600),
+            cut in prop::collection::vec(any::<u8>(), 0..CONTENT),
+            keep in 0.0_f64..1.0,
+            content in prop::collection::vec(any::<u8>(), 0..=CONTENT),
+        ) {
+            let half = Frame::new(&cut);
+            let half = &half.bytes()[..(keep * half.bytes().len() as f64) as usize];
+            let frame = Frame::new(&content);
+            let all = received(&[&garbage, half, frame.bytes()].concat());
+            prop_assert_eq!(all.last(), Some(&Ok(content)));
+        }
+
+        /// Noise of any kind is no frame; the checksum lets one of 2³² through.
+        #[test]
+        fn garbage_is_no_frame(garbage in prop::collection::vec(any::<u8>(), 0..2000)) {
+            prop_assert!(received(&garbage).iter().all(Result::is_err));
+        }
+
+        /// A burst of wrong bytes within a frame is noticed.
+        #[test]
+        fn a_burst_is_seen(
+            content in prop::collection::vec(any::<u8>(), 1..=CONTENT),
+            at in 0.0_f64..1.0,
+            burst in prop::collection::vec(any::<u8>(), 1..5),
+        ) {
+            let frame = Frame::new(&content);
+            let mut bytes = frame.bytes().to_vec();
+            let at = 1 + (at * (bytes.len() - 2) as f64) as usize;
+            for (slot, byte) in bytes[at..].iter_mut().zip(&burst) {
+                *slot = *byte;
+            }
+            let changed = bytes != frame.bytes();
+            let intact = received(&bytes).contains(&Ok(content));
+            prop_assert_eq!(changed, !intact);
         }
     }
 }

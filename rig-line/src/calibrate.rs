@@ -1,0 +1,285 @@
+//! What a rig is: played and measured.
+//!
+//! In this order: the valve shut, then open, each until the flow is steady; then
+//! pulses of growing length, and gaps of growing length in steady blowing, until
+//! the flow answers. What a healthy sensor does (noise, equal readings in a row,
+//! distance from the rails) is seen on the way.
+
+use wire::reply::Phase;
+
+use crate::command::Command;
+use crate::error::LineError;
+use crate::host::{Host, word};
+use crate::record::{Progress, record};
+use crate::rig_file::{ChannelEntry, FULL_SCALE, RigFile, SensorEntry, VERSION, ValveEntry};
+
+/// How a rig is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// How long the valve stays open, and shut, for the flow to become steady, s;
+    /// the second half of it is measured.
+    pub steady_s: f64,
+    /// Longest pulse that is tried, s.
+    pub longest_pulse_s: f64,
+    /// Pulses of each length.
+    pub pulses: u32,
+    /// Standard errors by which the flow must have answered a pulse.
+    pub sigmas: f64,
+    /// Standard deviations of the noise, averaged over 64 samples, that a model
+    /// may be off: the residual's envelope.
+    pub envelope_sigmas: f64,
+    /// Smallest envelope, y.
+    pub least_envelope: f64,
+}
+
+impl Default for Plan {
+    fn default() -> Self {
+        Self {
+            steady_s: 4.0,
+            longest_pulse_s: 0.05,
+            pulses: 24,
+            sigmas: 5.0,
+            envelope_sigmas: 6.0,
+            least_envelope: 0.25,
+        }
+    }
+}
+
+/// How much longer than the longest seen a run of equal readings is a stuck
+/// sensor, and the least.
+const STUCK: (u32, u32) = (20, 200);
+/// Distance from the ends of the converter's range at which a reading is at a rail.
+const RAIL: f64 = 8.0;
+
+/// The channel that a rig has, as the user says: the board cannot know.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChannelSaid {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Counts of 0.
+    pub zero_counts: f64,
+    /// Units per count.
+    pub per_count: f64,
+}
+
+/// Calibrates the rig behind `host`.
+///
+/// # Errors
+/// [`LineError`] when the board cannot, or the rig is not as it needs to be: the
+/// flow does not answer, readings at a rail.
+pub fn calibrate(
+    host: &mut Host,
+    plan: &Plan,
+    channel: Option<ChannelSaid>,
+    watch: &mut dyn FnMut(&str, &Progress),
+) -> Result<RigFile, LineError> {
+    let board = host.hello()?;
+    if let Phase::Faulted(_) | Phase::Armed | Phase::Playing = board.phase {
+        return Err(LineError::Calibration(format!(
+            "the board is {}; see why, and disarm it",
+            word(board.phase)
+        )));
+    }
+    let period = f64::from(board.period_us) * 1e-6;
+    let steady = (plan.steady_s / period).round() as usize;
+    let mut play = |what: &str, levels: Vec<bool>| {
+        let command = Command::new("calibration", period, levels);
+        played(host, &command, &mut |progress| watch(what, progress))
+    };
+    let shut = play("valve shut", vec![false; steady])?;
+    // Open, then shut again for as long: the next thing begins at rest.
+    let blown = play(
+        "valve open",
+        [vec![true; steady], vec![false; steady]].concat(),
+    )?;
+    let half = |counts: &[f64]| counts[counts.len() / 2..].to_vec();
+    let (off, on) = (half(&shut), half(&blown[..steady]));
+    let (zero, noise_off) = (mean(&off), deviation(&off));
+    let (one, noise_on) = (mean(&on), deviation(&on));
+    let noise = noise_off.max(noise_on);
+    let swing = one - zero;
+    if noise == 0.0 {
+        return Err(LineError::Calibration(
+            "the reading does not move at all; is the sensor connected?".into(),
+        ));
+    }
+    // Noise is coloured: the scatter of stretches says how sure the means are.
+    let sure = stretches(&off).max(stretches(&on));
+    if swing.abs() < plan.sigmas * sure || swing.abs() < 20.0 {
+        return Err(LineError::Calibration(format!(
+            "steady blowing moves the reading by {swing:.1} counts only; is the air on, and the valve on its pin?"
+        )));
+    }
+    let seen = |counts: &[f64]| {
+        counts
+            .iter()
+            .copied()
+            .fold((f64::MAX, 0.0), |(a, b), c| (c.min(a), c.max(b)))
+    };
+    let (low, high) = seen(&[&shut[..], &blown].concat());
+    if low <= RAIL || high >= FULL_SCALE - RAIL {
+        return Err(LineError::Calibration(format!(
+            "readings from {low} to {high} reach an end of the converter's range; change the divider (WIRING.md)"
+        )));
+    }
+    let equal = longest_equal(&shut).max(longest_equal(&blown));
+    let per_count = 1.0 / swing;
+
+    let (shortest_on, shortest_off) = {
+        let mut answers = |open: bool| shortest(&mut play, plan, period, steady, open, swing);
+        (answers(true)?, answers(false)?)
+    };
+    let envelope = plan.envelope_sigmas * sixty_four(&off).max(sixty_four(&on)) * per_count.abs();
+    Ok(RigFile {
+        format_version: VERSION,
+        sample_period_s: period,
+        residual_envelope: rounded(envelope.max(plan.least_envelope), 3),
+        sensor: SensorEntry {
+            zero_counts: rounded(zero, 2),
+            per_count: significant(per_count),
+            lower_rail_counts: RAIL,
+            upper_rail_counts: FULL_SCALE - RAIL,
+            stuck_after_samples: (STUCK.0 * equal).max(STUCK.1),
+            noise_counts: Some([rounded(noise_off, 2), rounded(noise_on, 2)]),
+        },
+        valve: ValveEntry {
+            shortest_on_s: rounded(shortest_on, 6),
+            shortest_off_s: rounded(shortest_off, 6),
+        },
+        channel: channel.map(|said| ChannelEntry {
+            name: said.name,
+            unit: said.unit,
+            zero_counts: said.zero_counts,
+            per_count: said.per_count,
+            lower_rail_counts: RAIL,
+            upper_rail_counts: FULL_SCALE - RAIL,
+        }),
+    })
+}
+
+/// Plays levels, under a name for the user, and gives the counts.
+type Play<'a> = dyn FnMut(&str, Vec<bool>) -> Result<Vec<f64>, LineError> + 'a;
+
+/// The shortest pulse (`open`), or gap in steady blowing, that the flow answers, s.
+fn shortest(
+    play: &mut Play<'_>,
+    plan: &Plan,
+    period: f64,
+    steady: usize,
+    open: bool,
+    swing: f64,
+) -> Result<f64, LineError> {
+    let longest = (plan.longest_pulse_s / period).round() as usize;
+    let what = if open { "pulses" } else { "gaps" };
+    // The board refuses what is shorter than the hold times that it knows.
+    let mut length = 1;
+    while length <= longest {
+        // Rests of half a second, as long as the flow needs to forget.
+        let rest = (0.5 / period).round() as usize;
+        let mut levels = if open { Vec::new() } else { vec![true; steady] };
+        for _ in 0..plan.pulses {
+            levels.extend(std::iter::repeat_n(!open, rest));
+            levels.extend(std::iter::repeat_n(open, length));
+        }
+        levels.extend(std::iter::repeat_n(!open, rest));
+        levels.extend(std::iter::repeat_n(false, steady));
+        let lead = if open { 0 } else { steady };
+        let text = format!("{what} of {:.0} ms", length as f64 * period * 1e3);
+        match play(&text, levels) {
+            Ok(counts) => {
+                let answers: Vec<f64> = (0..plan.pulses as usize)
+                    .filter_map(|n| {
+                        let edge = lead + n * (rest + length) + rest;
+                        // Before the pulse, and the extreme of what comes after it.
+                        let before = mean(counts.get(edge - rest / 4..edge)?);
+                        let after = mean(counts.get(edge + 20.min(rest / 8)..edge + rest / 2)?);
+                        Some((after - before) * if open { swing } else { -swing } / swing.abs())
+                    })
+                    .collect();
+                let sure = deviation(&answers) / (answers.len() as f64).sqrt();
+                if mean(&answers) > plan.sigmas * sure {
+                    return Ok(length as f64 * period);
+                }
+            }
+            // Shorter than the board allows: longer ones follow.
+            Err(LineError::Refused { reason, .. }) if reason.contains("hold time") => {}
+            Err(other) => return Err(other),
+        }
+        length = if length < 8 {
+            length + 1
+        } else {
+            length + length / 4
+        };
+    }
+    Err(LineError::Calibration(format!(
+        "the flow answers no {what} up to {} s; allow longer ones, or more of them",
+        plan.longest_pulse_s
+    )))
+}
+
+/// Plays a command once and gives the counts.
+fn played(
+    host: &mut Host,
+    command: &Command,
+    watch: &mut dyn FnMut(&Progress),
+) -> Result<Vec<f64>, LineError> {
+    let mut counts = Vec::new();
+    let mut gone = || {
+        Err(LineError::Gone(
+            "the line broke during the calibration".into(),
+        ))
+    };
+    let mut keep = |_, samples: &[wire::samples::Sample]| {
+        counts = samples.iter().map(|s| f64::from(s.counts)).collect();
+        Ok(())
+    };
+    let recording = record(host, &mut gone, command, 1, &mut keep, watch)?;
+    match recording.cut_short {
+        None => Ok(counts),
+        Some(why) => Err(LineError::Calibration(why)),
+    }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+fn deviation(values: &[f64]) -> f64 {
+    let m = mean(values);
+    let square = values.iter().map(|v| (v - m).powi(2)).sum::<f64>();
+    (square / (values.len().max(2) - 1) as f64).sqrt()
+}
+
+/// Standard error of the mean from the scatter of ten stretches.
+fn stretches(values: &[f64]) -> f64 {
+    let each = (values.len() / 10).max(1);
+    let means: Vec<f64> = values.chunks_exact(each).map(mean).collect();
+    deviation(&means) / (means.len().max(1) as f64).sqrt()
+}
+
+/// Standard deviation of averages over 64 samples.
+fn sixty_four(values: &[f64]) -> f64 {
+    let means: Vec<f64> = values.chunks_exact(64).map(mean).collect();
+    deviation(&means)
+}
+
+fn longest_equal(values: &[f64]) -> u32 {
+    let (mut longest, mut now) = (0, 0);
+    for pair in values.windows(2) {
+        now = if pair[0] == pair[1] { now + 1 } else { 0 };
+        longest = longest.max(now);
+    }
+    longest
+}
+
+fn rounded(value: f64, digits: i32) -> f64 {
+    let scale = 10_f64.powi(digits);
+    (value * scale).round() / scale
+}
+
+/// Seven digits: a float's.
+fn significant(value: f64) -> f64 {
+    format!("{value:.6e}").parse().unwrap_or(value)
+}

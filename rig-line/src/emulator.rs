@@ -1,0 +1,191 @@
+//! A board under QEMU with a rig behind it, so that everyone can try the circle.
+//!
+//! QEMU's first serial line is the host's; its second carries readings and valve
+//! (`qemu-rig` of the firmware). The rig is the sample clock: it samples as fast as
+//! board and host can, but no further ahead of the host than a real board would
+//! be, unless the host has died.
+
+use std::io::{Read, Write};
+use std::net::TcpListener;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex};
+use std::time::Duration;
+
+use crate::error::LineError;
+use crate::port::Port;
+
+/// Samples that the rig runs ahead of what the host was told: well below the
+/// half second after which a board gives its host up.
+const AHEAD: u64 = 150;
+/// A host that is silent for so long has died: time goes on without it.
+const DEAD: Duration = Duration::from_millis(1500);
+
+/// What is measured and driven.
+pub trait Rig: Send {
+    /// Holds the valve for a sample period, then gives the counts of sensor and
+    /// channel, 12 bits each.
+    fn sample(&mut self, open: bool) -> [u16; 2];
+}
+
+/// How far host and rig are.
+#[derive(Clone, Debug, Default)]
+pub struct Pace(Arc<(Mutex<u64>, Condvar)>);
+
+impl Pace {
+    /// The host was there.
+    pub fn touch(&self) {
+        let (count, changed) = &*self.0;
+        if let Ok(mut left) = count.lock() {
+            *left = AHEAD;
+            changed.notify_one();
+        }
+    }
+
+    /// Waits until the host is near enough for another sample.
+    pub fn wait(&self) {
+        let (count, changed) = &*self.0;
+        let Ok(left) = count.lock() else { return };
+        let waited = changed.wait_timeout_while(left, DEAD, |left| *left == 0);
+        if let Ok((mut left, timeout)) = waited {
+            if timeout.timed_out() {
+                // So long that the board notices.
+                *left = 5 * AHEAD;
+            }
+            *left -= 1;
+        }
+    }
+}
+
+/// A board under QEMU with its rig.
+pub struct Emulator {
+    process: Child,
+    /// How far host and rig are.
+    pub pace: Pace,
+    reset: Arc<AtomicBool>,
+    samples: Arc<AtomicU64>,
+    open: Arc<AtomicBool>,
+    lines: Option<Port>,
+}
+
+impl Emulator {
+    /// Starts `elf` with `rig` behind it.
+    ///
+    /// # Errors
+    /// [`LineError`] when QEMU cannot be started.
+    pub fn start(elf: &Path, mut rig: Box<dyn Rig>) -> Result<Self, LineError> {
+        let failed = |cause| LineError::Open {
+            port: format!("qemu-system-arm with {}", elf.display()),
+            cause,
+        };
+        if !elf.is_file() {
+            return Err(failed(std::io::Error::other(
+                "there is no such program; `cargo xtask firmware --board qemu-rig` builds it, `cargo xtask setup` gets \
+                 what that needs",
+            )));
+        }
+        let listener = TcpListener::bind("127.0.0.1:0").map_err(failed)?;
+        let address = listener.local_addr().map_err(failed)?;
+        let mut process = Command::new("qemu-system-arm")
+            .args(["-machine", "mps2-an386", "-cpu", "cortex-m4"])
+            .args(["-icount", "shift=5,sleep=off"])
+            .args(["-display", "none", "-monitor", "none", "-serial", "stdio"])
+            .arg("-serial")
+            .arg(format!("tcp:{address},nodelay=on"))
+            .arg("-kernel")
+            .arg(elf)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .map_err(failed)?;
+        let ends = process.stdin.take().zip(process.stdout.take());
+        let Some((to, from)) = ends else {
+            return Err(failed(std::io::Error::other("it has no serial line")));
+        };
+        let (pace, reset) = (Pace::default(), Arc::<AtomicBool>::default());
+        let (samples, open) = (Arc::<AtomicU64>::default(), Arc::<AtomicBool>::default());
+        let behind = Behind {
+            pace: pace.clone(),
+            reset: reset.clone(),
+            samples: samples.clone(),
+            open: open.clone(),
+        };
+        std::thread::spawn(move || {
+            if let Ok((line, _)) = listener.accept() {
+                let _ = line.set_nodelay(true);
+                // QEMU has ended when the line does.
+                let _ = behind.run(&line, &mut *rig);
+            }
+        });
+        Ok(Self {
+            process,
+            pace,
+            reset,
+            samples,
+            open,
+            lines: Some(Port::over(to, from)),
+        })
+    }
+
+    /// The serial line; there is one.
+    pub fn port(&mut self) -> Option<Port> {
+        self.lines.take()
+    }
+
+    /// Puts the line back, for another host.
+    pub fn put_back(&mut self, port: Port) {
+        self.lines = Some(port);
+    }
+
+    /// Presses the board's reset button.
+    pub fn press_reset(&self) {
+        self.reset.store(true, Ordering::Relaxed);
+    }
+
+    /// Samples of the rig so far.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        self.samples.load(Ordering::Relaxed)
+    }
+
+    /// Whether the rig's valve is open.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.open.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// The rig's end of the second line.
+struct Behind {
+    pace: Pace,
+    reset: Arc<AtomicBool>,
+    samples: Arc<AtomicU64>,
+    open: Arc<AtomicBool>,
+}
+
+impl Behind {
+    fn run(&self, mut line: impl Read + Write + Copy, rig: &mut dyn Rig) -> std::io::Result<()> {
+        let mut valve = [0];
+        loop {
+            line.read_exact(&mut valve)?;
+            let open = valve[0] != 0;
+            self.open.store(open, Ordering::Relaxed);
+            self.pace.wait();
+            let [counts, channel] = rig.sample(open).map(|counts| counts.min(0xFFF));
+            self.samples.fetch_add(1, Ordering::Relaxed);
+            let button = u8::from(self.reset.swap(false, Ordering::Relaxed));
+            let [c0, c1] = counts.to_le_bytes();
+            let [d0, d1] = channel.to_le_bytes();
+            line.write_all(&[button, c0, c1 | (d0 << 4), (d0 >> 4) | (d1 << 4)])?;
+        }
+    }
+}

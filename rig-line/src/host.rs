@@ -1,0 +1,355 @@
+//! The dialogue: requests that are repeated until they are answered, and the
+//! stream of samples, with the board told that its host is there.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use wire::frame::Receiver;
+use wire::reply::{Answer, Info, PROTOCOL, Phase, Reply, Status};
+use wire::request::{Ask, Request};
+use wire::samples::{Sample, Samples};
+
+use crate::emulator::Pace;
+use crate::error::LineError;
+use crate::port::Port;
+
+/// A request is sent this often before the board counts as silent.
+const ATTEMPTS: u32 = 8;
+/// How long an answer may take.
+const ANSWER: Duration = Duration::from_millis(250);
+/// The board hears of its host after so long, and after so many samples.
+const ALIVE: Duration = Duration::from_millis(100);
+const ALIVE_SAMPLES: usize = 48;
+/// Another host, if it is gone, is forgotten after half a second.
+const BUSY: Duration = Duration::from_millis(2000);
+
+/// Words for the faults, in the order of the firmware's `Fault::ALL`.
+const FAULTS: [&str; 9] = [
+    "overrun",
+    "not-finite",
+    "at-rail",
+    "stuck",
+    "channel",
+    "residual",
+    "link",
+    "watchdog",
+    "self-test",
+];
+
+/// The word for what the board does.
+#[must_use]
+pub fn word(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Disarmed => "disarmed",
+        Phase::Armed => "armed",
+        Phase::Playing => "playing",
+        Phase::Faulted(number) => FAULTS
+            .get(usize::from(number))
+            .copied()
+            .unwrap_or("a fault that this program does not know"),
+    }
+}
+
+/// Samples that came together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Streamed {
+    /// Their numbers and what was sampled.
+    pub samples: Vec<(u32, Sample)>,
+    /// Number of the sample after them.
+    pub next: u32,
+    /// What the board did.
+    pub phase: Phase,
+    /// y* at the first of them.
+    pub reference: Option<f32>,
+    /// Whether the stream ends here.
+    pub last: bool,
+    /// Samples of the stream so far that found no room on the board.
+    pub left_out: u32,
+}
+
+/// What came over the line.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// Samples of this host's stream.
+    Samples(Streamed),
+    /// Nothing within the time.
+    Silence,
+}
+
+/// A board on the line.
+pub struct Host {
+    port: Port,
+    receiver: Receiver,
+    session: u32,
+    number: u16,
+    alive_at: Instant,
+    unheard: usize,
+    waiting: VecDeque<Streamed>,
+    /// Frames that came damaged.
+    pub damaged: u64,
+    pace: Option<Pace>,
+}
+
+impl Host {
+    /// Takes the line. `session` is a number that no other host has.
+    #[must_use]
+    pub fn new(port: Port, session: u32, pace: Option<Pace>) -> Self {
+        Self {
+            port,
+            receiver: Receiver::new(),
+            session,
+            number: 0,
+            alive_at: Instant::now(),
+            unheard: 0,
+            waiting: VecDeque::new(),
+            damaged: 0,
+            pace,
+        }
+    }
+
+    /// This host's number.
+    #[must_use]
+    pub fn session(&self) -> u32 {
+        self.session
+    }
+
+    /// Asks who is there.
+    ///
+    /// # Errors
+    /// [`LineError`] when nobody is, or one of another version.
+    pub fn hello(&mut self) -> Result<Info, LineError> {
+        match self.ask("who are you", |_, _| Ask::Hello)? {
+            Answer::Info(info) if info.protocol == PROTOCOL => Ok(info),
+            Answer::Info(info) => Err(LineError::Version {
+                board: info.protocol,
+                host: PROTOCOL,
+            }),
+            Answer::Done { .. } => Err(LineError::Silent("who are you")),
+        }
+    }
+
+    /// Gives the board a command's runs.
+    ///
+    /// # Errors
+    /// [`LineError`].
+    pub fn load(&mut self, runs: &[u32]) -> Result<(), LineError> {
+        for (i, part) in runs.chunks(wire::request::RUNS).enumerate() {
+            let at = (i * wire::request::RUNS) as u16;
+            self.number = self.number.wrapping_add(1);
+            let frame = Request::load(self.number, self.session, at, part);
+            self.done("take a command", frame.bytes())?;
+        }
+        Ok(())
+    }
+
+    /// Has the loaded runs played; the stream begins.
+    ///
+    /// # Errors
+    /// [`LineError`].
+    pub fn play(&mut self, runs: &[u32], repeats: u32) -> Result<u64, LineError> {
+        self.waiting.clear();
+        let checksum = wire::request::checksum(runs.iter().copied());
+        self.carry_out(
+            "play a command",
+            Ask::Play {
+                repeats,
+                runs: runs.len() as u16,
+                checksum,
+            },
+        )
+    }
+
+    /// Has every sample streamed.
+    ///
+    /// # Errors
+    /// [`LineError`].
+    pub fn stream(&mut self) -> Result<u64, LineError> {
+        self.waiting.clear();
+        self.carry_out("stream its samples", Ask::Stream)
+    }
+
+    /// Lets the law have the valve.
+    ///
+    /// # Errors
+    /// [`LineError`].
+    pub fn arm(&mut self) -> Result<u64, LineError> {
+        self.carry_out("arm", Ask::Arm)
+    }
+
+    /// Shuts the valve.
+    ///
+    /// # Errors
+    /// [`LineError`].
+    pub fn disarm(&mut self) -> Result<u64, LineError> {
+        self.carry_out("disarm", Ask::Disarm)
+    }
+
+    /// Carries a request out; samples since the board's start when it was.
+    fn carry_out(&mut self, asked: &'static str, ask: Ask<'_>) -> Result<u64, LineError> {
+        self.number = self.number.wrapping_add(1);
+        let request = Request {
+            number: self.number,
+            session: self.session,
+            ask,
+        };
+        self.done(asked, request.frame().bytes())
+    }
+
+    fn done(&mut self, asked: &'static str, frame: &[u8]) -> Result<u64, LineError> {
+        let until = Instant::now() + BUSY;
+        loop {
+            let Answer::Done {
+                status,
+                detail,
+                samples,
+            } = self.answer(asked, frame)?
+            else {
+                return Err(LineError::Silent(asked));
+            };
+            match status {
+                Status::Done => return Ok(samples),
+                // The other one may be gone and not yet forgotten.
+                Status::Busy if Instant::now() < until => {
+                    let _ = self.port.receive(ALIVE)?;
+                    self.touch();
+                }
+                _ => {
+                    return Err(LineError::Refused {
+                        asked,
+                        reason: reason(status, detail),
+                    });
+                }
+            }
+        }
+    }
+
+    fn ask(
+        &mut self,
+        asked: &'static str,
+        ask: impl Fn(u16, u32) -> Ask<'static>,
+    ) -> Result<Answer, LineError> {
+        self.number = self.number.wrapping_add(1);
+        let request = Request {
+            number: self.number,
+            session: self.session,
+            ask: ask(self.number, self.session),
+        };
+        self.answer(asked, request.frame().bytes())
+    }
+
+    /// Sends a request until its answer has come; samples that come meanwhile wait.
+    fn answer(&mut self, asked: &'static str, frame: &[u8]) -> Result<Answer, LineError> {
+        for _ in 0..ATTEMPTS {
+            self.port.send(frame)?;
+            self.touch();
+            let until = Instant::now() + ANSWER;
+            while Instant::now() < until {
+                for reply in self.read(until.saturating_duration_since(Instant::now()))? {
+                    if reply.number == self.number && reply.session == self.session {
+                        return Ok(reply.answer);
+                    }
+                }
+            }
+        }
+        Err(LineError::Silent(asked))
+    }
+
+    /// What comes next, within `patience`.
+    ///
+    /// # Errors
+    /// [`LineError::Gone`].
+    pub fn next(&mut self, patience: Duration) -> Result<Event, LineError> {
+        let until = Instant::now() + patience;
+        loop {
+            if let Some(streamed) = self.waiting.pop_front() {
+                return Ok(Event::Samples(streamed));
+            }
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(Event::Silence);
+            }
+            self.read(left.min(ALIVE))?;
+            if self.unheard >= ALIVE_SAMPLES || self.alive_at.elapsed() >= ALIVE {
+                self.alive()?;
+            }
+        }
+    }
+
+    /// Tells the board that its host is there.
+    fn alive(&mut self) -> Result<(), LineError> {
+        let request = Request {
+            number: 0,
+            session: self.session,
+            ask: Ask::Alive,
+        };
+        self.port.send(request.frame().bytes())?;
+        self.touch();
+        Ok(())
+    }
+
+    fn touch(&mut self) {
+        self.unheard = 0;
+        self.alive_at = Instant::now();
+        if let Some(pace) = &self.pace {
+            pace.touch();
+        }
+    }
+
+    /// Reads what comes: samples wait in the queue, answers are returned.
+    fn read(&mut self, patience: Duration) -> Result<Vec<Reply>, LineError> {
+        let bytes = self.port.receive(patience)?;
+        let mut replies = Vec::new();
+        for byte in bytes {
+            let content = match self.receiver.receive(byte) {
+                None => continue,
+                // The operator's lines before the first frame are none, too.
+                Some(Err(_)) => {
+                    self.damaged += 1;
+                    continue;
+                }
+                Some(Ok(content)) => content,
+            };
+            if let Some(samples) = Samples::read(content) {
+                if samples.session == self.session {
+                    let all: Vec<_> = samples.iter().collect();
+                    self.unheard += all.len();
+                    self.waiting.push_back(Streamed {
+                        next: samples.first.wrapping_add(all.len() as u32),
+                        samples: all,
+                        phase: samples.phase,
+                        reference: samples.reference,
+                        last: samples.last,
+                        left_out: samples.left_out,
+                    });
+                }
+            } else {
+                replies.extend(Reply::read(content));
+            }
+        }
+        Ok(replies)
+    }
+}
+
+/// Why the board refuses, and what to do.
+fn reason(status: Status, detail: u32) -> String {
+    match status {
+        Status::Busy => "another host has it; end that one first".into(),
+        Status::TooLong => format!("it keeps {detail} runs; play the command in shorter pieces"),
+        Status::Missing => format!("it has only the first {detail} runs; start again"),
+        Status::TooShort => format!(
+            "run {detail} (counted from 0, the first one shut) is shorter than the valve's hold time in the board's rig \
+             constants; lengthen it"
+        ),
+        Status::OtherCommand => "what it has is not what is to be played; start again".into(),
+        Status::Nothing => "there is nothing to play, or more samples than 32 bits count".into(),
+        Status::NotDisarmed => match Phase::from_byte(detail as u8) {
+            Some(Phase::Faulted(number)) => format!(
+                "it has latched `{}`; see to its cause, then disarm (`--disarm`)",
+                word(Phase::Faulted(number))
+            ),
+            Some(phase) => format!("it is {}; disarm it first (`--disarm`)", word(phase)),
+            None => "it is not disarmed; disarm it first (`--disarm`)".into(),
+        },
+        _ => format!("it says {status:?} {detail}"),
+    }
+}

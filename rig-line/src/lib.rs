@@ -1,0 +1,22 @@
+//! The host's end of the serial line to a board: who it is ([`Host`]), commands
+//! played and recorded ([`record`]), and an emulated board for everyone without
+//! one ([`emulator`]).
+//!
+//! Nothing here knows of models. The dialogue itself is in the crate `wire`, which
+//! the board uses, too.
+
+pub mod calibrate;
+pub mod command;
+pub mod emulator;
+mod error;
+mod host;
+pub mod log;
+mod port;
+pub mod record;
+mod rig_file;
+
+pub use command::Command;
+pub use error::LineError;
+pub use host::{Event, Host, Streamed, word};
+pub use port::{Bad, Port};
+pub use rig_file::{ChannelEntry, RigFile, SensorEntry, ValveEntry};

@@ -1,0 +1,399 @@
+//! Plays a command again and again and keeps the repeats that came whole.
+//!
+//! A repeat of which a sample was lost, on the board or on the line, is played
+//! again; so is one in which the link broke. Repeats are never put together from
+//! pieces: what is kept is played in one go, each from rest.
+
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+use wire::reply::{Info, Phase};
+use wire::samples::Sample;
+
+use crate::command::Command;
+use crate::error::LineError;
+use crate::host::{Event, Host, Streamed, word};
+
+/// So long nothing may come while something is played.
+const SILENCE: Duration = Duration::from_millis(1000);
+/// A board that has gone is waited for so long.
+const GONE: Duration = Duration::from_secs(30);
+/// Turns without a whole repeat after which the line is given up.
+const FRUITLESS: u32 = 10;
+
+/// Where a recording is.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Whole repeats so far.
+    pub whole: u32,
+    /// Samples of the present one.
+    pub sample: u32,
+    /// Samples lost so far.
+    pub lost: u64,
+    /// The newest sample.
+    pub newest: Sample,
+}
+
+/// Repeats that were played in one go.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Part {
+    /// Samples of the board since its start when the first was played.
+    pub board_sample: u64,
+    /// Whole repeats before it.
+    pub first_repeat: u32,
+    /// Repeats of it that came whole.
+    pub whole: u32,
+    /// How it ended.
+    pub ended: String,
+}
+
+/// Samples that did not come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Gap {
+    /// In which part, counted from 0.
+    pub part: usize,
+    /// Number of the first that is missing, from the part's beginning.
+    pub first: u32,
+    /// How many.
+    pub samples: u32,
+    /// How many of them found no room on the board; the others were lost on the line.
+    pub left_out: u32,
+}
+
+/// What came of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// Who played it.
+    pub board: Info,
+    /// Whole repeats, all of them kept.
+    pub whole: u32,
+    /// Pieces in one go.
+    pub parts: Vec<Part>,
+    /// What did not come.
+    pub gaps: Vec<Gap>,
+    /// Samples that came, also of repeats that were not kept.
+    pub samples: u64,
+    /// Frames that came damaged.
+    pub damaged_frames: u64,
+    /// Why it ended before all repeats were whole.
+    pub cut_short: Option<String>,
+}
+
+impl Recording {
+    /// Samples that did not come.
+    #[must_use]
+    pub fn lost(&self) -> u64 {
+        self.gaps.iter().map(|gap| u64::from(gap.samples)).sum()
+    }
+}
+
+/// How a turn ended.
+enum End {
+    /// All was played.
+    Played,
+    /// The board says why not.
+    Shut(Phase),
+    /// The line, or the board.
+    Broken(String),
+}
+
+/// Opens the line again after it broke.
+pub type Connect<'a> = dyn FnMut() -> Result<Host, LineError> + 'a;
+/// Takes a whole repeat: its number and samples.
+pub type Keep<'a> = dyn FnMut(u32, &[Sample]) -> std::io::Result<()> + 'a;
+
+/// Has `host` play `command` until `repeats` of it came whole and hands each to `keep`.
+///
+/// A fault, a board that is somebody else, a line on which nothing comes whole:
+/// then the recording is cut short and says why, and what was whole is kept.
+///
+/// # Errors
+/// [`LineError`] when nothing can be played at all.
+pub fn record(
+    host: &mut Host,
+    connect: &mut Connect<'_>,
+    command: &Command,
+    repeats: u32,
+    keep: &mut Keep<'_>,
+    watch: &mut dyn FnMut(&Progress),
+) -> Result<Recording, LineError> {
+    let board = host.hello()?;
+    fits(command, &board)?;
+    let mut session = Session {
+        command,
+        repeats,
+        keep,
+        watch,
+        recording: Recording {
+            board,
+            whole: 0,
+            parts: Vec::new(),
+            gaps: Vec::new(),
+            samples: 0,
+            damaged_frames: 0,
+            cut_short: None,
+        },
+    };
+    let mut fruitless = 0;
+    while session.recording.whole < repeats && session.recording.cut_short.is_none() {
+        let before = session.recording.whole;
+        let end = match session.turn(host) {
+            Ok(end) => end,
+            // What can be played later can be played now.
+            Err(LineError::Gone(why)) => End::Broken(why),
+            Err(LineError::Silent(_)) => End::Broken("the board fell silent".into()),
+            Err(other @ LineError::Keep(_)) => return Err(other),
+            Err(other) if session.recording.whole == 0 => return Err(other),
+            Err(other) => {
+                session.recording.cut_short = Some(other.to_string());
+                break;
+            }
+        };
+        fruitless = if session.recording.whole > before {
+            0
+        } else {
+            fruitless + 1
+        };
+        session.recording.damaged_frames += std::mem::take(&mut host.damaged);
+        let ended = match &end {
+            End::Played => "played".to_owned(),
+            End::Shut(phase) => format!("the board was {}", word(*phase)),
+            End::Broken(why) => why.clone(),
+        };
+        if let Some(part) = session.recording.parts.last_mut() {
+            part.whole = session.recording.whole - part.first_repeat;
+            part.ended = ended;
+        }
+        let cut = match end {
+            End::Shut(phase @ Phase::Faulted(_)) => {
+                Some(format!("the board shut the valve: {}", word(phase)))
+            }
+            End::Shut(_) => Some("the valve was shut by hand or by another host".to_owned()),
+            End::Broken(_) => session.again(connect, host).err(),
+            End::Played => None,
+        };
+        let cut = cut.or_else(|| {
+            (fruitless >= FRUITLESS).then(|| {
+                format!("{FRUITLESS} times no repeat came whole; see to the line, or play shorter commands")
+            })
+        });
+        if session.recording.whole < repeats {
+            session.recording.cut_short = cut;
+        }
+    }
+    // Nothing is left open; a board that does not hear it shuts by itself.
+    let _ = host.disarm();
+    Ok(session.recording)
+}
+
+/// Whether the board can play the command at all.
+fn fits(command: &Command, board: &Info) -> Result<(), LineError> {
+    let refused = |reason| LineError::Command {
+        command: command.name.clone(),
+        reason,
+    };
+    let period = f64::from(board.period_us) * 1e-6;
+    if (command.sample_period_s / period - 1.0).abs() > 1e-6 {
+        return Err(refused(format!(
+            "it has a row every {} s and the board samples every {period} s; write it for the board's period",
+            command.sample_period_s
+        )));
+    }
+    if board.period_us < 400 {
+        return Err(refused(format!(
+            "the board samples every {period} s, and the line takes every sample only from 0.0004 s on"
+        )));
+    }
+    if command.runs.len() > usize::from(board.most_runs) {
+        return Err(refused(format!(
+            "it has {} runs and the board keeps {}; play it in shorter pieces",
+            command.runs.len(),
+            board.most_runs
+        )));
+    }
+    Ok(())
+}
+
+struct Session<'a, 'b> {
+    command: &'a Command,
+    repeats: u32,
+    keep: &'a mut Keep<'b>,
+    watch: &'a mut dyn FnMut(&Progress),
+    recording: Recording,
+}
+
+impl Session<'_, '_> {
+    /// Plays what is left in one go.
+    fn turn(&mut self, host: &mut Host) -> Result<End, LineError> {
+        let period = self.command.samples();
+        // Samples of a stream are numbered with 32 bits.
+        let most = (u64::from(u32::MAX) / period.max(1)).max(1);
+        let left = self.repeats - self.recording.whole;
+        let repeats = u32::try_from(most).map_or(left, |most| left.min(most));
+        let total = period * u64::from(repeats);
+        // Told of a link that broke, the board waits for that to be noted.
+        if matches!(host.hello()?.phase, Phase::Faulted(n) if word(Phase::Faulted(n)) == "link") {
+            host.disarm()?;
+        }
+        host.load(&self.command.runs)?;
+        let start = host.play(&self.command.runs, repeats)?;
+        self.recording.parts.push(Part {
+            board_sample: start,
+            first_repeat: self.recording.whole,
+            whole: 0,
+            ended: String::new(),
+        });
+        let mut taken = Taken {
+            period: period as usize,
+            next: 0,
+            left_out: 0,
+            repeat: Vec::new(),
+        };
+        let mut unanswered = 0;
+        loop {
+            match host.next(SILENCE)? {
+                Event::Samples(streamed) => {
+                    unanswered = 0;
+                    self.take(&mut taken, &streamed)?;
+                    if streamed.phase != Phase::Playing
+                        && !(streamed.last && streamed.samples.is_empty())
+                    {
+                        return Ok(End::Shut(streamed.phase));
+                    }
+                    if streamed.last {
+                        return Ok(if u64::from(taken.next) >= total {
+                            End::Played
+                        } else {
+                            End::Shut(streamed.phase)
+                        });
+                    }
+                }
+                Event::Silence => {
+                    let info = host.hello()?;
+                    if info.samples < start
+                        || (info.session != host.session() && info.phase == Phase::Disarmed)
+                    {
+                        return Ok(End::Broken("the board was restarted".into()));
+                    }
+                    match info.phase {
+                        Phase::Playing if unanswered < 3 => unanswered += 1,
+                        Phase::Playing => {
+                            return Ok(End::Broken("nothing of the stream comes".into()));
+                        }
+                        // The last frames were lost.
+                        Phase::Disarmed if info.samples - start >= total => {
+                            self.gap(&mut taken, total as u32, None);
+                            return Ok(End::Played);
+                        }
+                        phase if word(phase) == "link" => {
+                            return Ok(End::Broken("the board did not hear its host".into()));
+                        }
+                        phase => return Ok(End::Shut(phase)),
+                    }
+                }
+            }
+        }
+    }
+
+    fn take(&mut self, taken: &mut Taken, streamed: &Streamed) -> Result<(), LineError> {
+        let first = streamed.samples.first().map_or(streamed.next, |(n, _)| *n);
+        if first < taken.next {
+            // Comes again, or of another turn.
+            return Ok(());
+        }
+        self.gap(taken, first, Some(streamed.left_out));
+        for (number, sample) in &streamed.samples {
+            let at = *number as usize % taken.period.max(1);
+            if at == 0 {
+                taken.repeat.clear();
+            }
+            // Only one that has come from its beginning grows.
+            if taken.repeat.len() == at {
+                taken.repeat.push(*sample);
+            }
+            taken.next = number.wrapping_add(1);
+            self.recording.samples += 1;
+            if taken.repeat.len() == taken.period {
+                (self.keep)(self.recording.whole, &taken.repeat).map_err(LineError::Keep)?;
+                self.recording.whole += 1;
+                taken.repeat.clear();
+            }
+        }
+        if let Some((number, sample)) = streamed.samples.last() {
+            let progress = Progress {
+                whole: self.recording.whole,
+                sample: *number % (taken.period.max(1) as u32),
+                lost: self.recording.lost(),
+                newest: *sample,
+            };
+            (self.watch)(&progress);
+        }
+        Ok(())
+    }
+
+    /// Notes what is missing before sample `first`.
+    fn gap(&mut self, taken: &mut Taken, first: u32, left_out: Option<u32>) {
+        if first > taken.next {
+            let samples = first - taken.next;
+            let left_out = left_out.map_or(0, |all| all.wrapping_sub(taken.left_out));
+            self.recording.gaps.push(Gap {
+                part: self.recording.parts.len() - 1,
+                first: taken.next,
+                samples,
+                left_out: left_out.min(samples),
+            });
+            taken.next = first;
+            // What is broken is not continued, whatever comes at the same place of another.
+            taken.repeat.clear();
+        }
+        taken.left_out = left_out.unwrap_or(taken.left_out);
+    }
+
+    /// Finds the board again after the link broke; why not.
+    fn again(&self, connect: &mut Connect<'_>, host: &mut Host) -> Result<(), String> {
+        let until = Instant::now() + GONE;
+        loop {
+            let gone = match host.hello() {
+                Ok(info) => {
+                    let who = |i: &Info| (i.version, i.period_us, i.model, i.rig);
+                    if who(&info) != who(&self.recording.board) {
+                        return Err(LineError::AnotherBoard.to_string());
+                    }
+                    return match info.phase {
+                        Phase::Faulted(_) if word(info.phase) != "link" => {
+                            Err(format!("the board shut the valve: {}", word(info.phase)))
+                        }
+                        _ => Ok(()),
+                    };
+                }
+                Err(LineError::Gone(_)) => true,
+                Err(LineError::Silent(_)) => false,
+                Err(other) => return Err(other.to_string()),
+            };
+            if Instant::now() > until {
+                return Err(format!(
+                    "the board did not come back within {} s",
+                    GONE.as_secs()
+                ));
+            }
+            if gone {
+                match connect() {
+                    Ok(new) => *host = new,
+                    Err(_) => std::thread::sleep(Duration::from_millis(500)),
+                }
+            }
+        }
+    }
+}
+
+/// What has come of a turn.
+struct Taken {
+    /// Samples of a repeat.
+    period: usize,
+    /// Number of the next sample.
+    next: u32,
+    /// Left out by the board so far.
+    left_out: u32,
+    /// The present repeat, as far as it came whole.
+    repeat: Vec<Sample>,
+}

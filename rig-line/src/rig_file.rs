@@ -1,0 +1,283 @@
+//! `rig.toml`: what a rig is, measured once and read by every build of its
+//! firmware.
+
+use std::path::Path;
+
+use recordings::output::write_atomic;
+use serde::{Deserialize, Serialize};
+
+use crate::error::LineError;
+
+/// The version of the file that this program writes and reads.
+pub(crate) const VERSION: u32 = 1;
+
+/// A rig.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RigFile {
+    /// The version of this file, 1.
+    pub format_version: u32,
+    /// Sampling period, s.
+    pub sample_period_s: f64,
+    /// Largest residual, averaged over about 64 samples, that the model may have
+    /// before the loop is shut, y.
+    pub residual_envelope: f64,
+    /// The hot film.
+    pub sensor: SensorEntry,
+    /// The valve.
+    pub valve: ValveEntry,
+    /// The measured channel, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub channel: Option<ChannelEntry>,
+}
+
+/// The sensor: y = (counts − zero) · per_count.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensorEntry {
+    /// Counts of the separated flow, y = 0.
+    pub zero_counts: f64,
+    /// y per count: steady blowing is y = 1.
+    pub per_count: f64,
+    /// Readings at or below it are at the lower rail, counts.
+    pub lower_rail_counts: f64,
+    /// Readings at or above it are at the upper rail, counts.
+    pub upper_rail_counts: f64,
+    /// Equal readings in a row that mean a stuck sensor.
+    pub stuck_after_samples: u32,
+    /// Standard deviation of the noise, counts: off, and under steady blowing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_counts: Option<[f64; 2]>,
+}
+
+/// The valve.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ValveEntry {
+    /// Shortest time open that the flow answers, s.
+    pub shortest_on_s: f64,
+    /// Shortest time shut that the flow answers, s.
+    pub shortest_off_s: f64,
+}
+
+/// A measured channel: value = (counts − zero) · per_count.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChannelEntry {
+    /// Its name in recordings and models.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Counts of 0.
+    pub zero_counts: f64,
+    /// Units per count.
+    pub per_count: f64,
+    /// Readings at or below it are at the lower rail, counts.
+    pub lower_rail_counts: f64,
+    /// Readings at or above it are at the upper rail, counts.
+    pub upper_rail_counts: f64,
+}
+
+/// Largest count of the boards' converter.
+pub(crate) const FULL_SCALE: f64 = 4095.0;
+
+impl RigFile {
+    /// Reads and checks a file.
+    ///
+    /// # Errors
+    /// [`LineError::RigFile`] with the key that is wrong and what to do.
+    pub fn load(path: &Path) -> Result<Self, LineError> {
+        let refused = |reason| LineError::RigFile {
+            file: path.to_path_buf(),
+            reason,
+        };
+        let text = std::fs::read_to_string(path).map_err(|e| {
+            refused(format!(
+                "it cannot be read ({e}); `host-fit record --calibrate` writes one"
+            ))
+        })?;
+        let rig: Self = toml::from_str(&text).map_err(|e| refused(e.to_string()))?;
+        rig.check().map_err(refused)?;
+        Ok(rig)
+    }
+
+    /// Says what is wrong with the numbers, with the key.
+    ///
+    /// # Errors
+    /// The key, what is wrong with it, and what to do.
+    pub fn check(&self) -> Result<(), String> {
+        if self.format_version != VERSION {
+            return Err(format!(
+                "key `format_version`: this program reads version {VERSION}, not {}; calibrate anew",
+                self.format_version
+            ));
+        }
+        let positive = [
+            ("sample_period_s", self.sample_period_s),
+            ("residual_envelope", self.residual_envelope),
+            ("valve.shortest_on_s", self.valve.shortest_on_s),
+            ("valve.shortest_off_s", self.valve.shortest_off_s),
+        ];
+        for (key, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(format!("key `{key}`: {value} is no time or size above 0"));
+            }
+        }
+        let sensor = &self.sensor;
+        line("sensor", sensor.zero_counts, sensor.per_count)?;
+        rails("sensor", sensor.lower_rail_counts, sensor.upper_rail_counts)?;
+        let between = sensor.lower_rail_counts..sensor.upper_rail_counts;
+        if !between.contains(&sensor.zero_counts) {
+            return Err(format!(
+                "key `sensor.zero_counts`: {} is not between the rails, so the natural flow would be a fault",
+                sensor.zero_counts
+            ));
+        }
+        if sensor.stuck_after_samples < 2 {
+            return Err(
+                "key `sensor.stuck_after_samples`: two readings are equal now and then; 2 at least"
+                    .into(),
+            );
+        }
+        if let Some(channel) = &self.channel {
+            line("channel", channel.zero_counts, channel.per_count)?;
+            rails(
+                "channel",
+                channel.lower_rail_counts,
+                channel.upper_rail_counts,
+            )?;
+            if channel.name.is_empty()
+                || ["t", "u", "y", "y_sd", "y_min", "y_max"].contains(&&*channel.name)
+            {
+                return Err(format!(
+                    "key `channel.name`: `{}` is no name for a channel",
+                    channel.name
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// [`LineError::Output`].
+    pub fn save(&self, path: &Path) -> Result<(), LineError> {
+        let body = toml::to_string(self).unwrap_or_default();
+        let text = format!(
+            "# A rig, as `host-fit record --calibrate` found it; `cargo xtask firmware --rig` builds with it.\n{body}"
+        );
+        Ok(write_atomic(path, |out| out.write_all(text.as_bytes()))?)
+    }
+
+    /// The valve's shortest times, samples, on and off.
+    #[must_use]
+    pub fn hold_samples(&self) -> [u32; 2] {
+        [self.valve.shortest_on_s, self.valve.shortest_off_s]
+            // A thousandth of a sample is the file's rounding.
+            .map(|time| (time / self.sample_period_s - 1e-3).ceil().max(1.0) as u32)
+    }
+
+    /// y of a count.
+    #[must_use]
+    pub fn friction(&self, counts: f64) -> f64 {
+        (counts - self.sensor.zero_counts) * self.sensor.per_count
+    }
+}
+
+fn line(of: &str, zero: f64, per_count: f64) -> Result<(), String> {
+    if !zero.is_finite() {
+        return Err(format!("key `{of}.zero_counts`: {zero} is no number"));
+    }
+    if !(per_count.is_finite() && per_count != 0.0) {
+        return Err(format!(
+            "key `{of}.per_count`: {per_count} makes every reading the same"
+        ));
+    }
+    Ok(())
+}
+
+fn rails(of: &str, lower: f64, upper: f64) -> Result<(), String> {
+    if !(0.0 <= lower && lower < upper && upper <= FULL_SCALE) {
+        return Err(format!(
+            "key `{of}.lower_rail_counts`, `{of}.upper_rail_counts`: {lower} and {upper} are no rails within 0 to {FULL_SCALE}"
+        ));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub(crate) fn rig() -> RigFile {
+        RigFile {
+            format_version: VERSION,
+            sample_period_s: 0.001,
+            residual_envelope: 0.4,
+            sensor: SensorEntry {
+                zero_counts: 1023.5,
+                per_count: 0.000_976,
+                lower_rail_counts: 8.0,
+                upper_rail_counts: 4087.0,
+                stuck_after_samples: 60,
+                noise_counts: Some([47.0, 46.5]),
+            },
+            valve: ValveEntry {
+                shortest_on_s: 0.012,
+                shortest_off_s: 0.02,
+            },
+            channel: None,
+        }
+    }
+
+    #[test]
+    fn a_file_is_read_as_it_was_written() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("rig.toml");
+        let mut rig = rig();
+        for channel in [
+            None,
+            Some(ChannelEntry {
+                name: "u_inf".into(),
+                unit: "m/s".into(),
+                zero_counts: 0.0,
+                per_count: 0.005,
+                lower_rail_counts: 8.0,
+                upper_rail_counts: 4087.0,
+            }),
+        ] {
+            rig.channel = channel;
+            rig.save(&path).expect("written");
+            assert_eq!(RigFile::load(&path).expect("read"), rig);
+        }
+        assert_eq!(rig.hold_samples(), [12, 20]);
+    }
+
+    #[test]
+    fn what_is_wrong_is_refused_with_its_key() {
+        type Change = fn(&mut RigFile);
+        let wrong: [(&str, Change); 7] = [
+            ("format_version", |r| r.format_version = 9),
+            ("sample_period_s", |r| r.sample_period_s = f64::NAN),
+            ("sensor.zero_counts", |r| r.sensor.zero_counts = 4090.0),
+            ("sensor.per_count", |r| r.sensor.per_count = 0.0),
+            ("sensor.upper_rail_counts", |r| {
+                r.sensor.upper_rail_counts = 5000.0
+            }),
+            ("stuck_after_samples", |r| r.sensor.stuck_after_samples = 0),
+            ("valve.shortest_on_s", |r| r.valve.shortest_on_s = -1.0),
+        ];
+        for (key, change) in wrong {
+            let mut rig = rig();
+            change(&mut rig);
+            let reason = rig.check().expect_err(key);
+            assert!(reason.contains(key), "{reason}");
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("rig.toml");
+        std::fs::write(&path, "format_version = 1\nzeroo = 3\n").expect("written");
+        let error = RigFile::load(&path).expect_err("refused").to_string();
+        assert!(error.contains("zeroo"), "{error}");
+    }
+}

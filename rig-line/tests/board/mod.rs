@@ -1,0 +1,154 @@
+//! The firmware's own desk, controller and law in a thread, with a simple rig.
+
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU16, AtomicU64, Ordering};
+
+use firmware::controller::Reading;
+use firmware::link::desk::Desk;
+use firmware::on_board;
+use rig_line::emulator::Pace;
+use rig_line::{Bad, Host, LineError, Port};
+use wire::Outbox;
+
+/// What can be done to the board while it runs.
+#[derive(Clone, Default)]
+pub(crate) struct Hands {
+    /// Pulled for good.
+    pub(crate) plug: Arc<AtomicBool>,
+    pub(crate) reset: Arc<AtomicBool>,
+    /// Samples so far.
+    pub(crate) samples: Arc<AtomicU64>,
+    /// Samples with an open valve so far.
+    pub(crate) open: Arc<AtomicU64>,
+    pub(crate) is_open: Arc<AtomicBool>,
+    /// A reading instead of the sensor's, if it is not 0.
+    pub(crate) reading: Arc<AtomicU16>,
+    /// Air shut off by hand.
+    pub(crate) no_air: Arc<AtomicBool>,
+    pub(crate) pace: Pace,
+}
+
+/// A board, and its line.
+pub(crate) fn board() -> (Hands, UnixStream) {
+    let (ours, theirs) = UnixStream::pair().expect("a pair");
+    let hands = Hands::default();
+    let board = hands.clone();
+    std::thread::spawn(move || run(&board, theirs));
+    (hands, ours)
+}
+
+/// A host on that line.
+pub(crate) fn host(line: &UnixStream, hands: &Hands, bad: Option<Bad>, session: u32) -> Host {
+    let end = || line.try_clone().expect("an end");
+    let port = Port::over(end(), end());
+    let port = match bad {
+        Some(bad) => port.with_faults(bad),
+        None => port,
+    };
+    Host::new(port, session, Some(hands.pace.clone()))
+}
+
+/// A line that does not come back.
+pub(crate) fn gone() -> Result<Host, LineError> {
+    Err(LineError::Gone("pulled".into()))
+}
+
+/// The rig's sensor: 900 counts in natural flow, 1800 more under steady blowing,
+/// and noise of ±20. The channel tells the sample's number, so that a slip would
+/// be seen.
+fn shown(k: u64, friction: f32) -> [u16; 2] {
+    let noise = (k.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) % 41;
+    let counts = 880.0 + 1800.0 * friction + noise as f32;
+    [counts as u16, (k % 4096) as u16]
+}
+
+/// What a valve that opens and shuts in 6 samples lets through.
+struct Valve {
+    asked: bool,
+    since: u32,
+    open: bool,
+}
+
+impl Valve {
+    fn follow(&mut self, asked: bool) -> bool {
+        self.since = if asked == self.asked {
+            self.since + 1
+        } else {
+            1
+        };
+        self.asked = asked;
+        if self.since > 6 {
+            self.open = asked;
+        }
+        self.open
+    }
+}
+
+fn run(hands: &Hands, mut line: UnixStream) {
+    line.set_nonblocking(true).expect("a line");
+    let mut friction = 0.0_f32;
+    let mut valve = Valve {
+        asked: false,
+        since: 0,
+        open: false,
+    };
+    let mut k = 0_u64;
+    'start: loop {
+        let mut controller = on_board::controller();
+        let mut desk = Desk::new(on_board::BOARD);
+        let mut outbox = Outbox::new();
+        let mut tenths = 0;
+        let mut open = false;
+        loop {
+            if hands.plug.load(Ordering::Relaxed) {
+                return;
+            }
+            if hands.reset.swap(false, Ordering::Relaxed) {
+                continue 'start;
+            }
+            hands.pace.wait();
+            friction += (f32::from(u8::from(
+                valve.follow(open) && !hands.no_air.load(Ordering::Relaxed),
+            )) - friction)
+                / 40.0;
+            let [mut counts, channel] = shown(k, friction);
+            let reading = hands.reading.load(Ordering::Relaxed);
+            if reading > 0 {
+                counts = reading;
+            }
+            k += 1;
+            desk.before(&mut controller, &mut outbox);
+            let tick = controller.tick(Reading {
+                counts: f32::from(counts),
+                channel: f32::from(channel),
+                periods: 1,
+            });
+            open = tick.open;
+            hands.samples.store(k, Ordering::Relaxed);
+            hands.is_open.store(open, Ordering::Relaxed);
+            hands.open.fetch_add(u64::from(open), Ordering::Relaxed);
+            desk.after(&tick, &mut controller, &mut outbox);
+            let mut bytes = [0; 64];
+            match line.read(&mut bytes) {
+                Ok(0) => return,
+                Ok(count) => {
+                    for byte in bytes.iter().take(count) {
+                        desk.receive(*byte, &mut controller, &mut outbox);
+                    }
+                }
+                Err(_) => {}
+            }
+            // 11.52 bytes in a sample; a host that does not read takes none.
+            tenths = (tenths + 115).min(230);
+            let mut out = Vec::new();
+            while tenths >= 10 {
+                let Some(byte) = outbox.pop() else { break };
+                out.push(byte);
+                tenths -= 10;
+            }
+            let _ = line.write(&out);
+        }
+    }
+}

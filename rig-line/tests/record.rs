@@ -1,0 +1,265 @@
+//! Recordings over good and bad lines, with the firmware's own code at the other end.
+
+mod board;
+
+use board::{board, gone, host};
+use rig_line::record::{Recording, record};
+use rig_line::{Bad, Command, Host, LineError};
+use std::sync::atomic::Ordering;
+use wire::samples::Sample;
+
+fn command(samples: usize) -> Command {
+    let levels = (0..samples).map(|k| (30..samples / 2).contains(&k) && k % 100 < 60);
+    Command::new("squares", 0.001, levels).with_rest(200)
+}
+
+fn play(
+    host: &mut Host,
+    command: &Command,
+    repeats: u32,
+) -> (Result<Recording, LineError>, Vec<Vec<Sample>>) {
+    let mut kept = Vec::new();
+    let result = record(
+        host,
+        &mut gone,
+        command,
+        repeats,
+        &mut |repeat, samples| {
+            assert_eq!(repeat as usize, kept.len());
+            kept.push(samples.to_vec());
+            Ok(())
+        },
+        &mut |_| {},
+    );
+    (result, kept)
+}
+
+/// Repeats are whole: the valve as commanded, and samples that follow each other
+/// (the channel counts them).
+fn whole(command: &Command, kept: &[Vec<Sample>]) {
+    for repeat in kept {
+        assert!(command.levels().eq(repeat.iter().map(|s| s.open)));
+        let numbers = repeat.windows(2);
+        for pair in numbers {
+            assert_eq!((pair[0].channel + 1) % 4096, pair[1].channel);
+        }
+    }
+}
+
+#[test]
+fn a_good_line_loses_nothing() {
+    let (hands, line) = board();
+    let mut host = host(&line, &hands, None, 5);
+    let command = command(1000);
+    let (recording, kept) = play(&mut host, &command, 20);
+    let recording = recording.expect("a recording");
+    assert_eq!(
+        (recording.whole, recording.lost()),
+        (20, 0),
+        "{recording:?}"
+    );
+    assert_eq!((recording.parts.len(), recording.damaged_frames), (1, 0));
+    whole(&command, &kept);
+    assert!(!hands.is_open.load(Ordering::Relaxed));
+}
+
+/// A million samples over a line that damages a byte in five thousand: each
+/// sample came or is known to be missing, and what is kept is whole.
+#[test]
+fn a_bad_line_loses_nothing_unnoticed() {
+    let (hands, line) = board();
+    let bad = Bad {
+        millionths: 200,
+        seed: 1,
+    };
+    let mut host = host(&line, &hands, Some(bad), 5);
+    let command = command(1000);
+    let (mut samples, mut lost, mut frames, mut parts, mut repeats) = (0, 0, 0, 0, 0);
+    while samples + lost < 1_000_000 {
+        let (recording, kept) = play(&mut host, &command, 100);
+        let recording = recording.expect("a recording");
+        whole(&command, &kept);
+        assert_eq!(recording.cut_short, None);
+        // What was played is what came and what is known to be missing.
+        let played = recording.samples + recording.lost();
+        // Only where a go was broken off is the end of it not played.
+        let broken = recording.parts.iter().filter(|p| p.ended != "played");
+        let broken = broken.count();
+        assert!(broken <= 1 && (broken > 0 || played % command.samples() == 0));
+        samples += recording.samples;
+        lost += recording.lost();
+        frames += recording.damaged_frames;
+        parts += recording.parts.len();
+        repeats += kept.len();
+    }
+    assert!(frames > 500 && lost > 10_000, "{frames} {lost}");
+    println!(
+        "{samples} samples came, {lost} were lost and noticed, {frames} damaged frames, \
+         {repeats} whole repeats in {parts} goes"
+    );
+}
+
+#[test]
+fn a_board_that_is_restarted_goes_on_with_whole_repeats() {
+    let (hands, line) = board();
+    let mut host = host(&line, &hands, None, 5);
+    let command = command(2000);
+    let mut kept = Vec::new();
+    let recording = record(
+        &mut host,
+        &mut gone,
+        &command,
+        6,
+        &mut |repeat, samples| {
+            if repeat == 2 {
+                hands.reset.store(true, Ordering::Relaxed);
+            }
+            kept.push(samples.to_vec());
+            Ok(())
+        },
+        &mut |_| {},
+    )
+    .expect("a recording");
+    assert_eq!((recording.whole, recording.parts.len()), (6, 2));
+    assert!(recording.parts[0].ended.contains("restarted"));
+    whole(&command, &kept);
+}
+
+#[test]
+fn a_fault_ends_it_and_keeps_what_was_whole() {
+    let (hands, line) = board();
+    let mut host = host(&line, &hands, None, 5);
+    let command = command(1000);
+    let mut kept = 0;
+    let recording = record(
+        &mut host,
+        &mut gone,
+        &command,
+        6,
+        &mut |repeat, _| {
+            kept += 1;
+            if repeat == 1 {
+                hands.reading.store(4095, Ordering::Relaxed);
+            }
+            Ok(())
+        },
+        &mut |_| {},
+    )
+    .expect("a recording");
+    let why = recording.cut_short.expect("a reason");
+    assert!(why.contains("at-rail"), "{why}");
+    assert_eq!((recording.whole, kept), (2, 2));
+    assert!(!hands.is_open.load(Ordering::Relaxed));
+}
+
+#[test]
+fn a_host_that_dies_leaves_no_valve_open() {
+    let (hands, line) = board();
+    let mut first = host(&line, &hands, None, 5);
+    let runs = [10, 1_000_000, 10];
+    first.load(&runs).expect("loaded");
+    first.play(&runs, 1).expect("played");
+    let _ = first.next(std::time::Duration::from_millis(50));
+    // It neither reads nor speaks any more; time goes on without it.
+    drop(first);
+    let until = std::time::Instant::now() + std::time::Duration::from_secs(20);
+    loop {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        let (samples, open) = (
+            hands.samples.load(Ordering::Relaxed),
+            hands.is_open.load(Ordering::Relaxed),
+        );
+        if samples > 800 && !open {
+            break;
+        }
+        assert!(std::time::Instant::now() < until, "{samples} {open}");
+    }
+    let open = hands.open.load(Ordering::Relaxed);
+    // Half a second after the host was last heard.
+    assert!((300..1000).contains(&open), "{open}");
+}
+
+#[test]
+fn two_hosts_do_not_mix() {
+    let (hands, line) = board();
+    let mut first = host(&line, &hands, None, 5);
+    let runs = [10, 20_000, 10];
+    first.load(&runs).expect("loaded");
+    first.play(&runs, 1).expect("played");
+    // The same line: a second host speaks, and cannot play.
+    let frame = wire::request::Request {
+        number: 1,
+        session: 6,
+        ask: wire::request::Ask::Arm,
+    };
+    std::io::Write::write_all(&mut &line, frame.frame().bytes()).expect("sent");
+    let mut next = 0;
+    while next < 5_000 {
+        let event = first
+            .next(std::time::Duration::from_secs(2))
+            .expect("a line");
+        let rig_line::Event::Samples(streamed) = event else {
+            panic!("silence after {next}");
+        };
+        assert_eq!(streamed.samples.first().map(|s| s.0), Some(next));
+        next = streamed.next;
+    }
+    first.disarm().expect("disarmed");
+    assert!(!hands.is_open.load(Ordering::Relaxed));
+}
+
+#[test]
+fn what_no_board_can_play_is_refused_with_the_reason() {
+    let (hands, line) = board();
+    let mut host = host(&line, &hands, None, 5);
+    let refused = |host: &mut Host, command: &Command| {
+        let (result, _) = play(host, command, 2);
+        result.expect_err("refused").to_string()
+    };
+    let other = Command::new("slow", 0.002, [false, true, true]);
+    assert!(refused(&mut host, &other).contains("0.002"));
+    let short = Command::new("short", 0.001, [false, true, false]).with_rest(200);
+    assert!(refused(&mut host, &short).contains("hold time"));
+    let long = Command::new("long", 0.001, (0..90_000).map(|k| k / 30 % 2 == 1));
+    assert!(refused(&mut host, &long).contains("3000 runs"));
+    // A law that hears a flow that does not answer.
+    host.arm().expect("armed");
+    let message = refused(&mut host, &command(1000));
+    assert!(
+        message.contains("armed") || message.contains("residual"),
+        "{message}"
+    );
+}
+
+/// What the rig in the thread is, is found.
+#[test]
+fn a_rig_is_calibrated() {
+    let (hands, line) = board();
+    let mut host = host(&line, &hands, None, 5);
+    let plan = rig_line::calibrate::Plan::default();
+    let rig = rig_line::calibrate::calibrate(&mut host, &plan, None, &mut |_, _| {});
+    let rig = rig.expect("a rig");
+    rig.check().expect("a good one");
+    assert!((rig.sensor.zero_counts - 900.0).abs() < 1.5, "{rig:?}");
+    assert!((rig.friction(2700.0) - 1.0).abs() < 0.002, "{rig:?}");
+    // The sixth sample of asking is the last without an effect.
+    assert_eq!(rig.hold_samples(), [7, 7], "{rig:?}");
+    let [off, on] = rig.sensor.noise_counts.expect("noise");
+    let expected = (41.0_f64 * 41.0 - 1.0).sqrt() / 12.0_f64.sqrt();
+    assert!((off - expected).abs() < 1.0 && (on - expected).abs() < 1.0);
+    assert!(!hands.is_open.load(Ordering::Relaxed));
+}
+
+#[test]
+fn a_rig_without_air_or_at_a_rail_is_not_calibrated() {
+    for (reading, word) in [(0, "steady blowing"), (4095, "shut the valve")] {
+        let (hands, line) = board();
+        hands.no_air.store(true, Ordering::Relaxed);
+        hands.reading.store(reading, Ordering::Relaxed);
+        let mut host = host(&line, &hands, None, 5);
+        let plan = rig_line::calibrate::Plan::default();
+        let result = rig_line::calibrate::calibrate(&mut host, &plan, None, &mut |_, _| {});
+        let message = result.expect_err("refused").to_string();
+        assert!(message.contains(word), "{message}");
+    }
+}

@@ -1,0 +1,333 @@
+//! What the board answers.
+
+use crate::bytes::{Reader, Writer};
+use crate::frame::{CONTENT, Frame};
+
+/// The version of this dialogue; host and board must have the same.
+pub const PROTOCOL: u8 = 1;
+/// A host that has not been heard for so long is lost, ms. What it had the board
+/// play ends then.
+pub const LOST_AFTER_MS: u32 = 500;
+
+/// How a request ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
+#[non_exhaustive]
+pub enum Status {
+    /// Done.
+    Done = 0,
+    /// Another host has the board.
+    Busy = 1,
+    /// More runs than the board keeps; the detail says how many it keeps.
+    TooLong = 2,
+    /// Runs are missing before these; the detail says how many the board has.
+    Missing = 3,
+    /// A run is shorter than the valve's hold time; the detail says which.
+    TooShort = 4,
+    /// What is loaded is not what is to be played.
+    OtherCommand = 5,
+    /// Nothing to play: no runs, no repeats, or more samples than can be counted.
+    Nothing = 6,
+    /// A fault is latched, or the law or a command has the valve: disarm first.
+    NotDisarmed = 7,
+}
+
+impl Status {
+    const ALL: [Self; 8] = [
+        Self::Done,
+        Self::Busy,
+        Self::TooLong,
+        Self::Missing,
+        Self::TooShort,
+        Self::OtherCommand,
+        Self::Nothing,
+        Self::NotDisarmed,
+    ];
+}
+
+/// What the board is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Valves shut.
+    Disarmed,
+    /// The law drives the valve.
+    Armed,
+    /// A command is played.
+    Playing,
+    /// Valves shut by the fault of that number, see the board's `Fault::ALL`.
+    Faulted(u8),
+}
+
+impl Phase {
+    const FAULT: u8 = 0x80;
+
+    /// For the wire.
+    #[must_use]
+    pub const fn to_byte(self) -> u8 {
+        match self {
+            Self::Disarmed => 0,
+            Self::Armed => 1,
+            Self::Playing => 2,
+            Self::Faulted(number) => Self::FAULT | number,
+        }
+    }
+
+    /// From the wire.
+    #[must_use]
+    pub const fn from_byte(byte: u8) -> Option<Self> {
+        match byte {
+            0 => Some(Self::Disarmed),
+            1 => Some(Self::Armed),
+            2 => Some(Self::Playing),
+            byte if byte & Self::FAULT != 0 => Some(Self::Faulted(byte & !Self::FAULT)),
+            _ => None,
+        }
+    }
+}
+
+/// A sensor's or a channel's line: value = (counts − zero) · per_count.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Scale {
+    /// Counts of 0.
+    pub zero: f32,
+    /// Units per count.
+    pub per_count: f32,
+}
+
+/// Who the board is and how things are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Info {
+    /// [`PROTOCOL`] of the board.
+    pub protocol: u8,
+    /// Version of the firmware: major, minor, patch.
+    pub version: [u8; 3],
+    /// Sample period, µs.
+    pub period_us: u32,
+    /// Checksum of the model's constants.
+    pub model: u32,
+    /// Checksum of the rig's constants.
+    pub rig: u32,
+    /// From counts to y.
+    pub sensor: Scale,
+    /// Readings at or beyond these are at a rail, counts.
+    pub rails: [f32; 2],
+    /// Equal readings in a row that mean a stuck sensor.
+    pub stuck_after: u32,
+    /// Residual's envelope, y.
+    pub envelope: f32,
+    /// Shortest times open and shut, samples.
+    pub hold: [u32; 2],
+    /// From counts to the channel's unit; all zero where the model needs none.
+    pub channel: Scale,
+    /// What the board does.
+    pub phase: Phase,
+    /// Samples since the start.
+    pub samples: u64,
+    /// Runs that a command may have.
+    pub most_runs: u16,
+    /// Damaged frames received since the start, wrapping.
+    pub damaged: u32,
+    /// The host that has the board; 0 if none has. A board that was restarted has
+    /// forgotten its host.
+    pub session: u32,
+}
+
+/// An answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Answer {
+    /// To [`Ask::Hello`](crate::request::Ask::Hello).
+    Info(Info),
+    /// To anything else.
+    Done {
+        /// How it ended.
+        status: Status,
+        /// What the status says more.
+        detail: u32,
+        /// Samples since the board's start when it was carried out.
+        samples: u64,
+    },
+}
+
+/// An answer with the number and session of its request.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reply {
+    /// The request's.
+    pub number: u16,
+    /// The request's.
+    pub session: u32,
+    /// What is answered.
+    pub answer: Answer,
+}
+
+pub(crate) const INFO: u8 = 0x30;
+pub(crate) const DONE: u8 = 0x31;
+
+impl Reply {
+    /// The frame for the wire.
+    #[must_use]
+    pub fn frame(&self) -> Frame {
+        let mut content = Writer::<CONTENT>::new();
+        content.put(&[match self.answer {
+            Answer::Info(_) => INFO,
+            Answer::Done { .. } => DONE,
+        }]);
+        content.put(&self.number.to_le_bytes());
+        content.put(&self.session.to_le_bytes());
+        match &self.answer {
+            Answer::Info(info) => {
+                content.put(&[info.protocol]);
+                content.put(&info.version);
+                for word in [
+                    info.period_us,
+                    info.model,
+                    info.rig,
+                    info.sensor.zero.to_bits(),
+                    info.sensor.per_count.to_bits(),
+                    info.rails[0].to_bits(),
+                    info.rails[1].to_bits(),
+                    info.stuck_after,
+                    info.envelope.to_bits(),
+                    info.hold[0],
+                    info.hold[1],
+                    info.channel.zero.to_bits(),
+                    info.channel.per_count.to_bits(),
+                ] {
+                    content.put(&word.to_le_bytes());
+                }
+                content.put(&[info.phase.to_byte()]);
+                content.put(&info.samples.to_le_bytes());
+                content.put(&info.most_runs.to_le_bytes());
+                content.put(&info.damaged.to_le_bytes());
+                content.put(&info.session.to_le_bytes());
+            }
+            Answer::Done {
+                status,
+                detail,
+                samples,
+            } => {
+                content.put(&[*status as u8]);
+                content.put(&detail.to_le_bytes());
+                content.put(&samples.to_le_bytes());
+            }
+        }
+        Frame::new(&content.0)
+    }
+
+    /// From a frame's content; `None` if it is no answer.
+    #[must_use]
+    pub fn read(content: &[u8]) -> Option<Self> {
+        let mut reader = Reader(content);
+        let kind = reader.u8()?;
+        let (number, session) = (reader.u16()?, reader.u32()?);
+        let answer = match kind {
+            INFO => Answer::Info(Info {
+                protocol: reader.u8()?,
+                version: reader.take()?,
+                period_us: reader.u32()?,
+                model: reader.u32()?,
+                rig: reader.u32()?,
+                sensor: scale(&mut reader)?,
+                rails: [reader.f32()?, reader.f32()?],
+                stuck_after: reader.u32()?,
+                envelope: reader.f32()?,
+                hold: [reader.u32()?, reader.u32()?],
+                channel: scale(&mut reader)?,
+                phase: Phase::from_byte(reader.u8()?)?,
+                samples: reader.u64()?,
+                most_runs: reader.u16()?,
+                damaged: reader.u32()?,
+                session: reader.u32()?,
+            }),
+            DONE => Answer::Done {
+                status: {
+                    let byte = reader.u8()?;
+                    Status::ALL.into_iter().find(|s| *s as u8 == byte)?
+                },
+                detail: reader.u32()?,
+                samples: reader.u64()?,
+            },
+            _ => return None,
+        };
+        reader.0.is_empty().then_some(Self {
+            number,
+            session,
+            answer,
+        })
+    }
+}
+
+fn scale(reader: &mut Reader<'_>) -> Option<Scale> {
+    Some(Scale {
+        zero: reader.f32()?,
+        per_count: reader.f32()?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Receiver;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn through(reply: &Reply) -> Option<Reply> {
+        let mut receiver = Receiver::new();
+        let mut found = None;
+        for byte in reply.frame().bytes() {
+            if let Some(content) = receiver.receive(*byte) {
+                found = Reply::read(content.expect("undamaged"));
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn every_answer_arrives_as_it_was_given() {
+        let info = Info {
+            protocol: PROTOCOL,
+            version: [1, 2, 3],
+            period_us: 1000,
+            model: 1,
+            rig: 2,
+            sensor: Scale {
+                zero: 812.5,
+                per_count: 0.0005,
+            },
+            rails: [8.0, 4087.0],
+            stuck_after: 500,
+            envelope: 0.5,
+            hold: [20, 21],
+            channel: Scale::default(),
+            phase: Phase::Faulted(5),
+            samples: 1 << 40,
+            most_runs: 1024,
+            damaged: 3,
+            session: 12,
+        };
+        let reply = |answer| Reply {
+            number: 9,
+            session: 77,
+            answer,
+        };
+        let told = reply(Answer::Info(info));
+        assert_eq!(through(&told), Some(told));
+        for status in Status::ALL {
+            let done = reply(Answer::Done {
+                status,
+                detail: 4,
+                samples: 5,
+            });
+            assert_eq!(through(&done), Some(done));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn garbage_is_read_without_a_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+            let bytes: Vec<u8> = bytes;
+            let _ = Reply::read(&bytes);
+            let _ = bytes.first().map(|byte| Phase::from_byte(*byte).map(Phase::to_byte));
+        }
+    }
+}

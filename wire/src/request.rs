@@ -1,0 +1,246 @@
+//! What the host asks of the board.
+//!
+//! Every request carries a number and the session, a number that the host draws
+//! when it connects. The board serves one session at a time: another host is
+//! told [`Status::Busy`](crate::reply::Status::Busy) until the first has been
+//! silent for the link's time. Asking who is there and shutting the valves is
+//! allowed to everyone.
+//!
+//! A request whose answer was lost is sent again with its number; the board
+//! then gives the same answer and does not carry it out twice.
+
+use crate::bytes::{Reader, Writer};
+use crate::frame::{CONTENT, Frame};
+
+/// Most run lengths in one request.
+pub const RUNS: usize = 56;
+
+/// What is asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ask<'a> {
+    /// Who are you, how are things? Answered with [`Info`](crate::reply::Info).
+    Hello,
+    /// The host is there; no answer. A board that has not heard its host for
+    /// [`LOST_AFTER_MS`](crate::reply::LOST_AFTER_MS) shuts the valves.
+    Alive,
+    /// Run lengths of a command, to be kept from index `at` on.
+    Load {
+        /// Index of the first of them; 0 begins a new command.
+        at: u16,
+        /// The run lengths, samples.
+        runs: Runs<'a>,
+    },
+    /// Play the command that was loaded.
+    Play {
+        /// How often.
+        repeats: u32,
+        /// Its number of runs.
+        runs: u16,
+        /// [`checksum`] of its runs: what is played is what was meant.
+        checksum: u32,
+    },
+    /// Stream every sample from now on, whatever the valve does.
+    Stream,
+    /// Let the law drive the valve.
+    Arm,
+    /// Shut the valve, end what is played, take note of a fault.
+    Disarm,
+}
+
+/// A request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Request<'a> {
+    /// Tells requests of a session apart.
+    pub number: u16,
+    /// Whose it is.
+    pub session: u32,
+    /// What is asked.
+    pub ask: Ask<'a>,
+}
+
+/// Run lengths as they lie in a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Runs<'a>(&'a [u8]);
+
+impl<'a> Runs<'a> {
+    /// The run lengths, samples.
+    pub fn iter(self) -> impl Iterator<Item = u32> + 'a {
+        self.0.chunks_exact(4).map(|bytes| match bytes {
+            [a, b, c, d] => u32::from_le_bytes([*a, *b, *c, *d]),
+            _ => 0,
+        })
+    }
+}
+
+/// Checksum of a command's run lengths.
+pub fn checksum(runs: impl IntoIterator<Item = u32>) -> u32 {
+    runs.into_iter()
+        .fold(model_core::self_test::Crc32::new(), |crc, run| {
+            crc.word(run)
+        })
+        .value()
+}
+
+const HELLO: u8 = 0x20;
+const ALIVE: u8 = 0x21;
+const LOAD: u8 = 0x22;
+const PLAY: u8 = 0x23;
+const STREAM: u8 = 0x24;
+const ARM: u8 = 0x25;
+const DISARM: u8 = 0x26;
+
+impl<'a> Request<'a> {
+    /// From a frame's content; `None` if it is no request.
+    #[must_use]
+    pub fn read(content: &'a [u8]) -> Option<Self> {
+        let mut reader = Reader(content);
+        let kind = reader.u8()?;
+        let number = reader.u16()?;
+        let session = reader.u32()?;
+        let ask = match kind {
+            HELLO => Ask::Hello,
+            ALIVE => Ask::Alive,
+            LOAD => {
+                let at = reader.u16()?;
+                let rest = reader.slice(reader.0.len())?;
+                let whole = !rest.is_empty() && rest.len().is_multiple_of(4);
+                if !whole || rest.len() > 4 * RUNS {
+                    return None;
+                }
+                Ask::Load {
+                    at,
+                    runs: Runs(rest),
+                }
+            }
+            PLAY => Ask::Play {
+                repeats: reader.u32()?,
+                runs: reader.u16()?,
+                checksum: reader.u32()?,
+            },
+            STREAM => Ask::Stream,
+            ARM => Ask::Arm,
+            DISARM => Ask::Disarm,
+            _ => return None,
+        };
+        reader.0.is_empty().then_some(Self {
+            number,
+            session,
+            ask,
+        })
+    }
+
+    /// The frame for the wire.
+    #[must_use]
+    pub fn frame(&self) -> Frame {
+        let mut content = Writer::<CONTENT>::new();
+        let kind = match self.ask {
+            Ask::Hello => HELLO,
+            Ask::Alive => ALIVE,
+            Ask::Load { .. } => LOAD,
+            Ask::Play { .. } => PLAY,
+            Ask::Stream => STREAM,
+            Ask::Arm => ARM,
+            Ask::Disarm => DISARM,
+        };
+        content.put(&[kind]);
+        content.put(&self.number.to_le_bytes());
+        content.put(&self.session.to_le_bytes());
+        match self.ask {
+            Ask::Load { at, runs } => {
+                content.put(&at.to_le_bytes());
+                content.put(runs.0);
+            }
+            Ask::Play {
+                repeats,
+                runs,
+                checksum,
+            } => {
+                content.put(&repeats.to_le_bytes());
+                content.put(&runs.to_le_bytes());
+                content.put(&checksum.to_le_bytes());
+            }
+            _ => {}
+        }
+        Frame::new(&content.0)
+    }
+
+    /// The frame that loads `runs`, at most [`RUNS`] of them, from index `at` on.
+    #[must_use]
+    pub fn load(number: u16, session: u32, at: u16, runs: &[u32]) -> Frame {
+        let mut bytes = Writer::<{ 4 * RUNS }>::new();
+        for run in runs.iter().take(RUNS) {
+            bytes.put(&run.to_le_bytes());
+        }
+        let runs = Runs(&bytes.0);
+        Request {
+            number,
+            session,
+            ask: Ask::Load { at, runs },
+        }
+        .frame()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Receiver;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn content(frame: &Frame) -> Vec<u8> {
+        let mut receiver = Receiver::new();
+        let mut content = None;
+        for byte in frame.bytes() {
+            let received = receiver.receive(*byte);
+            content = content.or(received.map(|r| r.expect("undamaged").to_vec()));
+        }
+        content.expect("a frame")
+    }
+
+    #[test]
+    fn every_request_arrives_as_it_was_meant() {
+        let asks = [
+            Ask::Hello,
+            Ask::Alive,
+            Ask::Play {
+                repeats: 200,
+                runs: 7,
+                checksum: 0xDEAD_BEEF,
+            },
+            Ask::Stream,
+            Ask::Arm,
+            Ask::Disarm,
+        ];
+        for ask in asks {
+            let request = Request {
+                number: 513,
+                session: 7,
+                ask,
+            };
+            let bytes = content(&request.frame());
+            assert_eq!(Request::read(&bytes), Some(request));
+            // A request with something after it is another one.
+            assert_eq!(Request::read(&[&bytes[..], &[0]].concat()), None);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn runs_arrive(at: u16, runs in prop::collection::vec(any::<u32>(), 1..=RUNS)) {
+            let bytes = content(&Request::load(3, 4, at, &runs));
+            match Request::read(&bytes).map(|request| request.ask) {
+                Some(Ask::Load { at: found, runs: loaded }) => {
+                    prop_assert_eq!(found, at);
+                    prop_assert_eq!(loaded.iter().collect::<Vec<_>>(), runs);
+                }
+                other => prop_assert!(false, "{other:?}"),
+            }
+        }
+
+        #[test]
+        fn garbage_is_read_without_a_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+            let _ = Request::read(&bytes);
+        }
+    }
+}

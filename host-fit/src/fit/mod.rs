@@ -16,3 +16,5 @@ pub use free_run::{Fit, FitOptions, fit, sensitivities};
 pub use lean::{lean_base, settle_fixed_delay};
 pub use levenberg::FitStop;
 pub use rules::{RULES, Rules};
+pub use starts::Known;
+pub(crate) use starts::{combinations, rows};

@@ -4,7 +4,7 @@
 use super::rules::RULES;
 use crate::data::Record;
 use crate::model::Model;
-use model_core::effect::{Facts, Parameter, Spec, StartValue, Starts};
+use model_core::effect::{Facts, Spec, StartValue, Starts};
 
 /// The size of a signal: 1 where it is of order 1, as the catalogue's ranges are.
 fn size_of(records: &[&Record], signal: impl Fn(&Record) -> &[f64]) -> f64 {
@@ -17,62 +17,95 @@ fn size_of(records: &[&Record], signal: impl Fn(&Record) -> &[f64]) -> f64 {
     }
 }
 
-/// Root mean square change of y over a sample.
-fn y_per_sample(records: &[&Record]) -> f64 {
-    let changes = records
-        .iter()
-        .flat_map(|r| r.y.windows(2).map(|pair| pair[1] - pair[0]));
-    let (sum, count) = changes.fold((0.0, 0.0), |(s, n), change| (s + change * change, n + 1.0));
-    f64::sqrt(sum / f64::max(count, 1.0))
+/// What the records say, for ranges and starting values.
+#[derive(Clone, Debug)]
+pub struct Known {
+    sorted_y: Vec<f64>,
+    /// Root mean square change of y over a sample.
+    y_per_sample: f64,
+    longest: usize,
 }
 
-/// Parameter vectors from which a fit of `base` with `spec` sets out.
-pub(super) fn starts(base: &Model, spec: &Spec, records: &[&Record]) -> Vec<Vec<f64>> {
-    let mut sorted_y: Vec<f64> = records.iter().flat_map(|r| r.y.iter().copied()).collect();
-    sorted_y.sort_by(f64::total_cmp);
-    let period = base.sample_period_s;
-    let longest = records.iter().map(|r| r.len()).max().unwrap_or(0);
-    let y = size_of(records, |record| &record.y);
-    let facts = Facts {
-        y,
-        u: size_of(records, |record| &record.u),
-        time: 1.0,
-        y_per_sample: y_per_sample(records),
-        sorted_y: &sorted_y,
-        // In the middle of a law's range.
-        delay: base.delay.present(0.5 * y, period),
-        period,
-        record: longest as f64 * period,
-        time_constant: base.time_constant().min(longest as f64 * period),
-    };
-    match spec.starts {
-        Starts::Grid => product(spec.parameters, &facts),
-        Starts::Rows(rows) => {
-            let values = |row: &&[StartValue]| {
-                let each = row.iter().zip(spec.parameters);
-                each.map(|(start, p)| start.value(p, &facts)).collect()
-            };
-            rows.iter().map(values).collect()
+impl Known {
+    /// Of records in the units in which models are fitted.
+    #[must_use]
+    pub fn of(records: &[&Record]) -> Self {
+        let mut sorted_y: Vec<f64> = records.iter().flat_map(|r| r.y.iter().copied()).collect();
+        sorted_y.sort_by(f64::total_cmp);
+        let changes = records
+            .iter()
+            .flat_map(|r| r.y.windows(2).map(|pair| pair[1] - pair[0]));
+        let (sum, count) =
+            changes.fold((0.0, 0.0), |(s, n), change| (s + change * change, n + 1.0));
+        Self {
+            sorted_y,
+            y_per_sample: f64::sqrt(sum / f64::max(count, 1.0)),
+            longest: records.iter().map(|r| r.len()).max().unwrap_or(0),
+        }
+    }
+
+    /// The same for cards, about `model`; `y` and `u` are the sizes of the signals.
+    pub(crate) fn facts(&self, model: &Model, y: f64, u: f64) -> Facts<'_> {
+        let period = model.sample_period_s;
+        let record = self.longest as f64 * period;
+        Facts {
+            y,
+            u,
+            time: 1.0,
+            y_per_sample: self.y_per_sample,
+            sorted_y: &self.sorted_y,
+            // In the middle of a law's range.
+            delay: model.delay.present(0.5 * y, period),
+            period,
+            record,
+            time_constant: model.time_constant().min(record),
         }
     }
 }
 
-/// Every combination of the catalogue's starting values.
-fn product(parameters: &[Parameter], facts: &Facts<'_>) -> Vec<Vec<f64>> {
-    let mut all = vec![Vec::new()];
-    for parameter in parameters {
-        let extended = all.iter().flat_map(|start| {
-            parameter.starts.iter().map(move |value| {
-                let mut longer = start.clone();
-                longer.push(StartValue::Number(*value).value(parameter, facts));
-                longer
-            })
-        });
-        all = extended.collect();
+/// Parameter vectors from which a fit of `base` with `spec` sets out.
+pub(super) fn starts(base: &Model, spec: &Spec, records: &[&Record]) -> Vec<Vec<f64>> {
+    let (y, u) = (
+        size_of(records, |record| &record.y),
+        size_of(records, |record| &record.u),
+    );
+    let known = Known::of(records);
+    let facts = known.facts(base, y, u);
+    if let Some(rows) = rows(spec, &facts) {
+        return rows;
     }
+    let all = combinations(spec.parameters.iter().map(|parameter| {
+        let values = parameter.starts.iter();
+        values
+            .map(|value| StartValue::Number(*value).value(parameter, &facts))
+            .collect()
+    }));
     // Thinned evenly, so that no parameter keeps only its first value.
     let stride = all.len().div_ceil(RULES.most_starts).max(1);
     all.into_iter().step_by(stride).collect()
+}
+
+/// The starts that a card writes out; `None` where it leaves them to a grid.
+pub(crate) fn rows(spec: &Spec, facts: &Facts<'_>) -> Option<Vec<Vec<f64>>> {
+    let Starts::Rows(rows) = spec.starts else {
+        return None;
+    };
+    let values = |row: &&[StartValue]| {
+        let each = row.iter().zip(spec.parameters);
+        each.map(|(start, p)| start.value(p, facts)).collect()
+    };
+    Some(rows.iter().map(values).collect())
+}
+
+/// Every combination of one value of each list; the last list changes fastest.
+pub(crate) fn combinations(lists: impl Iterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {
+    lists.fold(vec![Vec::new()], |all, values| {
+        let longer = all.iter().flat_map(|start: &Vec<f64>| {
+            let with = |value: &f64| [start.as_slice(), &[*value]].concat();
+            values.iter().map(with)
+        });
+        longer.collect()
+    })
 }
 
 #[cfg(test)]

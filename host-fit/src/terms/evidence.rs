@@ -1,18 +1,9 @@
 //! What held-out records say about two models: effect size, significance under
 //! correlated errors, and what chance would have given.
 
+use super::RULES;
 use crate::linalg::dot;
 use statrs::distribution::{ContinuousCDF, StudentsT};
-
-/// Length of the blocks whose errors count as independent: this many correlation
-/// times of the errors …
-const CORRELATION_TIMES: f64 = 8.0;
-/// … but not less than so many samples …
-const SHORTEST: usize = 20;
-/// … and not so long that there are fewer than so many blocks.
-const FEWEST: usize = 24;
-/// Values that are enough to estimate a correlation time from.
-const PLENTY: usize = 4000;
 
 /// Standard deviation of normal numbers over their median absolute deviation.
 const NORMAL: f64 = 1.4826;
@@ -52,7 +43,7 @@ impl HeldOut {
 /// Samples of a block whose errors count as independent of the next one's.
 fn block(errors: &[Vec<f64>]) -> usize {
     let samples: usize = errors.iter().map(Vec::len).sum();
-    let thinned = (samples / PLENTY).max(1);
+    let thinned = (samples / RULES.plenty).max(1);
     let means = |errors: &Vec<f64>| -> Vec<f64> {
         let each = errors.chunks_exact(thinned);
         each.map(|chunk| chunk.iter().sum::<f64>() / thinned as f64)
@@ -63,13 +54,13 @@ fn block(errors: &[Vec<f64>]) -> usize {
         let pairs = series.iter().filter(|s| s.len() > lag);
         pairs.map(|s| dot(&s[lag..], &s[..s.len() - lag])).sum()
     };
-    let longest = samples / FEWEST;
+    let longest = samples / RULES.fewest_blocks;
     let variance = covariance(0).max(f64::MIN_POSITIVE);
     // Summed up to where the correlation is lost for the first time.
     let correlations = (1..=longest / thinned).map(|lag| covariance(lag) / variance);
     let time = 1.0 + 2.0 * correlations.take_while(|rho| *rho > 0.0).sum::<f64>();
-    let samples = (CORRELATION_TIMES * time * thinned as f64) as usize;
-    samples.clamp(SHORTEST, longest.max(SHORTEST))
+    let samples = (RULES.correlation_times * time * thinned as f64) as usize;
+    samples.clamp(RULES.shortest_block, longest.max(RULES.shortest_block))
 }
 
 /// One-sided p-value of "`better` has the smaller held-out error than `worse`".

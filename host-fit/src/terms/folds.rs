@@ -1,13 +1,9 @@
 //! What is learned from and what is judged on: records that were held out, each
 //! record in turn, or the end of the only one.
 
+use super::RULES;
 use crate::data::{Record, Use};
 use crate::fit::pieces;
-
-/// Most folds of a cross-validation.
-const MOST_FOLDS: usize = 4;
-/// Share of the only record that is learned from.
-const LEARNED_SHARE: f64 = 0.6;
 
 /// One split into learning and judging.
 #[derive(Clone, Debug)]
@@ -78,7 +74,7 @@ pub(crate) fn folds(records: &[Record]) -> (Vec<Fold>, HeldOutBy) {
         return (vec![fold], HeldOutBy::Records);
     }
     if let [only] = identify.as_slice() {
-        let from = (LEARNED_SHARE * only.len() as f64) as usize;
+        let from = (RULES.learned_share * only.len() as f64) as usize;
         let fold = Fold {
             learning: vec![only.part(0, from)],
             judging: vec![Judging {
@@ -88,7 +84,7 @@ pub(crate) fn folds(records: &[Record]) -> (Vec<Fold>, HeldOutBy) {
         };
         return (vec![fold], HeldOutBy::End);
     }
-    let count = identify.len().min(MOST_FOLDS);
+    let count = identify.len().min(RULES.most_folds);
     let fold = |turn: usize| {
         let mut fold = Fold {
             learning: Vec::new(),

@@ -1,9 +1,9 @@
 //! Parameter vectors over the ranges of an effect's card.
 
 use super::RULES;
-use crate::data::Record;
+use crate::fit::{Known, combinations, rows};
 use crate::model::Model;
-use model_core::effect::{Facts, Parameter, Spec, StartValue, Starts, Unit};
+use model_core::effect::{Parameter, Spec, StartValue, Unit};
 
 /// The longest lag that is tried in records of at least `shortest` samples.
 pub(super) fn longest_lag(period_s: f64, shortest: usize) -> u16 {
@@ -12,60 +12,13 @@ pub(super) fn longest_lag(period_s: f64, shortest: usize) -> u16 {
     longest.min(share).clamp(2.0, 4096.0) as u16
 }
 
-/// What the records say, for ranges and starting values.
-#[derive(Clone, Debug)]
-pub struct Known {
-    sorted_y: Vec<f64>,
-    y_per_sample: f64,
-    longest: usize,
-}
-
-impl Known {
-    /// Of records in the search's own units.
-    #[must_use]
-    pub fn of(records: &[&Record]) -> Self {
-        let mut sorted_y: Vec<f64> = records.iter().flat_map(|r| r.y.iter().copied()).collect();
-        sorted_y.sort_by(f64::total_cmp);
-        let changes = records
-            .iter()
-            .flat_map(|r| r.y.windows(2).map(|pair| pair[1] - pair[0]));
-        let (sum, count) =
-            changes.fold((0.0, 0.0), |(s, n), change| (s + change * change, n + 1.0));
-        Self {
-            sorted_y,
-            y_per_sample: f64::sqrt(sum / f64::max(count, 1.0)),
-            longest: records.iter().map(|r| r.len()).max().unwrap_or(0),
-        }
-    }
-
-    fn facts(&self, model: &Model) -> Facts<'_> {
-        let period = model.sample_period_s;
-        let record = self.longest as f64 * period;
-        Facts {
-            y: 1.0,
-            u: 1.0,
-            time: 1.0,
-            y_per_sample: self.y_per_sample,
-            sorted_y: &self.sorted_y,
-            // In the middle of a law's range: y is of order 1.
-            delay: model.delay.present(0.5, period),
-            period,
-            record,
-            time_constant: model.time_constant().min(record),
-        }
-    }
-}
-
 /// Parameter vectors from which `spec` is screened, for `model`.
 #[must_use]
 pub(super) fn grid(spec: &Spec, model: &Model, known: &Known) -> Vec<Vec<f64>> {
-    let facts = known.facts(model);
-    if let Starts::Rows(rows) = spec.starts {
-        let values = |row: &&[StartValue]| {
-            let each = row.iter().zip(spec.parameters);
-            each.map(|(start, p)| start.value(p, &facts)).collect()
-        };
-        return rows.iter().map(values).collect();
+    // y and u are of order 1 here.
+    let facts = known.facts(model, 1.0, 1.0);
+    if let Some(rows) = rows(spec, &facts) {
+        return rows;
     }
     let linear = spec.amplitude.filter(|amplitude| amplitude.linear);
     let scales = |p: &Parameter| linear.is_some_and(|amplitude| amplitude.parameter == p.name);
@@ -95,15 +48,7 @@ pub(super) fn grid(spec: &Spec, model: &Model, known: &Known) -> Vec<Vec<f64>> {
                 .collect()
         }
     };
-    let mut all = vec![Vec::new()];
-    for parameter in spec.parameters {
-        let values = along(parameter);
-        let longer = all.iter().flat_map(|start: &Vec<f64>| {
-            let with = |value: &f64| [start.as_slice(), &[*value]].concat();
-            values.iter().map(with)
-        });
-        all = longer.collect();
-    }
+    let mut all = combinations(spec.parameters.iter().map(along));
     // Where levels come in pairs, the first is the upper one.
     let levels: Vec<usize> = (0..spec.parameters.len())
         .filter(|i| {
@@ -127,7 +72,7 @@ fn logarithmic(p: &Parameter, count: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::Use;
+    use crate::data::{Record, Use};
     use model_core::effects::SPECS;
 
     #[test]

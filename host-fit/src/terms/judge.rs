@@ -1,6 +1,7 @@
 //! The bench on which models are judged: fitted in free run to some records, judged
 //! in free run on others.
 
+use super::RULES;
 use super::evidence::{HeldOut, p_above_noise};
 use super::folds::{Fold, HeldOutBy, Judging, folds};
 use crate::data::{Record, Use};
@@ -9,9 +10,6 @@ use crate::model::Model;
 use crate::residual::{NoiseSource, noise_floor};
 use crate::simulate::SimulateError;
 use rayon::prelude::*;
-
-/// A run that diverges counts as this many times the largest |y| off.
-const DIVERGED: f64 = 10.0;
 
 /// A model with its fits, one per fold, and its held-out error.
 #[derive(Clone, Debug)]
@@ -144,7 +142,7 @@ impl Judge {
                 .collect()),
             Err(SimulateError::Diverged { .. }) => {
                 let largest = record.y.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
-                Ok(measured.map(|_| DIVERGED * largest).collect())
+                Ok(measured.map(|_| RULES.diverged * largest).collect())
             }
             Err(error) => Err(error),
         }

@@ -18,10 +18,10 @@ mod search;
 mod term;
 mod units;
 
+pub use crate::fit::Known;
 pub use automatic::{Automatic, base_model};
 pub(crate) use evidence::{HeldOut, decoys, last_of_both, p_value};
 pub use folds::HeldOutBy;
-pub use grid::Known;
 pub use judge::{Judge, Judged};
 pub use rules::{RULES, Rules};
 pub use screen::{Candidate, Proposal, Screen, Table};

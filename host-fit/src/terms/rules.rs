@@ -62,4 +62,28 @@ rules! {
     off_zero: f64 = 5.0, "standard errors", "convention";
     /// Where records do not begin at rest, 0 is the level of rest unless it is further from all of y than this.
     far: f64 = 1.0, "times the range of y", "judgement";
+
+    /// Rounds of moving all lags of a model …
+    lag_rounds: usize = 4, "", "judgement";
+    /// … the steps of a fit after each move …
+    lag_iterations: usize = 5, "iterations", "judgement";
+    /// … and what a move must gain.
+    lag_gain: f64 = 1e-4, "share of the mean square error", "judgement";
+    /// Delay laws are compared at this level, where nothing better is known.
+    middle: f64 = 0.5, "size of y", "the middle of the range";
+
+    /// Errors of blocks of so many correlation times count as independent …
+    correlation_times: f64 = 8.0, "correlation times", "held by `the_p_value_is_calibrated_for_coloured_errors`";
+    /// … of so many samples at least …
+    shortest_block: usize = 20, "samples", "judgement";
+    /// … and not so long that there are fewer than this.
+    fewest_blocks: usize = 24, "blocks", "judgement: a test of fewer has no power";
+    /// Values that are enough to estimate a correlation time from.
+    plenty: usize = 4000, "values", "judgement: for the time it takes";
+    /// Most folds of a cross-validation.
+    most_folds: usize = 4, "", "judgement: for the time it takes";
+    /// What is learned from of the only record.
+    learned_share: f64 = 0.6, "share of the record", "judgement";
+    /// A run that diverges counts as so far off.
+    diverged: f64 = 10.0, "times the largest |y|", "judgement: worse than any that stays";
 }

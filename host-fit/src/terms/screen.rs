@@ -12,11 +12,11 @@
 //! are learned from, what they leave is counted on those that are held out.
 
 use super::RULES;
-use super::grid::{Known, grid, longest_lag};
+use super::grid::{grid, longest_lag};
 use super::judge::Judge;
 use super::term::Term;
 use crate::data::Record;
-use crate::fit::sensitivities;
+use crate::fit::{Known, sensitivities};
 use crate::linalg::{dot, solve_symmetric};
 use crate::model::{Delay, Model, Start};
 use model_core::effect::{Place, Sign, Spec};

@@ -2,23 +2,18 @@
 
 use super::RULES;
 use super::evidence::p_value;
-use super::grid::{Known, longest_lag};
+use super::grid::longest_lag;
 use super::judge::{Judge, Judged};
-use super::screen::{GRADINGS, Proposal, SERIES, Screen, has_jet_effect};
+use super::screen::{Proposal, SERIES, Screen, has_jet_effect};
 use super::term::Term;
-use crate::fit::{Fit, FitOptions, fit, lean_base, settle_fixed_delay};
+use crate::fit::{Fit, FitOptions, Known, fit, lean_base, settle_fixed_delay};
 use crate::model::{Model, Start};
 use crate::simulate::SimulateError;
 use model_core::effects::NUISANCES;
+use model_core::recursion::Grading;
 use rayon::prelude::*;
 use std::cmp::Ordering;
 use std::sync::atomic::{AtomicBool, Ordering as Memory};
-
-/// Rounds of moving all lags of a model, and steps of a fit after each move.
-const LAG_ROUNDS: usize = 4;
-const LAG_STEPS: usize = 5;
-/// What a move of a lag must gain, as a share of the mean square error.
-const LAG_GAIN: f64 = 1e-4;
 
 /// A model with the terms that were added to the leanest one.
 #[derive(Clone, Debug)]
@@ -137,7 +132,7 @@ impl Search<'_> {
         let mut judged = self.judge.refitted(&model)?;
         if !self.judge.on_off {
             // Graded commands show how the flow takes jets of part strength.
-            let others: Vec<Judged> = GRADINGS
+            let others: Vec<Judged> = Grading::ALL
                 .into_par_iter()
                 .filter(|grading| *grading != judged.model().grading)
                 .filter_map(|grading| {
@@ -338,7 +333,7 @@ impl Search<'_> {
             return None;
         }
         let learning = self.judge.learning(0);
-        let others = GRADINGS.into_par_iter().filter(|g| *g != model.grading);
+        let others = Grading::ALL.into_par_iter().filter(|g| *g != model.grading);
         let fits = others.filter_map(|grading| {
             let other = Model {
                 grading,
@@ -435,7 +430,7 @@ impl Search<'_> {
         let learning = self.judge.learning(0);
         let shortest = learning.iter().map(|r| r.len()).min().unwrap_or(0);
         let longest = longest_lag(current.model.sample_period_s, shortest);
-        for _ in 0..LAG_ROUNDS {
+        for _ in 0..RULES.lag_rounds {
             let Some(screen) = Screen::new(self.judge, &current.model) else {
                 return current;
             };
@@ -474,11 +469,11 @@ impl Search<'_> {
             }
         }
         let options = FitOptions {
-            iterations: LAG_STEPS,
+            iterations: RULES.lag_iterations,
             ..self.judge.options_for(&model)
         };
         let fitted = fit(&model, &self.judge.learning(0), &options).ok()?;
-        let least = current.mean_square() * (1.0 - LAG_GAIN);
+        let least = current.mean_square() * (1.0 - RULES.lag_gain);
         (fitted.mean_square() < least).then_some((fitted, moved))
     }
 

@@ -1,5 +1,6 @@
 //! What can be added to a model: the moves of the search.
 
+use super::RULES;
 use crate::model::{Delay, Model};
 use model_core::effect::{Place, Spec};
 use model_core::effects::{LEVEL_RATE, SLOW_WAKE, ZERO_OFFSET};
@@ -192,7 +193,7 @@ impl Term {
             Self::Effect { spec, .. } if spec.place == Place::Delay => {
                 // The base's law about where this one was: it may have been fitted
                 // beside quite other terms.
-                let level = |delay: &Delay| delay.present(MIDDLE, base.sample_period_s);
+                let level = |delay: &Delay| delay.present(RULES.middle, base.sample_period_s);
                 let later = level(&model.delay) - level(&base.delay);
                 model.delay = base.delay.clone();
                 model.delay_later(later);
@@ -245,9 +246,6 @@ impl Term {
         Some(model)
     }
 }
-
-/// A level in the middle of y, at which delay laws are compared.
-const MIDDLE: f64 = 0.5;
 
 /// The newest lag, and the one before.
 const NEWEST: u16 = 1;

@@ -31,6 +31,7 @@
 //! | [`steps`] | the way, step by step, with the results as data |
 //! | [`codegen`], [`design`], [`extend`] | what is done with a model |
 //! | [`diagnose`] | which effect is missing, and how sure that is |
+//! | [`discover`] | the term that is missing where no catalogue has it |
 //! | [`terms`] | one search over lags, the sensor's zero and effects |
 //! | [`experiment`], [`power`], [`residual`] | what would tell models apart, what would have been seen, where a model fails |
 //! | [`identify`], [`delay`], [`excitation`] | what is done with recordings |
@@ -45,6 +46,7 @@ pub mod codegen;
 pub mod delay;
 pub mod design;
 pub mod diagnose;
+pub mod discover;
 pub mod dual;
 pub mod excitation;
 pub mod experiment;

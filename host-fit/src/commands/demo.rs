@@ -185,7 +185,7 @@ fn hidden_effect(
     console.say(&format!(
         "\na ramp with a hidden effect: {headline}\n{meaning}"
     ))?;
-    console.say(&ladder_table(&finding.diagnosis))?;
+    console.say(&ladder_table(&finding.diagnosis.ladder))?;
     report_finding(report, &set, &finding);
     let svg = ladder_picture(&finding.diagnosis, &set);
     write_atomic(&out.join("ladder.svg"), |file| {

@@ -20,6 +20,7 @@ pub(crate) mod delay;
 pub(crate) mod demo;
 pub(crate) mod design;
 pub(crate) mod diagnose;
+pub(crate) mod discover;
 mod drawings;
 mod effect_files;
 pub(crate) mod effects;

@@ -5,10 +5,11 @@ use host_fit::diagnose::Verdict;
 use host_fit::indicators::Scores;
 use host_fit::model::Model;
 use host_fit::picture::{
-    Candidate, Column, KeyNumber, Ranking, Report, Tone, WhereItFails, ranking,
+    BandPoint, Candidate, Column, CurvePlot, KeyNumber, Ranking, Report, Tone, WhereItFails, curve,
+    ranking,
 };
 use host_fit::residual::Failures;
-use host_fit::steps::{Comparison, Finding};
+use host_fit::steps::{Comparison, Finding, Terms};
 
 use super::drawings::{ladder_picture, overlays};
 use super::words::{describe, ladder_rows, ranking_rows, score_rows, short};
@@ -58,6 +59,65 @@ pub(crate) fn finding(given: &Model, set: &DataSet, found: &Finding) -> String {
     provenance(&mut report, set);
     report.html()
 }
+
+/// The page of a discovery beside `given`.
+pub(crate) fn discovery(given: &Model, set: &DataSet, found: &Terms) -> String {
+    let mut report = Report::new("Discovery", title(set));
+    let terms = &found.discovery.terms;
+    let tone = if terms.is_empty() {
+        Tone::Warning
+    } else {
+        Tone::Finding
+    };
+    report.verdict(tone, &found.headline, &found.meaning);
+    report.section("Held-out error, step by step");
+    report.table("", &LADDER, &ladder_rows(&found.discovery.ladder));
+    for term in terms {
+        report.section(&format!("{} by {}", term.changes, term.coordinate));
+        let points: Vec<BandPoint> = term
+            .curve
+            .iter()
+            .map(|p| BandPoint {
+                x: p.x,
+                value: p.value,
+                low: p.low,
+                high: p.high,
+            })
+            .collect();
+        let plot = CurvePlot {
+            title: "",
+            x_label: &format!("{} ({})", term.coordinate, term.coordinate_unit),
+            y_label: &format!("{} ({})", term.changes, term.unit),
+            points: &points,
+            ..CurvePlot::default()
+        };
+        report.figure(
+            &curve(&plot),
+            "The curve that was fitted with everything else, in straight lines between its points.",
+        );
+        report.paragraph("The effect file that the term makes:");
+        report.code(&term.file);
+    }
+    report.section("The model with the terms");
+    report.paragraph(&describe(&found.model));
+    report_scores(&mut report, &found.scores);
+    let mut all: Vec<(&str, &[Vec<f64>])> = Vec::new();
+    if let Some(before) = &found.runs_before {
+        all.push(("as given", before));
+    }
+    all.push(("with the terms", &found.runs));
+    report_runs(&mut report, &given.targets(&set.records), &all);
+    provenance(&mut report, set);
+    report.html()
+}
+
+/// Columns of a ladder's table.
+const LADDER: [Column<'_>; 4] = [
+    Column::Text("step"),
+    Column::Number("RMSE"),
+    Column::Number("FIT, %"),
+    Column::Number("noise floor"),
+];
 
 fn title(set: &DataSet) -> &str {
     set.title.as_deref().unwrap_or("data set")
@@ -120,16 +180,7 @@ pub(crate) fn report_finding(report: &mut Report, set: &DataSet, found: &Finding
         &ladder_picture(diagnosis, set),
         "Root mean square error of the free run on the held-out records.",
     );
-    report.table(
-        "",
-        &[
-            Column::Text("step"),
-            Column::Number("RMSE"),
-            Column::Number("FIT, %"),
-            Column::Number("noise floor"),
-        ],
-        &ladder_rows(diagnosis),
-    );
+    report.table("", &LADDER, &ladder_rows(&diagnosis.ladder));
     if !diagnosis.ranking.is_empty() {
         report.section("Every effect, refitted alone");
         let base = diagnosis

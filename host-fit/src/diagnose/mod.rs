@@ -24,10 +24,9 @@ pub use rules::{RULES, Rules};
 pub use verdict::Verdict;
 
 use crate::data::Record;
-use crate::fit::{FitOptions, restart_after};
 use crate::model::{Model, Start};
 use crate::simulate::SimulateError;
-use crate::terms::{Hypothesis, Judge, Known, Search, Units, begins_in_mid_run};
+use crate::terms::{Bench, Hypothesis, Known, Search};
 use session::Session;
 use std::sync::atomic::{AtomicBool, Ordering};
 use thiserror::Error;
@@ -79,19 +78,14 @@ pub fn diagnose(
     interrupt: &AtomicBool,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis, DiagnoseError> {
-    let units = Units::of(given, records);
-    let inner: Vec<Record> = records.iter().map(|r| units.record_in(r)).collect();
-    let given_inside = units.model_in(given);
-    let mid_run = inner.iter().any(begins_in_mid_run);
-    let fit_options = FitOptions {
-        constant: mid_run || given.constant != 0.0,
-        ..FitOptions::default()
-    };
-    let restarted = restart_after(&given_inside, &inner);
-    let judge = |records: &[Record]| {
-        Judge::new(records, restarted, fit_options).ok_or(DiagnoseError::NothingToLearnFrom)
-    };
-    let judge = judge(&inner)?;
+    let bench = Bench::of(given, records).ok_or(DiagnoseError::NothingToLearnFrom)?;
+    let Bench {
+        units,
+        judge,
+        given: given_inside,
+        mid_run,
+        restarted,
+    } = bench;
     let known = Known::of(&judge.learning(0));
     let search = Search {
         judge: &judge,

@@ -3,7 +3,7 @@
 use super::{Memory, ParameterEstimate, Separation, Verdict};
 use crate::model::Model;
 use crate::residual::NoiseSource;
-use crate::terms::HeldOutBy;
+use crate::terms::{HeldOut, HeldOutBy, Judge, Units};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -20,6 +20,26 @@ pub struct Rung {
     pub noise_rmse: Option<f64>,
     /// What was done to get here, in words.
     pub step: String,
+}
+
+impl Rung {
+    /// What was held out, in the user's units.
+    pub(crate) fn of(
+        judge: &Judge,
+        units: &Units,
+        held_out: &HeldOut,
+        effects: &[String],
+        step: &str,
+    ) -> Self {
+        let measured = judge.noise_source == NoiseSource::Measured;
+        Self {
+            effects: effects.to_vec(),
+            validate_rmse: held_out.rmse() * units.y,
+            validate_fit_percent: 100.0 * (1.0 - judge.unexplained_share(held_out).sqrt()),
+            noise_rmse: measured.then(|| judge.noise_rmse() * units.y),
+            step: step.to_owned(),
+        }
+    }
 }
 
 /// A candidate, judged against the model it was added to.

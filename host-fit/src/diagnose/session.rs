@@ -5,7 +5,6 @@ use super::ranking::{not_tried, ranked, rivals};
 use super::verdict::Conclusion;
 use super::{DiagnoseError, Diagnosis, Options, RULES, Rung, Verdict, estimates};
 use crate::model::Model;
-use crate::residual::NoiseSource;
 use crate::terms::{Found, HeldOut, Hypothesis, Judge, Search, Term, Units, p_value};
 use model_core::effect::Spec;
 use std::collections::BTreeMap;
@@ -23,15 +22,7 @@ impl Session<'_> {
     }
 
     pub(super) fn rung(&self, held_out: &HeldOut, effects: &[String], step: &str) -> Rung {
-        let judge = self.judge();
-        let measured = judge.noise_source == NoiseSource::Measured;
-        Rung {
-            effects: effects.to_vec(),
-            validate_rmse: held_out.rmse() * self.units.y,
-            validate_fit_percent: 100.0 * (1.0 - judge.unexplained_share(held_out).sqrt()),
-            noise_rmse: measured.then(|| judge.noise_rmse() * self.units.y),
-            step: step.to_owned(),
-        }
+        Rung::of(self.judge(), &self.units, held_out, effects, step)
     }
 
     /// Decoys' shifts, as fractions of a record.

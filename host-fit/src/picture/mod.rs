@@ -12,6 +12,7 @@
 mod axis;
 mod canvas;
 mod closed_loop;
+mod curve;
 mod decimate;
 mod delay_law;
 mod format;
@@ -26,6 +27,7 @@ mod strip;
 mod where_it_fails;
 
 pub use closed_loop::{ClosedLoop, LoopRun, closed_loop};
+pub use curve::{BandPoint, CurvePlot, curve};
 pub use delay_law::{DelayEdge, DelayLawPlot, LawPoint, MeasuredDelay, delay_law};
 pub use format::significant;
 pub use ladder::{Ladder, LadderRecord, LadderStep, ladder};

@@ -8,6 +8,7 @@
 //! | [`identify`] | a data set | [`Identification`] |
 //! | [`compare`] | a model and a data set | [`Comparison`] |
 //! | [`diagnose`] | a model and a data set | [`Finding`] |
+//! | [`discover`] | a model and a data set | [`Terms`] |
 //! | [`extend`] | a model, a data set and effects | [`Extension`] |
 //! | [`simulate`] | a model and a command | [`Simulation`] |
 //! | [`design`] | a model and a goal | [`Design`] |
@@ -27,6 +28,7 @@ mod constants;
 mod delay;
 mod design;
 mod diagnose;
+mod discover;
 mod error;
 mod extend;
 mod identify;
@@ -44,6 +46,7 @@ pub use constants::{BoardConstants, constants};
 pub use delay::{DelayReport, EdgeReport, measure_delays};
 pub use design::{Design, DesignOutcome, DesignRequest, design, try_out};
 pub use diagnose::{Finding, diagnose};
+pub use discover::{Terms, discover};
 pub use error::StepError;
 pub use extend::{Extension, RecordChange, extend};
 pub use identify::{DelayKind, Identification, IdentifiedDelays, IdentifyRequest, identify};

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use crate::rules::Rulebook;
 use crate::{
-    data, delay, design, diagnose, excitation, experiment, fit, identify, model, power, residual,
-    search, simulate, terms,
+    data, delay, design, diagnose, discover, excitation, experiment, fit, identify, model, power,
+    residual, search, simulate, terms,
 };
 
 /// The rules of every room, in the order in which the way of the data meets them.
@@ -23,6 +23,7 @@ pub fn rulebooks() -> Vec<Rulebook> {
         residual::RULES.book(),
         terms::RULES.book(),
         diagnose::RULES.book(),
+        discover::RULES.book(),
         power::RULES.book(),
         experiment::RULES.book(),
         design::RULES.book(),

@@ -1,12 +1,11 @@
 //! The structure of a base model, chosen by held-out error: as many lags as earn
 //! their place, the delay law that does better, the sensor's zero where it is off.
 
+use super::bench::Bench;
 use super::judge::{Judge, Judged};
 use super::search::{Hypothesis, Search};
-use super::units::{Units, begins_in_mid_run};
 use super::{Known, RULES};
 use crate::data::Record;
-use crate::fit::{FitOptions, restart_after};
 use crate::model::{Delay, Model};
 use crate::simulate::SimulateError;
 use std::sync::atomic::AtomicBool;
@@ -37,19 +36,17 @@ pub fn base_model(
         sample_period_s: records.first()?.sample_period_s,
         ..Model::default()
     };
-    let units = Units::of(&frame, records);
-    let inner: Vec<Record> = records.iter().map(|r| units.record_in(r)).collect();
-    let mid_run = inner.iter().any(begins_in_mid_run);
-    let options = FitOptions {
-        constant: mid_run,
-        ..FitOptions::default()
+    let first = Model {
+        delay: laws.first()?.clone(),
+        ..frame
     };
-    let given = |law: &Delay| Model {
-        delay: law.clone(),
-        ..units.model_in(&frame)
-    };
-    let restarted = restart_after(&given(laws.first()?), &inner);
-    let judge = Judge::new(&inner, restarted, options)?;
+    let Bench {
+        units,
+        judge,
+        given,
+        mid_run,
+        ..
+    } = Bench::of(&first, records)?;
     let search = Search {
         judge: &judge,
         known: Known::of(&judge.learning(0)),
@@ -58,11 +55,15 @@ pub fn base_model(
         interrupt,
         progress,
     };
+    let with_law = |law: &Delay| Model {
+        delay: law.clone(),
+        ..given.clone()
+    };
     let mut best: Option<(f64, Hypothesis)> = None;
     let mut refused = None;
     for law in laws {
         progress("the leanest model");
-        match search.root(&given(law), mid_run) {
+        match search.root(&with_law(law), mid_run) {
             Ok(root) => {
                 let parameters = root.judged.model().coordinates().len() as f64;
                 let score = root.judged.rmse().ln() + RULES.price * parameters;

@@ -8,6 +8,7 @@
 //! what a base without it can do.
 
 mod automatic;
+mod bench;
 mod evidence;
 mod folds;
 mod grid;
@@ -20,10 +21,12 @@ mod units;
 
 pub use crate::fit::Known;
 pub use automatic::{Automatic, base_model};
+pub use bench::Bench;
 pub(crate) use evidence::{HeldOut, decoys, last_of_both, p_value};
 pub use folds::HeldOutBy;
 pub use judge::{Judge, Judged};
 pub use rules::{RULES, Rules};
+pub(crate) use screen::Tangent;
 pub use screen::{Candidate, Proposal, Screen, Table};
 pub use search::{Found, Hypothesis, Search};
 pub use term::Term;

@@ -53,6 +53,9 @@ const PROBE: u16 = 2;
 const LONGEST_MOVE: f64 = 12.0;
 /// What is not proportional must be wanted at least this many times.
 const SOME: f64 = 0.1;
+/// Ridge of the points of a curve, share of their mean square: points that are hardly
+/// ever met stay where they are.
+const RIDGE: f64 = 1e-4;
 /// Share of the error that moving a lag must take.
 const WORTH_MOVING: f64 = 2e-4;
 
@@ -80,6 +83,18 @@ pub struct Proposal {
     pub left: f64,
     /// ½ ln of that, and the price of the terms: below 0 is worth it.
     pub score: f64,
+}
+
+/// What the parameters of one effect do together.
+pub(crate) struct Tangent {
+    /// By how much each should change, to first order.
+    pub(crate) coefficients: Vec<f64>,
+    /// Share of the error energy that they take where it is learned.
+    pub(crate) learned: f64,
+    /// The same on what is held out.
+    pub(crate) held_out: f64,
+    /// What they change in the free run, as far as the model itself cannot.
+    pub(crate) direction: Vec<f64>,
 }
 
 /// Everything that could be added, and its changes to the free run.
@@ -241,6 +256,11 @@ impl<'a> Screen<'a> {
     /// Coefficients of columns fitted to the error, and the shares of the error's
     /// energy that are left where it was learned and held out.
     fn regress(&self, columns: &[&[f64]]) -> Option<(Vec<f64>, f64, f64)> {
+        self.regress_with(columns, 0.0)
+    }
+
+    /// The same with a ridge, as a share of the mean square of the columns.
+    fn regress_with(&self, columns: &[&[f64]], ridge: f64) -> Option<(Vec<f64>, f64, f64)> {
         let n = columns.len();
         let learned = |series: &'_ [f64]| series[..self.learned].to_vec();
         let own: Vec<Vec<f64>> = columns.iter().map(|c| learned(c)).collect();
@@ -250,8 +270,12 @@ impl<'a> Screen<'a> {
             for j in 0..n {
                 products[i * n + j] = dot(&own[i], &own[j]);
             }
-            products[i * n + i] *= 1.0 + 1e-9;
             right[i] = dot(&own[i], &self.error[..self.learned]);
+        }
+        let mean = (0..n).map(|i| products[i * n + i]).sum::<f64>() / n.max(1) as f64;
+        for i in 0..n {
+            products[i * n + i] *= 1.0 + 1e-9;
+            products[i * n + i] += ridge * mean;
         }
         let scale = solve_symmetric(&products, &right)?;
         let mut rest = self.error.clone();
@@ -288,6 +312,54 @@ impl<'a> Screen<'a> {
             }
         }
         moves
+    }
+
+    /// What the parameters of an effect do together, from where `other` has them: the
+    /// model with that effect, which runs as this one does. `None` if they do nothing.
+    pub(crate) fn tangent(&self, other: &Model, effect: &str) -> Option<Tangent> {
+        let coordinates = other.coordinates();
+        let own = |name: &str| name.split('.').next() == Some(effect);
+        let indices: Vec<usize> = (0..coordinates.len())
+            .filter(|i| own(&coordinates[*i].name))
+            .collect();
+        let slopes: Option<Vec<Vec<Vec<f64>>>> = self
+            .records
+            .iter()
+            .map(|record| Some(sensitivities(other, record, &indices)?.1))
+            .collect();
+        let slopes = slopes?;
+        let columns: Vec<Vec<f64>> = (0..indices.len())
+            .map(|i| {
+                let mut column = self.joined(slopes.iter().map(|record| record[i].as_slice()));
+                self.residualise(&mut column);
+                column
+            })
+            .collect();
+        let all: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let (coefficients, learned, held_out) = self.regress_with(&all, RIDGE)?;
+        let mut direction = vec![0.0; self.error.len()];
+        for (column, scale) in columns.iter().zip(&coefficients) {
+            let pairs = direction.iter_mut().zip(column);
+            pairs.for_each(|(sum, x)| *sum += scale * x);
+        }
+        let finite = coefficients.iter().all(|c| c.is_finite()) && held_out.is_finite();
+        finite.then_some(Tangent {
+            coefficients,
+            learned: 1.0 - learned,
+            held_out: 1.0 - held_out,
+            direction,
+        })
+    }
+
+    /// Correlation of what a candidate changes with a direction, where it is learned.
+    pub(crate) fn likeness(&self, table: &Table, candidate: &Candidate, direction: &[f64]) -> f64 {
+        let own = candidate.columns.iter().map(|i| &table.columns[*i]);
+        let along = own.map(|column| {
+            let (column, direction) = (&column[..self.learned], &direction[..self.learned]);
+            let size = (dot(column, column) * dot(direction, direction)).sqrt();
+            dot(column, direction).abs() / size.max(f64::MIN_POSITIVE)
+        });
+        along.fold(0.0, f64::max)
     }
 
     fn lags(&self) -> Vec<u16> {

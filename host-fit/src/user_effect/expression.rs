@@ -17,7 +17,7 @@ const PUNCTUATION: &str = "+-*/<>=!&|,;.";
 /// Words of Rust that open constructs outside the subset; the parser of Rust
 /// would accept them.
 const SUBSET: &str = "allowed are numbers, names, + - * /, comparisons, && || !, `if … else …`, \
-     `let`, and abs, min, max, sqrt, exp, cbrt, sin, cos, delayed";
+     `let`, and abs, min, max, sqrt, exp, cbrt, sin, cos, delayed, table";
 
 /// What is wrong with an expression, and where.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -273,6 +273,9 @@ impl Compiler {
         for argument in arguments {
             numbers.push(self.of_kind(argument, Kind::Number)?);
         }
+        if name == "table" {
+            return self.table(span, arguments, &numbers);
+        }
         let unary = match name {
             "abs" => Some(Unary::Abs),
             "sqrt" => Some(Unary::Sqrt),
@@ -284,6 +287,7 @@ impl Compiler {
         };
         let expected = match (name, unary) {
             (_, Some(_)) => 1,
+            ("delayed", None) if numbers.len() == 3 => 3,
             ("min" | "max" | "delayed", None) => 2,
             _ => {
                 let problem = format!("there is no function `{name}`: {SUBSET}");
@@ -294,18 +298,25 @@ impl Compiler {
             (Some(f), &[x]) => Op::Unary(f, x),
             (None, &[x, y]) if name == "min" => Op::Binary(Binary::Min, x, y),
             (None, &[x, y]) if name == "max" => Op::Binary(Binary::Max, x, y),
-            (None, &[signal, delay]) => {
-                if !self.builder.is_once(delay) {
-                    let place = arguments.get(1).map_or(span, |delay| delay.span());
-                    let problem = "a delay is the same at every sample: a number of seconds, a \
-                         parameter, or made of those and `period`";
-                    return Err(Fault::at(place, problem));
+            (None, &[signal, delay, ref longest @ ..]) => {
+                let place = |i: usize| arguments.get(i).map_or(span, |delay| delay.span());
+                let longest = longest.first().copied();
+                if longest.is_none() && !self.builder.is_once(delay) {
+                    let problem = "a delay of two arguments is the same at every sample: a number of \
+                         seconds, a parameter, or made of those and `period`; for one that changes, \
+                         say how long it can be: delayed(x, seconds, longest)";
+                    return Err(Fault::at(place(1), problem));
+                }
+                if longest.is_some_and(|longest| !self.builder.is_once(longest)) {
+                    let problem =
+                        "the longest delay is the same at every sample: a number of seconds";
+                    return Err(Fault::at(place(2), problem));
                 }
                 if self.builder.is_number(signal) {
                     let problem = "a number does not change, so there is nothing to delay";
                     return Err(Fault::at(span, problem));
                 }
-                let register = self.builder.delayed(signal, delay);
+                let register = self.builder.delayed(signal, delay, longest);
                 let kind = Kind::Number;
                 return Ok(Typed { register, kind });
             }
@@ -317,7 +328,54 @@ impl Compiler {
         };
         Ok(self.push(op, Kind::Number))
     }
+
+    /// `table(x, x1, v1, x2, v2, …)`: straight lines between points, level beyond them.
+    fn table(
+        &mut self,
+        span: Span,
+        arguments: &[&Expr],
+        numbers: &[Register],
+    ) -> Result<Typed, Fault> {
+        let [x, points @ ..] = numbers else {
+            return Err(Fault::at(span, TABLE));
+        };
+        if points.len() < 4 || !points.len().is_multiple_of(2) {
+            return Err(Fault::at(span, TABLE));
+        }
+        let mut value = points[1];
+        for (i, pair) in points.windows(4).step_by(2).enumerate() {
+            let (from, to) = (self.builder.number(pair[0]), self.builder.number(pair[2]));
+            // Single precision, in which the board calculates, must tell them apart.
+            let width = from
+                .zip(to)
+                .map(|(from, to)| (to - from, to as f32 > from as f32));
+            let Some((width, true)) = width else {
+                let place = arguments.get(2 * i + 3).map_or(span, |x| x.span());
+                let problem = "the places of a table are numbers, each above the one before";
+                return Err(Fault::at(place, problem));
+            };
+            let mut number = |op: Op| self.builder.push(op);
+            let (zero, one) = (number(Op::Number(0.0)), number(Op::Number(1.0)));
+            let steepness = number(Op::Number(1.0 / width));
+            let along = number(Op::Binary(Binary::Subtract, *x, pair[0]));
+            let along = number(Op::Binary(Binary::Multiply, along, steepness));
+            let along = number(Op::Binary(Binary::Max, along, zero));
+            let along = number(Op::Binary(Binary::Min, along, one));
+            let rise = number(Op::Binary(Binary::Subtract, pair[3], pair[1]));
+            let part = number(Op::Binary(Binary::Multiply, along, rise));
+            value = number(Op::Binary(Binary::Add, value, part));
+        }
+        let kind = Kind::Number;
+        Ok(Typed {
+            register: value,
+            kind,
+        })
+    }
 }
+
+/// How a table is written.
+const TABLE: &str = "a table is written table(x, x1, v1, x2, v2, …): at least two points, the places \
+     numbers that rise";
 
 fn binary_operator(op: &BinOp) -> Option<(Binary, Kind, Kind)> {
     use Kind::{Condition, Number};

@@ -67,10 +67,18 @@ impl<T: Real> UserEffect<T> {
                     then,
                     otherwise,
                 } if *once => select(results[condition], results[then], results[otherwise]),
-                Op::Delayed { line, delay, .. } => {
-                    let longest = T::from_count(LONGEST_DELAY);
-                    taps[line] = Tap::between((results[delay] / setting.period).at_most(longest));
-                    T::ZERO
+                Op::Delayed {
+                    line,
+                    delay,
+                    longest,
+                    ..
+                } => {
+                    // What must be remembered where the delay changes.
+                    let seconds = results[longest.unwrap_or(delay)];
+                    let most = T::from_count(LONGEST_DELAY);
+                    let samples = (seconds / setting.period).at_most(most);
+                    taps[line] = Tap::between(samples);
+                    samples
                 }
                 Op::Unary(..)
                 | Op::Binary(..)
@@ -113,10 +121,20 @@ impl<T: Real> UserEffect<T> {
                     otherwise,
                 } => select(results[condition], results[then], results[otherwise]),
                 Op::State(index) => states[index],
-                Op::Delayed { line, signal, .. } => {
+                Op::Delayed {
+                    line,
+                    signal,
+                    delay,
+                    longest,
+                } => {
                     let memory = &mut lines[line];
                     memory.push(results[signal]);
-                    self.taps[line].read(memory)
+                    if longest.is_some() {
+                        let samples = results[delay] / self.setting.period;
+                        Tap::between(samples.at_most(self.results[*register])).read(memory)
+                    } else {
+                        self.taps[line].read(memory)
+                    }
                 }
                 Op::Signal(signal) => match signal {
                     Signal::Own => signals.own,

@@ -82,11 +82,13 @@ pub(super) enum Op {
     Signal(Signal),
     /// A state as the last sample left it.
     State(usize),
-    /// `signal` as it was `delay` seconds ago; `line` numbers the memories.
+    /// `signal` as it was `delay` seconds ago; `line` numbers the memories. A delay
+    /// that changes is never longer than `longest` seconds.
     Delayed {
         line: usize,
         signal: Register,
         delay: Register,
+        longest: Option<Register>,
     },
     Unary(Unary, Register),
     Binary(Binary, Register, Register),
@@ -106,7 +108,12 @@ impl Op {
             | Self::Reference
             | Self::Signal(_)
             | Self::State(_) => [None; 3],
-            Self::Delayed { signal, delay, .. } => [Some(signal), Some(delay), None],
+            Self::Delayed {
+                signal,
+                delay,
+                longest,
+                ..
+            } => [Some(signal), Some(delay), longest],
             Self::Unary(_, x) => [Some(x), None, None],
             Self::Binary(_, x, y) => [Some(x), Some(y), None],
             Self::Select {
@@ -118,16 +125,18 @@ impl Op {
         all.into_iter().flatten()
     }
 
-    fn with_operands(self, to: impl Fn(Register) -> Register) -> Self {
+    fn with_operands(self, to: impl Fn(Register) -> Register + Copy) -> Self {
         match self {
             Self::Delayed {
                 line,
                 signal,
                 delay,
+                longest,
             } => Self::Delayed {
                 line,
                 signal: to(signal),
                 delay: to(delay),
+                longest: longest.map(to),
             },
             Self::Unary(f, x) => Self::Unary(f, to(x)),
             Self::Binary(f, x, y) => Self::Binary(f, to(x), to(y)),
@@ -186,13 +195,19 @@ impl Builder {
         self.ops.len() - 1
     }
 
-    pub(super) fn delayed(&mut self, signal: Register, delay: Register) -> Register {
+    pub(super) fn delayed(
+        &mut self,
+        signal: Register,
+        delay: Register,
+        longest: Option<Register>,
+    ) -> Register {
         let mut lines = self.ops.iter().filter_map(|op| match op {
             Op::Delayed {
                 line,
                 signal: s,
                 delay: d,
-            } if *s == signal && *d == delay => Some(*line),
+                longest: l,
+            } if *s == signal && *d == delay && *l == longest => Some(*line),
             _ => None,
         });
         let known = lines.next_back();
@@ -205,6 +220,7 @@ impl Builder {
             line: known.unwrap_or(count),
             signal,
             delay,
+            longest,
         })
     }
 
@@ -212,8 +228,17 @@ impl Builder {
         once(&self.ops).get(register).copied().unwrap_or(false)
     }
 
+    /// The number that a register holds, if it is one that was written down.
+    pub(super) fn number(&self, register: Register) -> Option<f64> {
+        match self.ops.get(register)? {
+            Op::Number(value) => Some(*value),
+            Op::Unary(Unary::Negative, x) => self.number(*x).map(|x| -x),
+            _ => None,
+        }
+    }
+
     pub(super) fn is_number(&self, register: Register) -> bool {
-        matches!(self.ops.get(register), Some(Op::Number(_)))
+        self.number(register).is_some()
     }
 
     /// Leaves out what has no influence on `value`, and numbers the rest anew.
@@ -267,10 +292,12 @@ impl Builder {
                     line,
                     signal,
                     delay,
+                    longest,
                 } => Op::Delayed {
                     line: line_numbers[line],
                     signal,
                     delay,
+                    longest,
                 },
                 op => op,
             })

@@ -216,6 +216,18 @@ impl Writer {
                 Signal::Time => quote!(state.clock.time(self.period)),
                 Signal::SinceEdge => quote!(state.clock.since_edge(self.period)),
             },
+            Op::Delayed {
+                line,
+                delay,
+                longest: Some(_),
+                ..
+            } => {
+                let (most, line) = (format_ident!("longest{line}"), format_ident!("line{line}"));
+                let delay = self.operand(delay, false);
+                quote!(
+                    Tap::between(Real::at_most(#delay / self.period, self.#most)).read(&state.#line)
+                )
+            }
             Op::Delayed { line, .. } => {
                 let (tap, line) = (format_ident!("tap{line}"), format_ident!("line{line}"));
                 quote!(self.#tap.read(&state.#line))
@@ -244,7 +256,12 @@ impl Writer {
         let program = &self.definition.program;
         let used = |(_, op, once): (Register, &Op, bool)| match op {
             // Delays become taps.
-            Op::Delayed { signal, .. } => *signal == register,
+            Op::Delayed {
+                signal,
+                longest: None,
+                ..
+            } => *signal == register,
+            Op::Delayed { signal, delay, .. } => [signal, delay].contains(&&register),
             op => !once && op.operands().any(|operand| operand == register),
         };
         let result = program.value == register
@@ -264,17 +281,40 @@ impl Writer {
     /// Fields of the effect.
     fn fields(&self) -> Vec<Field> {
         let mut fields = Vec::new();
-        let (mut period, mut reference) = (self.is_clocked(), self.reads(Signal::Channel));
+        let varying = |(_, op, _): (Register, &Op, bool)| {
+            matches!(
+                op,
+                Op::Delayed {
+                    longest: Some(_),
+                    ..
+                }
+            )
+        };
+        let mut period = self.is_clocked() || self.ops().any(varying);
+        let mut reference = self.reads(Signal::Channel);
         for (register, op, _) in self.ops() {
-            if let Op::Delayed { line, delay, .. } = op {
-                let delay = self.operand(*delay, true);
-                let longest = number(f64::from(LONGEST_DELAY), "_f32");
-                fields.push(Field {
-                    name: format_ident!("tap{line}"),
-                    kind: quote!(Tap<f32>),
-                    value: Some(quote! {
-                        Tap::between(Real::at_most(#delay / setting.period, #longest))
-                    }),
+            if let Op::Delayed {
+                line,
+                delay,
+                longest,
+                ..
+            } = op
+            {
+                let seconds = self.operand(longest.unwrap_or(*delay), true);
+                let most = number(f64::from(LONGEST_DELAY), "_f32");
+                let samples = quote!(Real::at_most(#seconds / setting.period, #most));
+                fields.push(if longest.is_some() {
+                    Field {
+                        name: format_ident!("longest{line}"),
+                        kind: quote!(f32),
+                        value: Some(samples),
+                    }
+                } else {
+                    Field {
+                        name: format_ident!("tap{line}"),
+                        kind: quote!(Tap<f32>),
+                        value: Some(quote!(Tap::between(#samples))),
+                    }
                 });
             }
             if !self.is_field(register) {

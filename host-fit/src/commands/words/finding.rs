@@ -1,9 +1,9 @@
 //! A diagnosis in words.
 
 use super::{Words, aligned, lines, short};
-use host_fit::diagnose::{Diagnosis, ParameterEstimate, Ranked, Rung};
+use host_fit::diagnose::{ParameterEstimate, Ranked, Rung};
 use host_fit::residual::Failures;
-use host_fit::steps::Finding;
+use host_fit::steps::{Finding, Terms};
 
 impl Words for Finding {
     fn words(&self) -> String {
@@ -11,7 +11,7 @@ impl Words for Finding {
         told.extend(self.failures.iter().flat_map(Failures::describe));
         told.extend(self.unstable.clone());
         told.extend(self.detectable.iter().map(|d| format!("  {}", d.words)));
-        told.push(format!("\n{}", ladder_table(&self.diagnosis)));
+        told.push(format!("\n{}", ladder_table(&self.diagnosis.ladder)));
         if !self.diagnosis.ranking.is_empty() {
             told.push(format!("\n{}", ranking_table(&self.diagnosis.ranking)));
         }
@@ -24,7 +24,34 @@ impl Words for Finding {
     }
 }
 
-pub(in super::super) fn ladder_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
+impl Words for Terms {
+    fn words(&self) -> String {
+        let mut told = vec![self.headline.clone(), self.meaning.clone()];
+        told.push(format!("\n{}", ladder_table(&self.discovery.ladder)));
+        for term in &self.discovery.terms {
+            let head = [
+                format!("{} ({})", term.coordinate, term.coordinate_unit),
+                format!("{} ({})", term.changes, term.unit),
+                "95 % band".to_owned(),
+            ];
+            let rows = term.curve.iter().map(|point| {
+                vec![
+                    short(point.x),
+                    short(point.value),
+                    format!("{} … {}", short(point.low), short(point.high)),
+                ]
+            });
+            let rows: Vec<Vec<String>> = rows.collect();
+            told.push(format!(
+                "\n{}",
+                aligned(&head.each_ref().map(String::as_str), &rows, 0)
+            ));
+        }
+        lines(told)
+    }
+}
+
+pub(in super::super) fn ladder_rows(ladder: &[Rung]) -> Vec<Vec<String>> {
     let row = |rung: &Rung| {
         vec![
             rung.step.clone(),
@@ -34,13 +61,13 @@ pub(in super::super) fn ladder_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
                 .map_or_else(|| "–".into(), |noise| format!("{noise:.5}")),
         ]
     };
-    diagnosis.ladder.iter().map(row).collect()
+    ladder.iter().map(row).collect()
 }
 
 /// The ladder of held-out errors as an aligned table.
-pub(crate) fn ladder_table(diagnosis: &Diagnosis) -> String {
+pub(crate) fn ladder_table(ladder: &[Rung]) -> String {
     let head = ["held-out error, step by step", "RMSE", "FIT %", "noise"];
-    aligned(&head, &ladder_rows(diagnosis), 1)
+    aligned(&head, &ladder_rows(ladder), 1)
 }
 
 /// `name = value unit (low … high)`.

@@ -1,0 +1,305 @@
+//! What a term may depend on: everything that its place can know.
+
+use crate::terms::Units;
+use model_core::effect::Unit;
+
+/// What a term depends on. Times in s.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Coordinate {
+    /// The friction of the flow.
+    Y,
+    /// What the sensor is about to show.
+    Reading,
+    /// y so long ago.
+    PastY(f64),
+    /// The mean of y over so long.
+    MeanY(f64),
+    /// Time since the command was switched on.
+    SinceRisingEdge,
+    /// Time since it was switched off.
+    SinceFallingEdge,
+    /// Length of the rest before the last pulse.
+    RestBefore,
+    /// Length of the last pulse, or of this one so far.
+    PulseLength,
+    /// How many pulses there were, this one among them.
+    PulseNumber,
+    /// For how long there was blowing in the last so many seconds.
+    Blowing(f64),
+    /// The command, forgotten exponentially.
+    MemoryOfU(f64),
+    /// y, forgotten exponentially.
+    MemoryOfY(f64),
+    /// |ẏ|, forgotten exponentially.
+    MemoryOfRate(f64),
+    /// Time in the record.
+    Time,
+    /// A measured channel, from its mean.
+    Channel(String),
+}
+
+/// A state of an effect file.
+pub(super) struct State {
+    pub(super) name: &'static str,
+    pub(super) start: f64,
+    pub(super) update: String,
+}
+
+/// Before the first edge, the last one was so long ago, s at 1 kHz.
+const LONG_AGO_S: f64 = 10.0;
+/// What the fading time is called where it is fitted.
+pub(super) const FADING: &str = "fading_time";
+
+impl Coordinate {
+    /// In words, as documents name it.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let seconds = |t: &f64| crate::picture::significant(*t, 2);
+        match self {
+            Self::Y => "y".to_owned(),
+            Self::Reading => "reading".to_owned(),
+            Self::PastY(t) => format!("past y ({} s)", seconds(t)),
+            Self::MeanY(t) => format!("mean y ({} s)", seconds(t)),
+            Self::SinceRisingEdge => "since rising edge".to_owned(),
+            Self::SinceFallingEdge => "since falling edge".to_owned(),
+            Self::RestBefore => "rest before".to_owned(),
+            Self::PulseLength => "pulse length".to_owned(),
+            Self::PulseNumber => "pulse number".to_owned(),
+            Self::Blowing(t) => format!("blowing in the last {} s", seconds(t)),
+            Self::MemoryOfU(t) => format!("memory of u ({} s)", seconds(t)),
+            Self::MemoryOfY(t) => format!("memory of y ({} s)", seconds(t)),
+            Self::MemoryOfRate(t) => format!("memory of rate ({} s)", seconds(t)),
+            Self::Time => "time in record".to_owned(),
+            Self::Channel(name) => name.clone(),
+        }
+    }
+
+    /// Its words without times, joined by `-`: what a term is named after.
+    pub(super) fn slug(&self) -> String {
+        let words = self.words();
+        let kind = words.split(" (").next().unwrap_or(&words);
+        let kind = kind.split(" in the last").next().unwrap_or(kind);
+        let letter = |c: char| match c {
+            'a'..='z' | '0'..='9' => c,
+            'A'..='Z' => c.to_ascii_lowercase(),
+            _ => '-',
+        };
+        let slug: String = kind.chars().map(letter).collect();
+        let parts: Vec<&str> = slug.split('-').filter(|part| !part.is_empty()).collect();
+        parts.join("-")
+    }
+
+    /// Its unit.
+    #[must_use]
+    pub fn unit(&self) -> Unit {
+        match self {
+            Self::Y | Self::Reading | Self::PastY(_) | Self::MeanY(_) | Self::MemoryOfY(_) => {
+                Unit::Y
+            }
+            Self::SinceRisingEdge
+            | Self::SinceFallingEdge
+            | Self::RestBefore
+            | Self::PulseLength
+            | Self::Blowing(_)
+            | Self::Time => Unit::Second,
+            Self::MemoryOfRate(_) => Unit::Other("y/s"),
+            Self::PulseNumber | Self::MemoryOfU(_) => Unit::None,
+            Self::Channel(_) => Unit::Other("of the channel"),
+        }
+    }
+
+    /// What an inner unit of it is in the user's.
+    pub(super) fn scale(&self, units: &Units) -> f64 {
+        match self {
+            Self::MemoryOfU(_) => units.u,
+            Self::MemoryOfRate(_) => units.y / units.time,
+            Self::Blowing(_) => units.time,
+            _ => self.unit().scale(units.y, units.time, units.u),
+        }
+    }
+
+    /// The same in the user's units.
+    pub(super) fn out(&self, units: &Units) -> Self {
+        let mut other = self.clone();
+        if let Some(time) = other.time_mut() {
+            *time *= units.time;
+        }
+        other
+    }
+
+    fn time_mut(&mut self) -> Option<&mut f64> {
+        match self {
+            Self::PastY(t)
+            | Self::MeanY(t)
+            | Self::Blowing(t)
+            | Self::MemoryOfU(t)
+            | Self::MemoryOfY(t)
+            | Self::MemoryOfRate(t) => Some(t),
+            _ => None,
+        }
+    }
+
+    /// The fading time, where it can be fitted.
+    pub(super) fn fading(&self) -> Option<f64> {
+        match self {
+            Self::MemoryOfU(t) | Self::MemoryOfY(t) | Self::MemoryOfRate(t) => Some(*t),
+            _ => None,
+        }
+    }
+
+    /// The same with another fading time.
+    pub(super) fn with_fading(&self, time: f64) -> Self {
+        let mut other = self.clone();
+        if self.fading().is_some()
+            && let Some(own) = other.time_mut()
+        {
+            *own = time;
+        }
+        other
+    }
+
+    /// Whether both are the same but for a time.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        self.slug() == other.slug()
+    }
+
+    /// The channel that it reads.
+    pub(super) fn channel(&self) -> Option<&str> {
+        match self {
+            Self::Channel(name) => Some(name),
+            _ => None,
+        }
+    }
+
+    /// Its value in an effect file.
+    pub(super) fn expression(&self) -> String {
+        match self {
+            Self::Y => "y".to_owned(),
+            Self::Reading => "reading".to_owned(),
+            Self::PastY(t) => format!("delayed(y, {t:?})"),
+            Self::MeanY(_) => "mean".to_owned(),
+            Self::SinceRisingEdge => "since_rise".to_owned(),
+            Self::SinceFallingEdge => "since_fall".to_owned(),
+            Self::RestBefore => "rest".to_owned(),
+            Self::PulseLength => "length".to_owned(),
+            Self::PulseNumber => "number".to_owned(),
+            Self::Blowing(_) => "blown".to_owned(),
+            Self::MemoryOfU(_) | Self::MemoryOfY(_) | Self::MemoryOfRate(_) => "memory".to_owned(),
+            Self::Time => "t".to_owned(),
+            Self::Channel(name) => format!("({name} - reference)"),
+        }
+    }
+
+    /// What must be carried from sample to sample for it. The command is on above
+    /// `on`; `fitted` if the fading time is a parameter.
+    pub(super) fn states(&self, on: f64, time: f64, fitted: bool) -> Vec<State> {
+        let rises = format!("u > {on:?} && was_on < 0.5");
+        let falls = format!("u <= {on:?} && was_on > 0.5");
+        let long_ago = LONG_AGO_S * time;
+        // Comes last: until then it is what was at the sample before.
+        let was_on = || State {
+            name: "was_on",
+            start: 0.0,
+            update: format!("if u > {on:?} {{ 1.0 }} else {{ 0.0 }}"),
+        };
+        let state = |name, start, update| State {
+            name,
+            start,
+            update,
+        };
+        let since = |name, edge: &str| {
+            let update = format!("if {edge} {{ 0.0 }} else {{ {name} + period }}");
+            state(name, long_ago, update)
+        };
+        let fading = |signal: &str, t: &f64| {
+            let time = if fitted {
+                FADING.to_owned()
+            } else {
+                format!("{t:?}")
+            };
+            let update = format!("memory + ({signal} - memory) * (1.0 - exp(-period / {time}))");
+            state("memory", 0.0, update)
+        };
+        match self {
+            Self::Y | Self::Reading | Self::PastY(_) | Self::Time | Self::Channel(_) => Vec::new(),
+            Self::MeanY(t) => {
+                let update = format!("mean + (y - delayed(y, {t:?})) * (period / {t:?})");
+                vec![state("mean", 0.0, update)]
+            }
+            Self::Blowing(t) => {
+                let scale = 2.0 * on;
+                let update = format!("blown + (u - delayed(u, {t:?})) * (period / {scale:?})");
+                vec![state("blown", 0.0, update)]
+            }
+            Self::SinceRisingEdge => vec![since("since_rise", &rises), was_on()],
+            Self::SinceFallingEdge => vec![since("since_fall", &falls), was_on()],
+            Self::RestBefore => {
+                let update = format!("if {rises} {{ since_fall }} else {{ rest }}");
+                let rest = state("rest", long_ago, update);
+                vec![rest, since("since_fall", &falls), was_on()]
+            }
+            Self::PulseLength => {
+                let update = format!(
+                    "if {rises} {{ period }} else {{ if u > {on:?} {{ length + period }} else {{ length }} }}"
+                );
+                vec![state("length", 0.0, update), was_on()]
+            }
+            Self::PulseNumber => {
+                let update = format!("if {rises} {{ number + 1.0 }} else {{ number }}");
+                vec![state("number", 0.0, update), was_on()]
+            }
+            Self::MemoryOfU(t) => vec![fading("u", t)],
+            Self::MemoryOfY(t) => vec![fading("y", t)],
+            Self::MemoryOfRate(t) => {
+                let was = state("was", 0.0, "y".to_owned());
+                vec![fading("abs(y - was) / period", t), was]
+            }
+        }
+    }
+}
+
+/// What terms are screened over: times are multiples of how long the flow takes, all
+/// within records of `longest` seconds.
+pub(super) fn coordinates(
+    time_constant: f64,
+    longest: f64,
+    channels: &[String],
+) -> Vec<Coordinate> {
+    let times = |multiples: &[f64], most: f64| -> Vec<f64> {
+        let all = multiples.iter().map(|m| m * time_constant);
+        all.filter(|t| *t <= most).collect()
+    };
+    // Signals can be remembered for two seconds at 1 kHz.
+    let remembered = (0.25 * longest).min(2.0);
+    let mut all = vec![
+        Coordinate::Y,
+        Coordinate::SinceRisingEdge,
+        Coordinate::SinceFallingEdge,
+        Coordinate::RestBefore,
+        Coordinate::PulseLength,
+        Coordinate::PulseNumber,
+        Coordinate::Time,
+    ];
+    let with = |of: fn(f64) -> Coordinate, times: Vec<f64>| times.into_iter().map(of);
+    all.extend(with(
+        Coordinate::PastY,
+        times(&[2.0, 5.0, 12.0], remembered),
+    ));
+    all.extend(with(Coordinate::MeanY, times(&[10.0], remembered)));
+    all.extend(with(
+        Coordinate::Blowing,
+        times(&[3.0, 8.0, 24.0], remembered),
+    ));
+    let slow = 0.5 * longest;
+    all.extend(with(
+        Coordinate::MemoryOfU,
+        times(&[2.0, 6.0, 20.0, 60.0], slow),
+    ));
+    all.extend(with(Coordinate::MemoryOfY, times(&[3.0, 10.0, 40.0], slow)));
+    all.extend(with(
+        Coordinate::MemoryOfRate,
+        times(&[2.0, 8.0, 30.0], slow),
+    ));
+    all.extend(channels.iter().cloned().map(Coordinate::Channel));
+    all
+}

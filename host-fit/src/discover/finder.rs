@@ -1,0 +1,423 @@
+//! From screened curves to a term, and from its curve to a formula.
+
+use super::formula::FORMS;
+use super::outcome::{Alike, CurvePoint, Smallest, coordinate_words};
+use super::place::Entry;
+use super::screening::{Screened, reference, screened};
+use super::term::{Shape, Term};
+use super::{Options, RULES};
+use crate::fit::{Fit, FitOptions, fit};
+use crate::model::Model;
+use crate::terms::{HeldOut, Hypothesis, Judged, Screen, Search, Units, p_value};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::atomic::Ordering;
+
+/// A term in the model that it was found for.
+#[derive(Clone)]
+pub(super) struct Found {
+    /// As it is handed over: a formula, or the curve.
+    pub(super) term: Term,
+    /// Its curve, as fitted.
+    curve: Term,
+    /// Standard errors of the curve's values.
+    errors: Vec<f64>,
+    /// The model with it.
+    pub(super) with: Hypothesis,
+    /// The same base without it, refitted.
+    without: Judged,
+    pub(super) p: f64,
+    /// Share of the excess that the curve takes …
+    pub(super) taken: f64,
+    /// … and that the formula does.
+    pub(super) formula_taken: f64,
+    pub(super) resembles: Vec<String>,
+    pub(super) alike: Vec<Alike>,
+}
+
+impl Found {
+    /// The curve with its band, in the user's units.
+    pub(super) fn curve(&self, units: &Units) -> Vec<CurvePoint> {
+        let outer = self.curve.out(units);
+        let scale = outer.entry.scale(units);
+        let Shape::Points { x, g, .. } = &outer.shape else {
+            return Vec::new();
+        };
+        let points = x.iter().zip(g).zip(&self.errors);
+        points
+            .map(|((x, g), error)| {
+                let half = 1.96 * error * scale;
+                CurvePoint {
+                    x: *x,
+                    low: g - half,
+                    value: *g,
+                    high: g + half,
+                }
+            })
+            .collect()
+    }
+}
+
+/// What a round found, and what it looked at.
+pub(super) struct Round {
+    pub(super) found: Option<Found>,
+    pub(super) looked_at: usize,
+    pub(super) smallest: BTreeMap<String, Smallest>,
+}
+
+/// ln of the held-out error, and the price of the model's parameters.
+pub(super) fn size(hypothesis: &Hypothesis) -> f64 {
+    sized(hypothesis.judged.rmse(), hypothesis.judged.model())
+}
+
+fn sized(rmse: f64, model: &Model) -> f64 {
+    rmse.ln() + crate::terms::RULES.price * model.coordinates().len() as f64
+}
+
+/// The search for terms and what it works on.
+pub(super) struct Finder<'a> {
+    pub(super) search: &'a Search<'a>,
+    pub(super) units: &'a Units,
+    pub(super) options: &'a Options,
+}
+
+impl Finder<'_> {
+    fn interrupted(&self) -> bool {
+        self.search.interrupt.load(Ordering::Relaxed)
+    }
+
+    /// The best term for any of the `contexts`, if it does better than `base` does.
+    pub(super) fn next(&self, contexts: &[Hypothesis], base: &Hypothesis, number: usize) -> Round {
+        let progress = self.search.progress;
+        progress(&format!("term {number}: screening curves"));
+        let mut pool: Vec<(usize, Screened)> = Vec::new();
+        let mut smallest = BTreeMap::new();
+        for (index, context) in contexts.iter().enumerate() {
+            let curves = screened(self.search, context.judged.model(), number);
+            if index == 0 {
+                smallest = self.smallest(&curves);
+            }
+            pool.extend(curves.into_iter().map(|curve| (index, curve)));
+        }
+        let looked_at = pool.len();
+        let promised = |(index, curve): &(usize, Screened)| size(&contexts[*index]) + curve.score;
+        pool.sort_by(|a, b| promised(a).total_cmp(&promised(b)));
+        let pool = diverse(pool, RULES.tried, |(_, curve)| &curve.term);
+        progress(&format!("term {number}: refitting {} curves", pool.len()));
+        let tried: Vec<(Term, Fit)> = pool
+            .into_par_iter()
+            .filter_map(|(index, curve)| {
+                let model = contexts[index].judged.model();
+                let brief = self.fitted(model, &curve.term, crate::terms::RULES.brief)?;
+                Some((curve.term, brief))
+            })
+            .collect();
+        let mut finished = self.finished(tried);
+        let by_size =
+            |a: &(Term, Hypothesis), b: &(Term, Hypothesis)| size(&a.1).total_cmp(&size(&b.1));
+        finished.sort_by(by_size);
+        progress(&format!("term {number}: the flow's lags beside it"));
+        let leading = finished.iter().take(RULES.settled).cloned();
+        let settled: Vec<(Term, Hypothesis)> = leading
+            .map(|(term, hypothesis)| {
+                let best = self.search.run(Hypothesis::new(hypothesis.judged)).best;
+                (term, best)
+            })
+            .collect();
+        finished.extend(settled);
+        let best = finished.into_iter().min_by(by_size);
+        let found = best.and_then(|best| self.judged(best, base, looked_at, number));
+        Round {
+            found,
+            looked_at,
+            smallest,
+        }
+    }
+
+    /// How large a term would have to be at each place, in the user's units.
+    fn smallest(&self, curves: &[Screened]) -> BTreeMap<String, Smallest> {
+        let mut all = BTreeMap::new();
+        for entry in [Entry::Jet, Entry::Delay, Entry::Level, Entry::Reading] {
+            let own = curves.iter().filter(|curve| curve.term.entry == entry);
+            let mut sizes: Vec<f64> = own.map(|curve| curve.smallest).collect();
+            sizes.sort_by(f64::total_cmp);
+            let Some(least) = sizes.first() else { continue };
+            let scale = entry.scale(self.units);
+            let name = format!("{:?}", entry.place()).to_lowercase();
+            let smallest = Smallest {
+                from: least * scale,
+                to: sizes[sizes.len() / 2] * scale,
+                unit: entry.unit().symbol(),
+            };
+            all.insert(name, smallest);
+        }
+        all
+    }
+
+    /// A model with the term, fitted so many steps; from 0 where the promised values
+    /// are too bold for a free run.
+    fn fitted(&self, model: &Model, term: &Term, iterations: usize) -> Option<Fit> {
+        if self.interrupted() {
+            return None;
+        }
+        let judge = self.search.judge;
+        let learning = judge.learning(0);
+        let reference = reference(&term.coordinate, &learning);
+        let from = |term: &Term| {
+            let with = term.added_to(model, reference)?;
+            let options = FitOptions {
+                iterations,
+                ..judge.options_for(&with)
+            };
+            fit(&with, &learning, &options).ok()
+        };
+        let nothing = vec![0.0; term.values().len()];
+        from(term).or_else(|| from(&term.with_values(&nothing)))
+    }
+
+    /// The best of some brief fits, followed to the end.
+    fn finished(&self, tried: Vec<(Term, Fit)>) -> Vec<(Term, Hypothesis)> {
+        let judge = self.search.judge;
+        let rated = tried.into_par_iter().filter_map(|(term, fit)| {
+            let rmse = judge.held_out(|_| &fit.model).ok()?.rmse();
+            Some((sized(rmse, &fit.model), term, fit))
+        });
+        let mut rated: Vec<(f64, Term, Fit)> = rated.collect();
+        rated.sort_by(|a, b| a.0.total_cmp(&b.0));
+        rated.truncate(RULES.finished);
+        let finished = rated.into_par_iter().filter_map(|(_, term, brief)| {
+            let learning = judge.learning(0);
+            let options = judge.options_for(&brief.model);
+            let fitted = fit(&brief.model, &learning, &options).ok()?;
+            let judged = judge.judged_from(fitted).ok()?;
+            Some((term, Hypothesis::new(judged)))
+        });
+        finished.collect()
+    }
+
+    /// A term with what else it could be, if it does better than the base.
+    fn judged(
+        &self,
+        (term, with): (Term, Hypothesis),
+        base: &Hypothesis,
+        looked_at: usize,
+        number: usize,
+    ) -> Option<Found> {
+        let judge = self.search.judge;
+        let progress = self.search.progress;
+        progress(&format!("term {number}: what else it could be"));
+        let without = judge.refitted(&term.taken_from(with.judged.model())).ok()?;
+        let curves = screened(self.search, without.model(), number);
+        let screen = Screen::new(judge, without.model())?;
+        let others = diverse(curves, RULES.tried, |curve| &curve.term);
+        let rivals: Vec<(Term, Hypothesis)> = {
+            let rivals = others.iter().filter(|curve| {
+                let same = curve.term.coordinate.is_like(&term.coordinate);
+                !(same && curve.term.entry == term.entry)
+            });
+            let brief: Vec<(Term, Fit)> = rivals
+                .collect::<Vec<_>>()
+                .into_par_iter()
+                .filter_map(|curve| {
+                    let steps = crate::terms::RULES.brief;
+                    Some((
+                        curve.term.clone(),
+                        self.fitted(without.model(), &curve.term, steps)?,
+                    ))
+                })
+                .collect();
+            self.finished(brief)
+        };
+        // Beside the final base another one may do better.
+        let (mut term, mut with) = (term, with);
+        let mut all = rivals;
+        let better = (0..all.len()).min_by(|a, b| size(&all[*a].1).total_cmp(&size(&all[*b].1)));
+        if let Some(index) = better.filter(|index| size(&all[*index].1) < size(&with)) {
+            let other = all.swap_remove(index);
+            all.push((term, with));
+            (term, with) = other;
+        }
+        let gain = 1.0 - with.judged.rmse() / base.judged.rmse();
+        let p = p_value(&base.judged.held_out, &with.judged.held_out) * looked_at as f64;
+        if gain < RULES.worthwhile
+            || p >= RULES.level
+            || judge.drifts_more(&with.judged, &base.judged)
+        {
+            return None;
+        }
+        let alike = all.iter().filter(|(_, other)| {
+            let (worse, better) = (&other.judged.held_out, &with.judged.held_out);
+            is_as_good(worse, better)
+        });
+        let alike: Vec<Alike> = alike
+            .map(|(other, _)| Alike {
+                place: other.entry.place(),
+                coordinate: coordinate_words(other.entry, other),
+            })
+            .collect();
+        let term = term.in_model(with.judged.model());
+        let errors = errors(&term, &with.judged.fits[0]);
+        let direction = term
+            .added_to(
+                without.model(),
+                reference(&term.coordinate, &judge.learning(0)),
+            )
+            .and_then(|model| screen.tangent(&model, &term.name()))
+            .map(|tangent| tangent.direction);
+        let resembles =
+            direction.map_or_else(Vec::new, |direction| self.resembling(&screen, &direction));
+        let excess = |judged: &Judged| judge.excess(&judged.held_out);
+        let taken = 1.0 - excess(&with.judged) / excess(&without).max(f64::MIN_POSITIVE);
+        Some(Found {
+            curve: term.clone(),
+            errors,
+            term,
+            with,
+            without,
+            p: p.min(1.0),
+            taken,
+            formula_taken: taken,
+            resembles,
+            alike,
+        })
+    }
+
+    /// Effects of the catalogue that change the free run along `direction`.
+    fn resembling(&self, screen: &Screen<'_>, direction: &[f64]) -> Vec<String> {
+        let table = screen.table(&self.search.known, true);
+        let mut names: Vec<String> = Vec::new();
+        for candidate in &table.candidates {
+            let Some(spec) = candidate.term.effect() else {
+                continue;
+            };
+            let forgotten = self.options.without.iter().any(|name| name == spec.name);
+            let alike = screen.likeness(&table, candidate, direction) > RULES.resembles;
+            if alike && !forgotten && !names.iter().any(|name| name == spec.name) {
+                names.push(spec.name.to_owned());
+            }
+        }
+        names
+    }
+
+    /// The terms with formulas where one does as well as the curve, and the model with
+    /// them.
+    pub(super) fn formulas(
+        &self,
+        found: Vec<Found>,
+        mut current: Hypothesis,
+    ) -> (Vec<Found>, Hypothesis) {
+        let mut told = Vec::new();
+        for mut found in found {
+            if let Some((term, judged)) = self.formula(&found, &current) {
+                let excess = |held_out: &HeldOut| self.search.judge.excess(held_out);
+                let without = excess(&found.without.held_out).max(f64::MIN_POSITIVE);
+                // Other terms may have come since: what the formula loses, it loses here.
+                let lost = excess(&judged.held_out) - excess(&current.judged.held_out);
+                found.formula_taken = found.taken - lost / without;
+                found.term = term;
+                current = Hypothesis::new(judged);
+            }
+            told.push(found);
+        }
+        (told, current)
+    }
+
+    fn formula(&self, found: &Found, current: &Hypothesis) -> Option<(Term, Judged)> {
+        let judge = self.search.judge;
+        let model = current.judged.model();
+        let curve = found.curve.in_model(model);
+        let Shape::Points { x, g, pinned } = &curve.shape else {
+            return None;
+        };
+        let typical = {
+            let mut sizes = found.errors.clone();
+            sizes.sort_by(f64::total_cmp);
+            sizes.get(sizes.len() / 2).copied().unwrap_or(1.0).max(1e-9)
+        };
+        let weights: Vec<f64> = found.errors.iter().map(|e| 1.0 / e.max(typical)).collect();
+        let base = curve.taken_from(model);
+        let reference = reference(&curve.coordinate, &judge.learning(0));
+        let range = [*x.first()?, *x.last()?];
+        let forms: Vec<_> = FORMS
+            .iter()
+            .filter(|form| !(pinned.is_some() && form.has_level()))
+            .collect();
+        let fits = forms.into_par_iter().filter_map(|form| {
+            let (parameters, _) = form.nearest(x, g, &weights, pinned.is_some())?;
+            let formula = |fading: Option<f64>| Term {
+                shape: Shape::Formula {
+                    form,
+                    parameters: parameters.clone(),
+                    range,
+                    fading,
+                },
+                ..curve.clone()
+            };
+            let refitted = |term: Term| {
+                let with = term.added_to(&base, reference)?;
+                let judged = judge.refitted(&with).ok()?;
+                Some((term.in_model(judged.model()), judged))
+            };
+            let plain = refitted(formula(None));
+            let faded = curve
+                .coordinate
+                .fading()
+                .and_then(|t| refitted(formula(Some(t))));
+            let least = |judged: &Judged| sized(judged.rmse(), judged.model());
+            match (plain, faded) {
+                (Some(a), Some(b)) if least(&b.1) < least(&a.1) => Some(b),
+                (Some(a), _) => Some(a),
+                (None, b) => b,
+            }
+        });
+        let mut fits: Vec<(Term, Judged)> = fits.collect();
+        fits.retain(|(_, judged)| {
+            let with_curve = &current.judged;
+            judged.rmse() <= (1.0 + RULES.formula) * with_curve.rmse()
+                || p_value(&judged.held_out, &with_curve.held_out) >= RULES.level
+        });
+        fits.into_iter().min_by(|a, b| {
+            sized(a.1.rmse(), a.1.model()).total_cmp(&sized(b.1.rmse(), b.1.model()))
+        })
+    }
+}
+
+/// Whether a model is as good as a better one, for all that the records say.
+fn is_as_good(worse: &HeldOut, better: &HeldOut) -> bool {
+    worse.rmse() <= (1.0 + RULES.alike) * better.rmse() || p_value(worse, better) >= RULES.level
+}
+
+/// The first so many, no more of a kind than rules allow.
+fn diverse<T>(all: Vec<T>, most: usize, term: impl Fn(&T) -> &Term) -> Vec<T> {
+    let mut kept: Vec<T> = Vec::new();
+    for one in all {
+        let own = term(&one);
+        let of_a_kind = kept.iter().filter(|other| {
+            let other = term(other);
+            other.entry == own.entry && other.coordinate.is_like(&own.coordinate)
+        });
+        if kept.len() < most && of_a_kind.count() < RULES.of_a_kind {
+            kept.push(one);
+        }
+    }
+    kept
+}
+
+/// Standard errors of a curve's values, 0 where it is pinned.
+fn errors(term: &Term, fitted: &Fit) -> Vec<f64> {
+    let Shape::Points { g, pinned, .. } = &term.shape else {
+        return Vec::new();
+    };
+    let coordinates = fitted.model.coordinates();
+    let name = term.name();
+    let error = |i: usize| {
+        if Some(i) == *pinned {
+            return 0.0;
+        }
+        let full = format!("{name}.g{i}");
+        let index = coordinates.iter().position(|c| c.name == full);
+        let known = index.and_then(|index| fitted.standard_error(index));
+        known.unwrap_or(f64::INFINITY)
+    };
+    (0..g.len()).map(error).collect()
+}

@@ -1,0 +1,154 @@
+//! The term that is missing where no catalogue has it: where it acts, on what it
+//! depends, its curve, and the shortest formula that does as well.
+//!
+//! Every way to enter the model (jet, delay, flow, sensor) by every coordinate that can
+//! be known there is a curve through points. Screening says to first order what each
+//! takes of the free-run error beside all that the base can do (diagnosis 7); the best
+//! are refitted with everything else, the flow's lags are searched again beside them,
+//! and what is left on held-out records decides. A term has to beat the best base
+//! without it, with all curves that were looked at as alternatives.
+
+mod coordinate;
+mod finder;
+mod formula;
+mod outcome;
+mod place;
+mod rules;
+mod screening;
+mod term;
+
+pub use coordinate::Coordinate;
+pub use outcome::{Alike, CurvePoint, Discovery, FoundTerm, Smallest};
+pub use place::{Entry, Place};
+pub use rules::{RULES, Rules};
+
+use crate::data::Record;
+use crate::diagnose::{DiagnoseError, Rung};
+use crate::model::Model;
+use crate::terms::{Bench, Hypothesis, Known, Search};
+use finder::{Finder, size};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What to look for.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Most terms.
+    pub terms: usize,
+    /// Effects of the catalogue that are to be forgotten: no term is said to resemble them.
+    pub without: Vec<String>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            terms: 2,
+            without: Vec::new(),
+        }
+    }
+}
+
+/// Looks for the terms that `given` lacks on `records`. `progress` is told what is
+/// being tried.
+///
+/// # Errors
+/// [`DiagnoseError`].
+pub fn discover(
+    given: &Model,
+    records: &[Record],
+    options: &Options,
+    interrupt: &AtomicBool,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<Discovery, DiagnoseError> {
+    let bench = Bench::of(given, records).ok_or(DiagnoseError::NothingToLearnFrom)?;
+    let (judge, units) = (&bench.judge, &bench.units);
+    let search = Search {
+        judge,
+        known: Known::of(&judge.learning(0)),
+        effects: false,
+        most_effects: 0,
+        interrupt,
+        progress,
+    };
+    let finder = Finder {
+        search: &search,
+        units,
+        options,
+    };
+    let rung = |hypothesis: &Hypothesis, terms: &[String], step: &str| {
+        let held_out = &hypothesis.judged.held_out;
+        Rung::of(judge, units, held_out, terms, step)
+    };
+    progress("the model as given");
+    let as_given = judge.held_out(|_| &bench.given)?;
+    let mut ladder = vec![Rung::of(judge, units, &as_given, &[], "the model as given")];
+    progress("the base");
+    let root = search.root(&bench.given, bench.mid_run)?;
+    if interrupt.load(Ordering::Relaxed) {
+        return Err(DiagnoseError::Interrupted);
+    }
+    let mut bases = vec![root.clone()];
+    bases.push(search.run(root).best);
+    if let Ok(judged) = judge.refitted(&bench.given) {
+        bases.push(Hypothesis::new(judged));
+    }
+    let leanest = bases[0].clone();
+    let by_size = |a: &Hypothesis, b: &Hypothesis| size(a).total_cmp(&size(b));
+    let base = bases.into_iter().min_by(by_size).unwrap_or(leanest.clone());
+    ladder.push(rung(&base, &[], "the best base without a new term"));
+    let mut current = base.clone();
+    let mut contexts = vec![current.clone()];
+    if size(&leanest) > size(&current) {
+        contexts.push(leanest);
+    }
+    let mut found = Vec::new();
+    let mut smallest = None;
+    let (mut looked_at, mut names) = (0, Vec::new());
+    while found.len() < options.terms && !interrupt.load(Ordering::Relaxed) {
+        let next = finder.next(&contexts, &current, found.len() + 1);
+        looked_at += next.looked_at;
+        smallest.get_or_insert(next.smallest);
+        let Some(term) = next.found else { break };
+        current = term.with.clone();
+        names.push(term.term.name());
+        let step = format!("with {}", term.term.name());
+        ladder.push(rung(&current, &names, &step));
+        contexts = vec![current.clone()];
+        found.push(term);
+        if judge.over_noise(current.judged.rmse()) <= crate::terms::RULES.at_the_floor {
+            break;
+        }
+    }
+    progress("formulas");
+    let (terms, end) = finder.formulas(found, current);
+    if !terms.is_empty() {
+        ladder.push(rung(&end, &names, "with formulas where one does as well"));
+    }
+    let fitted = judge.final_fit(&end.judged);
+    let mut inner = fitted.model.clone();
+    let mut written = Vec::new();
+    for found in terms.iter().rev() {
+        let term = found.term.in_model(&inner);
+        inner = term.taken_from(&inner);
+        written.push(term.out(units));
+    }
+    let mut model = units.model_out(&inner);
+    for term in written.iter().rev() {
+        let reference = screening::reference(&term.coordinate, &judge.learning(0));
+        model = term.added_to(&model, reference).unwrap_or(model);
+    }
+    let terms = terms
+        .iter()
+        .zip(written.iter().rev())
+        .map(|(found, written)| outcome::told(found, written, &fitted, units))
+        .collect();
+    Ok(Discovery {
+        terms,
+        ladder,
+        smallest_seen: smallest.unwrap_or_default(),
+        held_out_by: judge.held_out_by,
+        noise_source: judge.noise_source,
+        noise_estimate: judge.noise_rmse() * units.y,
+        looked_at,
+        model,
+    })
+}

@@ -1,0 +1,191 @@
+//! What a discovery hands over.
+
+use super::finder::Found;
+use super::place::{Entry, Place};
+use super::term::{Shape, Term};
+use crate::diagnose::{ParameterEstimate, Rung};
+use crate::fit::Fit;
+use crate::model::Model;
+use crate::residual::NoiseSource;
+use crate::terms::{HeldOutBy, Units};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A point of a curve with its 95 % band, in the user's units.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CurvePoint {
+    /// The coordinate.
+    pub x: f64,
+    /// Lower end of the band.
+    pub low: f64,
+    /// g there.
+    pub value: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// A term that the records cannot tell from another.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Alike {
+    /// Where it acts.
+    pub place: Place,
+    /// On what it depends.
+    pub coordinate: String,
+}
+
+/// How large a term would have to be to be seen at a place: rms of its values, from the
+/// easiest coordinate to the hardest.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Smallest {
+    /// Depending on the coordinate that shows best.
+    pub from: f64,
+    /// Depending on the one that shows worst of the better half.
+    pub to: f64,
+    /// The unit.
+    pub unit: &'static str,
+}
+
+/// A term that was found. Serialises to an entry of `terms` of `discover --json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct FoundTerm {
+    /// The name of its effect.
+    pub effect: String,
+    /// Where it acts.
+    pub place: Place,
+    /// What it changes there, in words.
+    pub changes: &'static str,
+    /// On what it depends.
+    pub coordinate: String,
+    /// Unit of the coordinate.
+    pub coordinate_unit: &'static str,
+    /// What it takes of the excess of the held-out error, as a curve, %.
+    pub excess_taken_percent: f64,
+    /// The same as it is handed over.
+    pub formula_taken_percent: f64,
+    /// p-value of its gain, times the number of curves that were looked at.
+    pub p_value: f64,
+    /// The curve with its band.
+    pub curve: Vec<CurvePoint>,
+    /// Unit of the curve.
+    pub unit: &'static str,
+    /// Effects of the catalogue that change the free run alike.
+    pub resembles: Vec<String>,
+    /// The formula of the effect: an expression over its coordinate, or a table where no
+    /// formula does as well.
+    pub formula: String,
+    /// Whether it is a formula rather than a table.
+    pub is_formula: bool,
+    /// Parameters of the formula.
+    pub parameters: BTreeMap<String, ParameterEstimate>,
+    /// What else these records cannot tell from it.
+    pub alike: Vec<Alike>,
+    /// Its effect file.
+    #[serde(skip)]
+    pub file: String,
+}
+
+/// The outcome.
+#[derive(Clone, Debug)]
+pub struct Discovery {
+    /// The terms in the order found.
+    pub terms: Vec<FoundTerm>,
+    /// Held-out errors from the model as given to the last one.
+    pub ladder: Vec<Rung>,
+    /// For each place, how large a term would have to be to be seen.
+    pub smallest_seen: BTreeMap<String, Smallest>,
+    /// How the errors were held out.
+    pub held_out_by: HeldOutBy,
+    /// Where the noise floor comes from.
+    pub noise_source: NoiseSource,
+    /// The noise floor on what was judged, y rms.
+    pub noise_estimate: f64,
+    /// Curves that were looked at.
+    pub looked_at: usize,
+    /// The model with the terms.
+    pub model: Model,
+}
+
+/// A found term as it is told; `written` is it as handed over, in the user's units.
+pub(super) fn told(found: &Found, written: &Term, fitted: &Fit, units: &Units) -> FoundTerm {
+    let entry = written.entry;
+    let curve = found.curve(units);
+    let is_formula = matches!(written.shape, Shape::Formula { .. });
+    let parameters = estimates(&found.term, written, fitted);
+    let name = written.name();
+    let place = entry.place();
+    let share = |share: f64| 100.0 * share;
+    let mut comment = format!(
+        "Found by `host-fit discover`: {} by {}.\nIt takes {:.0} % of the excess error on held-out records; p = {:.1e}.",
+        entry.words(),
+        written.coordinate.words(),
+        share(found.formula_taken),
+        found.p
+    );
+    if !found.resembles.is_empty() {
+        comment += &format!("\nResembles {}.", found.resembles.join(", "));
+    }
+    for other in &found.alike {
+        let place = format!("{:?}", other.place).to_lowercase();
+        comment += &format!(
+            "\nThe records cannot tell it from one at the {place} by {}.",
+            other.coordinate
+        );
+    }
+    FoundTerm {
+        effect: name,
+        place,
+        changes: entry.words(),
+        coordinate: coordinate_words(entry, written),
+        coordinate_unit: written.coordinate.unit().symbol(),
+        excess_taken_percent: share(found.taken),
+        formula_taken_percent: share(found.formula_taken),
+        p_value: found.p,
+        curve,
+        unit: entry.unit().symbol(),
+        resembles: found.resembles.clone(),
+        formula: written.formula(),
+        is_formula,
+        parameters,
+        alike: found.alike.clone(),
+        file: written.file(&comment),
+    }
+}
+
+/// A rate and a sensitivity act in proportion to y as well.
+pub(super) fn coordinate_words(entry: Entry, term: &Term) -> String {
+    let own = term.coordinate.words();
+    match entry {
+        Entry::Rate if own != "y" => format!("{own} × y"),
+        Entry::Sensitivity if own != "reading" => format!("{own} × reading"),
+        _ => own,
+    }
+}
+
+/// Parameters with their intervals in the user's units.
+fn estimates(inner: &Term, outer: &Term, fitted: &Fit) -> BTreeMap<String, ParameterEstimate> {
+    let Ok(definition) = outer.definition() else {
+        return BTreeMap::new();
+    };
+    let inner = inner.in_model(&fitted.model);
+    let coordinates = fitted.model.coordinates();
+    let name = outer.name();
+    let values = inner.values().into_iter().zip(outer.values());
+    let cards = definition.spec().parameters.iter();
+    cards
+        .zip(values)
+        .map(|(card, (inside, outside))| {
+            let full = format!("{name}.{}", card.name);
+            let index = coordinates.iter().position(|c| c.name == full);
+            let error = index.and_then(|index| fitted.standard_error(index));
+            let scale = if inside == 0.0 { 0.0 } else { outside / inside };
+            let half = error.map_or(f64::INFINITY, |error| 1.96 * (error * scale).abs());
+            let estimate = ParameterEstimate {
+                value: outside,
+                unit: card.unit.symbol().to_owned(),
+                low: (outside - half).max(card.low),
+                high: (outside + half).min(card.high),
+            };
+            (card.name.to_owned(), estimate)
+        })
+        .collect()
+}

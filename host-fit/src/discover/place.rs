@@ -1,0 +1,114 @@
+//! Where a term acts, and how it enters there.
+
+use crate::terms::Units;
+use model_core::effect::Unit;
+use serde::Serialize;
+
+/// Where a term acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Place {
+    /// The jet's strength.
+    Jet,
+    /// The way from the jet to the flow.
+    Delay,
+    /// What drives the flow.
+    Flow,
+    /// What the sensor shows.
+    Sensor,
+}
+
+/// How a term enters at its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Entry {
+    /// The jet's strength times 1 + g.
+    Jet,
+    /// The delay plus g, s.
+    Delay,
+    /// The level that the flow tends to plus g, y.
+    Level,
+    /// The rate at which the flow goes back, times 1 + g.
+    Rate,
+    /// The reading plus g, y.
+    Reading,
+    /// The reading times 1 + g.
+    Sensitivity,
+}
+
+impl Entry {
+    /// All of them.
+    pub const ALL: [Self; 6] = [
+        Self::Jet,
+        Self::Delay,
+        Self::Level,
+        Self::Rate,
+        Self::Reading,
+        Self::Sensitivity,
+    ];
+
+    /// Where that is.
+    #[must_use]
+    pub fn place(self) -> Place {
+        match self {
+            Self::Jet => Place::Jet,
+            Self::Delay => Place::Delay,
+            Self::Level | Self::Rate => Place::Flow,
+            Self::Reading | Self::Sensitivity => Place::Sensor,
+        }
+    }
+
+    /// What g is.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Jet => "relative change of the jet's strength",
+            Self::Delay => "change of the delay",
+            Self::Level => "change of the level that the flow tends to",
+            Self::Rate => "relative change of the rate at which the flow goes back",
+            Self::Reading => "change of the reading",
+            Self::Sensitivity => "relative change of the sensor's sensitivity",
+        }
+    }
+
+    /// The unit of g.
+    #[must_use]
+    pub fn unit(self) -> Unit {
+        match self {
+            Self::Jet | Self::Rate | Self::Sensitivity => Unit::None,
+            Self::Delay => Unit::Second,
+            Self::Level | Self::Reading => Unit::Y,
+        }
+    }
+
+    /// What an inner unit of g is in the user's.
+    pub(super) fn scale(self, units: &Units) -> f64 {
+        self.unit().scale(units.y, units.time, units.u)
+    }
+
+    /// Whether the base takes a constant g as well.
+    pub(super) fn has_free_level(self) -> bool {
+        !matches!(self, Self::Level | Self::Reading)
+    }
+
+    /// The place in an effect file.
+    pub(super) fn of_effect(self) -> &'static str {
+        match self {
+            Self::Jet | Self::Delay => "jet",
+            Self::Level | Self::Rate => "flow",
+            Self::Reading | Self::Sensitivity => "sensor",
+        }
+    }
+
+    /// The expression of an effect with this `g`; a delay of the model was made
+    /// shorter by `shift` seconds for it, and becomes `longest` at most.
+    pub(super) fn expression(self, g: &str, shift: f64, longest: f64) -> String {
+        match self {
+            Self::Jet => format!("jet * (1.0 + ({g}))"),
+            Self::Delay => format!("delayed(jet, {shift:?} + ({g}), {longest:?})"),
+            Self::Level => format!("relaxation * ({g})"),
+            Self::Rate => format!("-(relaxation * y) * ({g})"),
+            Self::Reading => format!("reading + ({g})"),
+            Self::Sensitivity => format!("reading * (1.0 + ({g}))"),
+        }
+    }
+}

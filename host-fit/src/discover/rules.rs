@@ -1,0 +1,39 @@
+//! The rules of discovery.
+
+use crate::rules;
+
+rules! {
+    /// When a term that no catalogue has is reported, and how its curve is drawn.
+    pub struct Rules in "discover";
+
+    /// Points of a curve, at most; they lie where the coordinate spends equal times.
+    points: usize = 8, "", "judgement: as many derivatives as one run carries";
+    /// A coordinate with fewer distinct points than this shows no curve.
+    fewest_points: usize = 3, "", "judgement: two points are a line at best";
+    /// Share of the samples beyond the first and the last point.
+    beyond: f64 = 0.01, "share of the samples", "judgement";
+    /// Points are at least this far apart.
+    apart: f64 = 0.02, "share of the coordinate's range", "judgement";
+    /// Curves that are refitted for a few steps per round …
+    tried: usize = 10, "", "judgement";
+    /// … no more of them of one place and one kind of coordinate than this …
+    of_a_kind: usize = 2, "", "judgement: memories of neighbouring lengths promise alike";
+    /// … and how many of them are followed to the end.
+    finished: usize = 4, "", "judgement";
+    /// Of those, for how many the flow's own lags are searched again.
+    settled: usize = 2, "", "judgement: each takes as long as `identify`";
+    /// A term must lower the held-out error of the best base without it by this fraction.
+    worthwhile: f64 = 0.015, "share of the rms error", "as for effects of the catalogue";
+    /// Level of the tests; p-values are multiplied by the number of curves that were looked at.
+    level: f64 = 0.05, "p-value", "convention";
+    /// Held-out errors that differ by less than this are the same for any purpose.
+    alike: f64 = 0.01, "share of the rms error", "judgement: twice what is asked of effects; a curve has more freedom";
+    /// A formula may leave this much more than the curve it stands for.
+    formula: f64 = 0.01, "share of the rms error", "judgement";
+    /// An effect of the catalogue resembles a curve if what both change in the free run correlates so well.
+    resembles: f64 = 0.9, "", "judgement";
+    /// A delay may become this much longer.
+    longest_delay_s: f64 = 0.1, "s at 1 kHz", "judgement: three times the delays of the rigs at hand";
+    /// Largest change that is searched, relative or in units of y.
+    largest: f64 = 5.0, "", "judgement";
+}

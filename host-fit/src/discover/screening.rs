@@ -1,0 +1,203 @@
+//! Which curves are worth a refit: every way to enter a place by every coordinate,
+//! to first order, beside everything that the base can do.
+
+use super::RULES;
+use super::coordinate::{Coordinate, coordinates};
+use super::place::Entry;
+use super::term::{Shape, Term};
+use crate::data::Record;
+use crate::model::Model;
+use crate::terms::{Screen, Search, Tangent};
+use crate::user_effect::Definition;
+use model_core::effects::NUISANCES;
+use rayon::prelude::*;
+
+/// A curve that was screened.
+pub(super) struct Screened {
+    /// With the values that the screening promises.
+    pub(super) term: Term,
+    /// Half the logarithm of what it leaves of the held-out mean square error, and the
+    /// price of its points: below 0 is worth it.
+    pub(super) score: f64,
+    /// Size of a change, rms of its values, that would have been worth it.
+    pub(super) smallest: f64,
+}
+
+/// The command is on above this, inner units.
+const ON: f64 = 0.5;
+/// Samples that show where a coordinate spends its time.
+const SHOWN: usize = 20_000;
+
+/// The values of a coordinate over the records, as a model sees them; `None` if it
+/// cannot be had there.
+fn values_of(coordinate: &Coordinate, model: &Model, records: &[&Record]) -> Option<Vec<Vec<f64>>> {
+    let mut probe = model.clone();
+    // What comes after the probe would be added to it.
+    let after = |name: &str| NUISANCES.iter().any(|spec| spec.name == name);
+    probe.effects.retain(|added| !after(&added.name));
+    let mut text = format!(
+        "name = \"probe-of-a-coordinate\"\nplace = \"sensor\"\nsummary = \"a coordinate\"\nexpression = \"{}\"\n",
+        coordinate.expression()
+    );
+    if let Some(channel) = coordinate.channel() {
+        text += &format!("channel = \"{channel}\"\n");
+    }
+    for state in coordinate.states(ON, 1.0, false) {
+        text += &format!(
+            "[[state]]\nname = \"{}\"\nstart = {:?}\nupdate = \"{}\"\n",
+            state.name, state.start, state.update
+        );
+    }
+    let definition = Definition::from_toml(&text, "a coordinate").ok()?;
+    probe.define(definition).ok()?;
+    probe.add(definition.spec(), &[], reference(coordinate, records));
+    let runs = records.iter().map(|record| probe.free_run(record).ok());
+    runs.collect()
+}
+
+/// The mean of the channel that a coordinate reads.
+pub(super) fn reference(coordinate: &Coordinate, records: &[&Record]) -> Option<f64> {
+    let channel = coordinate.channel()?;
+    let values = || {
+        let series = records.iter().filter_map(|r| r.channels.get(channel));
+        series.flatten()
+    };
+    Some(values().sum::<f64>() / values().count().max(1) as f64)
+}
+
+/// Where a coordinate spends equal times, and which of these places it is at most.
+fn points(mut values: Vec<f64>) -> Option<(Vec<f64>, usize)> {
+    values.retain(|x| x.is_finite());
+    values.sort_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    let at = |share: f64| values[(share * last as f64).round() as usize];
+    let (low, high) = (at(RULES.beyond), at(1.0 - RULES.beyond));
+    let extent = high - low;
+    if extent <= 1e-6 * low.abs().max(high.abs()).max(1e-6) {
+        return None;
+    }
+    let count = RULES.points;
+    let mut x: Vec<f64> = Vec::new();
+    for i in 0..count {
+        let along = i as f64 / (count - 1) as f64;
+        // Half by time spent, half by extent: a rare place may be where it matters.
+        let share = RULES.beyond + along * (1.0 - 2.0 * RULES.beyond);
+        let place = 0.5 * at(share) + 0.5 * (low + along * extent);
+        if x.last()
+            .is_none_or(|last| place - last > RULES.apart * extent)
+        {
+            x.push(place);
+        }
+    }
+    if x.len() < RULES.fewest_points {
+        return None;
+    }
+    let median = at(0.5);
+    let nearest = (0..x.len()).min_by(|a, b| {
+        let from = |i: &usize| (x[*i] - median).abs();
+        from(a).total_cmp(&from(b))
+    })?;
+    Some((x, nearest))
+}
+
+/// Every curve at `model`, the most promising first.
+pub(super) fn screened(search: &Search<'_>, model: &Model, number: usize) -> Vec<Screened> {
+    let judge = search.judge;
+    let Some(screen) = Screen::new(judge, model) else {
+        return Vec::new();
+    };
+    let learning = judge.learning(0);
+    let longest = learning.iter().map(|r| r.len()).max().unwrap_or(0) as f64;
+    let longest = longest * model.sample_period_s;
+    let channels: Vec<String> = learning
+        .first()
+        .map(|record| record.channels.keys().cloned().collect())
+        .unwrap_or_default();
+    let all = coordinates(model.time_constant().clamp(0.005, 0.2), longest, &channels);
+    let each = all.into_par_iter().map(|coordinate| {
+        let Some(series) = values_of(&coordinate, model, &learning) else {
+            return Vec::new();
+        };
+        let screened = |entry: Entry| {
+            let coordinate = match (&coordinate, entry.place()) {
+                // The sensor sees the reading.
+                (Coordinate::Y, super::place::Place::Sensor) => Coordinate::Reading,
+                (other, _) => other.clone(),
+            };
+            curve(
+                &screen, model, entry, coordinate, &series, &learning, number,
+            )
+        };
+        Entry::ALL
+            .into_iter()
+            .filter_map(screened)
+            .collect::<Vec<_>>()
+    });
+    let mut curves: Vec<Screened> = each.flatten().collect();
+    curves.sort_by(|a, b| a.score.total_cmp(&b.score));
+    curves
+}
+
+fn curve(
+    screen: &Screen<'_>,
+    model: &Model,
+    entry: Entry,
+    coordinate: Coordinate,
+    series: &[Vec<f64>],
+    learning: &[&Record],
+    number: usize,
+) -> Option<Screened> {
+    // A jet knows its coordinate only while it blows.
+    let of_jet = entry == Entry::Jet;
+    let pairs = series.iter().zip(learning);
+    let shown: Vec<f64> = pairs
+        .flat_map(|(series, record)| {
+            let pairs = series.iter().zip(&record.u);
+            let kept = pairs.filter(move |(_, u)| !of_jet || **u > ON);
+            kept.map(|(x, _)| *x)
+        })
+        .collect();
+    let stride = shown.len().div_ceil(SHOWN).max(1);
+    let (x, pinned) = points(shown.into_iter().step_by(stride).collect())?;
+    let shift = match entry {
+        Entry::Delay => {
+            let period = model.sample_period_s;
+            let room = model.delay.present(0.5, period).floor();
+            (0.8 * room).floor().clamp(0.0, 20.0) * period
+        }
+        _ => 0.0,
+    };
+    let pinned = entry.has_free_level().then_some(pinned);
+    let mut term = Term {
+        entry,
+        coordinate,
+        shape: Shape::Points {
+            g: vec![0.0; x.len()],
+            x,
+            pinned,
+        },
+        on: ON,
+        shift,
+        time: 1.0,
+        number,
+    };
+    let reference = reference(&term.coordinate, learning);
+    let with = term.added_to(model, reference)?;
+    let Tangent {
+        coefficients,
+        learned,
+        held_out,
+        ..
+    } = screen.tangent(&with, &term.name())?;
+    let cost = coefficients.len() as f64;
+    let size = (coefficients.iter().map(|c| c * c).sum::<f64>() / cost).sqrt();
+    // What would have been worth it takes so much of the error.
+    let wanted = 1.0 - (1.0 - RULES.worthwhile).powi(2);
+    let smallest = size * (wanted / learned.max(1e-12)).sqrt();
+    term = term.with_values(&coefficients);
+    Some(Screened {
+        score: 0.5 * (1.0 - held_out).max(1e-6).ln() + crate::terms::RULES.price * cost,
+        smallest,
+        term,
+    })
+}

@@ -1,0 +1,292 @@
+//! A term as an effect file: a curve through points, or a formula.
+
+use super::RULES;
+use super::coordinate::{Coordinate, FADING};
+use super::formula::Form;
+use super::place::Entry;
+use crate::model::Model;
+use crate::terms::Units;
+use crate::user_effect::{Definition, DefinitionError};
+use std::fmt::Write as _;
+
+/// How g depends on its coordinate.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Shape {
+    /// Straight lines between points. Where the base takes a constant g as well, one
+    /// value is kept at 0.
+    Points {
+        x: Vec<f64>,
+        g: Vec<f64>,
+        pinned: Option<usize>,
+    },
+    /// A formula with its parameters.
+    Formula {
+        form: &'static Form,
+        parameters: Vec<f64>,
+        /// Extent of the coordinate.
+        range: [f64; 2],
+        /// The fading time, where it is fitted.
+        fading: Option<f64>,
+    },
+}
+
+/// A term that no catalogue has.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Term {
+    pub(super) entry: Entry,
+    pub(super) coordinate: Coordinate,
+    pub(super) shape: Shape,
+    /// The command is on above this.
+    pub(super) on: f64,
+    /// By how much the model's own delay is shorter, s: room for a delay that shrinks.
+    pub(super) shift: f64,
+    /// Size of a time, s.
+    pub(super) time: f64,
+    /// Which term of its kind it is.
+    pub(super) number: usize,
+}
+
+/// A parameter of an effect file, and what it is scaled with.
+struct Parameter {
+    name: String,
+    value: f64,
+    unit: &'static str,
+    low: f64,
+    high: f64,
+}
+
+impl Term {
+    /// The name of its effect.
+    pub(super) fn name(&self) -> String {
+        let entry = match self.entry {
+            Entry::Jet => "jet",
+            Entry::Delay => "delay",
+            Entry::Level => "level",
+            Entry::Rate => "rate",
+            Entry::Reading => "reading",
+            Entry::Sensitivity => "sensitivity",
+        };
+        let number = match self.number {
+            0 | 1 => String::new(),
+            number => format!("-{number}"),
+        };
+        let mut slug = self.coordinate.slug();
+        slug.truncate(20);
+        format!("{entry}-by-{}{number}", slug.trim_end_matches('-'))
+    }
+
+    /// The same in the user's units.
+    pub(super) fn out(&self, units: &Units) -> Self {
+        let (of_x, of_g) = (self.coordinate.scale(units), self.entry.scale(units));
+        let scaled = |values: &[f64], scale: f64| values.iter().map(|v| v * scale).collect();
+        let shape = match &self.shape {
+            Shape::Points { x, g, pinned } => Shape::Points {
+                x: scaled(x, of_x),
+                g: scaled(g, of_g),
+                pinned: *pinned,
+            },
+            Shape::Formula {
+                form,
+                parameters,
+                range,
+                fading,
+            } => Shape::Formula {
+                form,
+                parameters: form.scaled(parameters, of_x, of_g),
+                range: range.map(|x| x * of_x),
+                fading: fading.map(|time| time * units.time),
+            },
+        };
+        Self {
+            shape,
+            coordinate: self.coordinate.out(units),
+            on: self.on * units.u,
+            shift: self.shift * units.time,
+            time: self.time * units.time,
+            ..self.clone()
+        }
+    }
+
+    /// g as an expression.
+    pub(super) fn formula(&self) -> String {
+        let x = self.coordinate.expression();
+        match &self.shape {
+            Shape::Formula { form, .. } => form.expression.replace("{x}", &x),
+            Shape::Points { x: at, pinned, .. } => {
+                let points = at.iter().enumerate().map(|(i, at)| {
+                    let value = if *pinned == Some(i) {
+                        "0.0".to_owned()
+                    } else {
+                        format!("g{i}")
+                    };
+                    format!("{at:?}, {value}")
+                });
+                let points: Vec<String> = points.collect();
+                format!("table({x}, {})", points.join(", "))
+            }
+        }
+    }
+
+    fn parameters(&self) -> Vec<Parameter> {
+        let of_g = self.entry.unit().symbol();
+        match &self.shape {
+            Shape::Points { g, pinned, .. } => {
+                let size = match self.entry {
+                    Entry::Delay => RULES.longest_delay_s * self.time,
+                    _ => RULES.largest * g.iter().fold(1.0, |m: f64, g| m.max(g.abs())),
+                };
+                let free = (0..g.len()).filter(|i| Some(*i) != *pinned);
+                let all = free.map(|i| Parameter {
+                    name: format!("g{i}"),
+                    value: g[i].clamp(-size, size),
+                    unit: of_g,
+                    low: -size,
+                    high: size,
+                });
+                all.collect()
+            }
+            Shape::Formula {
+                form,
+                parameters,
+                range,
+                fading,
+            } => {
+                let cards = form.parameters.iter().zip(parameters);
+                let own = cards.map(|(card, value)| {
+                    let [low, high] = card.range(*value, *range);
+                    Parameter {
+                        name: card.name.to_owned(),
+                        value: value.clamp(low, high),
+                        unit: card.unit(of_g, self.coordinate.unit().symbol()),
+                        low,
+                        high,
+                    }
+                });
+                let fading = fading.map(|time| Parameter {
+                    name: FADING.to_owned(),
+                    value: time,
+                    unit: "s",
+                    low: 0.1 * time,
+                    high: 10.0 * time,
+                });
+                own.chain(fading).collect()
+            }
+        }
+    }
+
+    /// Values of its effect's parameters.
+    pub(super) fn values(&self) -> Vec<f64> {
+        self.parameters().iter().map(|p| p.value).collect()
+    }
+
+    /// The same with other values.
+    pub(super) fn with_values(&self, values: &[f64]) -> Self {
+        let mut other = self.clone();
+        match &mut other.shape {
+            Shape::Points { g, pinned, .. } => {
+                let free = g
+                    .iter_mut()
+                    .enumerate()
+                    .filter(|(i, _)| Some(*i) != *pinned);
+                for ((_, own), value) in free.zip(values) {
+                    *own = *value;
+                }
+            }
+            Shape::Formula {
+                parameters, fading, ..
+            } => {
+                let count = parameters.len().min(values.len());
+                parameters.copy_from_slice(&values[..count]);
+                if let (Some(own), Some(value)) = (fading.as_mut(), values.get(count)) {
+                    *own = *value;
+                    other.coordinate = other.coordinate.with_fading(*value);
+                }
+            }
+        }
+        other
+    }
+
+    /// Its effect file; every line of `comment` comes first.
+    pub(super) fn file(&self, comment: &str) -> String {
+        let longest = self.shift + RULES.longest_delay_s * self.time;
+        let fitted = matches!(
+            self.shape,
+            Shape::Formula {
+                fading: Some(_),
+                ..
+            }
+        );
+        let mut text = String::new();
+        for line in comment.lines() {
+            let _ = writeln!(text, "# {line}");
+        }
+        let summary = format!(
+            "{} by {}",
+            self.entry.words(),
+            self.coordinate.words().replace(['"', '\\'], "")
+        );
+        let g = self.formula();
+        let expression = self.entry.expression(&g, self.shift, longest);
+        let _ = writeln!(
+            text,
+            "name = \"{}\"\nplace = \"{}\"\nsummary = \"{summary}\"\nsource = \"found by discover\"",
+            self.name(),
+            self.entry.of_effect(),
+        );
+        if let Some(channel) = self.coordinate.channel() {
+            let _ = writeln!(text, "channel = \"{channel}\"");
+        }
+        let _ = writeln!(text, "expression = \"{expression}\"");
+        for state in self.coordinate.states(self.on, self.time, fitted) {
+            let _ = writeln!(
+                text,
+                "\n[[state]]\nname = \"{}\"\nstart = {:?}\nupdate = \"{}\"",
+                state.name, state.start, state.update
+            );
+        }
+        for p in self.parameters() {
+            let _ = writeln!(
+                text,
+                "\n[[parameter]]\nname = \"{}\"\nunit = \"{}\"\nlow = {:?}\nhigh = {:?}\nstarts = [{:?}]",
+                p.name, p.unit, p.low, p.high, p.value
+            );
+        }
+        text
+    }
+
+    /// Its definition.
+    pub(super) fn definition(&self) -> Result<&'static Definition, DefinitionError> {
+        Definition::from_toml(&self.file(""), &self.name())
+    }
+
+    /// The model with it; `reference` is that of its channel. `None` if the model has
+    /// an effect of its name.
+    pub(super) fn added_to(&self, model: &Model, reference: Option<f64>) -> Option<Model> {
+        let mut model = model.clone();
+        let definition = self.definition().ok()?;
+        if model.effects.iter().any(|e| e.name == self.name()) {
+            return None;
+        }
+        model.define(definition).ok()?;
+        model.delay_later(-self.shift / model.sample_period_s);
+        model.add(definition.spec(), &self.values(), reference);
+        Some(model)
+    }
+
+    /// The model without it.
+    pub(super) fn taken_from(&self, model: &Model) -> Model {
+        let mut model = model.clone();
+        let name = self.name();
+        model.effects.retain(|added| added.name != name);
+        model.definitions.retain(|known| known.spec().name != name);
+        model.delay_later(self.shift / model.sample_period_s);
+        model
+    }
+
+    /// The term as a model has it.
+    pub(super) fn in_model(&self, model: &Model) -> Self {
+        let name = self.name();
+        let own = model.effects.iter().find(|added| added.name == name);
+        own.map_or_else(|| self.clone(), |own| self.with_values(&own.parameters))
+    }
+}

@@ -251,6 +251,44 @@ high = 5.0
 starts = [0.1]
 "#;
 
+    const TABLE: &str = r#"
+name = "own-table"
+place = "sensor"
+summary = "the reading is bent"
+expression = "reading + table(reading, -0.5, low, 0.25, 0.0, 1.0, high)"
+[[parameter]]
+name = "low"
+unit = "y"
+low = -1.0
+high = 1.0
+starts = [0.1]
+[[parameter]]
+name = "high"
+unit = "y"
+low = -1.0
+high = 1.0
+starts = [0.1]
+"#;
+
+    const DRIFT: &str = r#"
+name = "own-drift"
+place = "jet"
+summary = "the jets come later and later"
+expression = "delayed(jet, early + drift * t, 0.08)"
+[[parameter]]
+name = "early"
+unit = "s"
+low = 0.0
+high = 0.1
+starts = [0.01]
+[[parameter]]
+name = "drift"
+unit = "-"
+low = -1.0
+high = 1.0
+starts = [0.1]
+"#;
+
     fn definition(text: &str) -> &'static Definition {
         match Definition::from_toml(text, "own.toml") {
             Ok(definition) => definition,
@@ -329,6 +367,8 @@ starts = [0.1]
             (VALVE, &[0.012, 0.033]),
             (ECHO, &[-0.31, 0.0477]),
             (CUBIC, &[0.8]),
+            (TABLE, &[0.2, -0.1]),
+            (DRIFT, &[0.0123, 0.1007]),
         ] {
             let own = definition(own);
             let run = |values: &[f64]| response(&UserEffect::new(own, values, &setting()));
@@ -415,6 +455,55 @@ update = "reading"
     }
 
     #[test]
+    fn a_table_goes_straight_from_point_to_point_and_stays_level_beyond() {
+        let effect = UserEffect::new(definition(TABLE), &[0.3, -0.6], &setting::<f64>());
+        let mut state = effect.start();
+        let at = Instant {
+            command: 0.0,
+            flow: 0.0,
+            arrived: 0.0,
+            present: 0.0,
+            channels: &[],
+        };
+        for (reading, bend) in [
+            (-2.0, 0.3),
+            (-0.5, 0.3),
+            (-0.125, 0.15),
+            (0.25, 0.0),
+            (0.5, -0.2),
+            (1.0, -0.6),
+            (7.0, -0.6),
+        ] {
+            let seen = effect.sense(&mut state, reading, &at);
+            assert!((seen - reading - bend).abs() < 1e-12, "{reading}: {seen}");
+        }
+    }
+
+    /// A delay that grows by a tenth of the time: what left at t arrives at 1.1 t, up
+    /// to the longest that is remembered.
+    #[test]
+    fn a_delay_that_changes_is_followed_up_to_its_longest() {
+        let effect = UserEffect::new(definition(DRIFT), &[0.01, 0.1], &setting::<f64>());
+        let mut state = effect.start();
+        for k in 0..2000_u32 {
+            let now = f64::from(k) * 0.001;
+            let at = Instant {
+                command: 0.0,
+                flow: 0.0,
+                arrived: 0.0,
+                present: 0.0,
+                channels: &[],
+            };
+            let seen = effect.jet(&mut state, now, &at);
+            let delay = (0.01 + 0.1 * now).min(0.08);
+            assert!(
+                (seen - (now - delay).max(0.0)).abs() < 1e-3,
+                "{now}: {seen}"
+            );
+        }
+    }
+
+    #[test]
     fn equal_definitions_share_their_memory() {
         assert!(std::ptr::eq(definition(PICKUP), definition(PICKUP)));
     }
@@ -439,6 +528,22 @@ update = "reading"
             ("gain + max(reading)", 8, "takes 2 argument(s), here are 1"),
             ("gain + delayed(reading, y)", 25, "the same at every sample"),
             ("gain + delayed(1, 0.1)", 8, "nothing to delay"),
+            (
+                "gain + delayed(u, y, t)",
+                22,
+                "the longest delay is the same",
+            ),
+            ("gain + table(y, 0.0, 1.0)", 8, "at least two points"),
+            (
+                "gain + table(y, 0.0, 1.0, 0.0, 2.0)",
+                27,
+                "each above the one before",
+            ),
+            (
+                "gain + table(y, u, 1.0, 2.0, 2.0)",
+                25,
+                "each above the one before",
+            ),
             ("gain * if u > 0.0 { 1.0 }", 8, "needs an `else`"),
             (
                 "if u { gain } else { 0.0 }",

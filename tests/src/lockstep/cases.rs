@@ -1,10 +1,11 @@
 //! The models that a board runs in lockstep: base, averaged, laws, a user's own
-//! effects, and every effect of the catalogue by itself.
+//! effects, terms that were found, and every effect of the catalogue by itself.
 
 use anyhow::{Context, Result};
 use host_fit::codegen::generate;
 use host_fit::design::{TrackRequest, track};
 use host_fit::model::{Law, Model};
+use host_fit::user_effect::Definition;
 use model_core::effect::{Place, Spec};
 use model_core::effects::{LAWS, NUISANCES, SPECS};
 use std::path::Path;
@@ -82,6 +83,7 @@ pub fn all() -> Result<Vec<Case>> {
         Case::new("law_jet", designed(with("plenum-droop")?)?).short(),
         Case::new("law_sensor", designed(with("hot-film-lag")?)?).short(),
         Case::new("own_effects", read(bundled!("own"), "own.toml")?).short(),
+        Case::new("found_terms", with_found(&base)?).short(),
     ];
     for spec in known() {
         let name = format!("effect_{}", spec.name.replace('-', "_"));
@@ -114,6 +116,22 @@ fn with_effect(base: &Model, spec: &'static Spec) -> Model {
     let reference = spec.channel.map(|_| 10.0);
     model.add(spec, &values, reference);
     model
+}
+
+/// `base` with terms as `discover` writes them: a table, and a delay that changes.
+fn with_found(base: &Model) -> Result<Model> {
+    let mut model = slightly_negative(base);
+    for text in [
+        include_str!("../../../docs/effects/tiring-jets.toml"),
+        include_str!("../../../docs/effects/drifting-delay.toml"),
+    ] {
+        let definition = Definition::from_toml(text, "a found term")?;
+        model.define(definition)?;
+        let starts = definition.spec().parameters.iter();
+        let values: Vec<f64> = starts.flat_map(|p| p.starts.first().copied()).collect();
+        model.add(definition.spec(), &values, None);
+    }
+    Ok(model)
 }
 
 fn slightly_negative(base: &Model) -> Model {

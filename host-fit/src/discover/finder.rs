@@ -143,7 +143,7 @@ impl Finder<'_> {
             sizes.sort_by(f64::total_cmp);
             let Some(least) = sizes.first() else { continue };
             let scale = entry.scale(self.units);
-            let name = format!("{:?}", entry.place()).to_lowercase();
+            let name = entry.place().word().to_owned();
             let smallest = Smallest {
                 from: least * scale,
                 to: sizes[sizes.len() / 2] * scale,

@@ -27,6 +27,7 @@ use crate::diagnose::{DiagnoseError, Rung};
 use crate::model::Model;
 use crate::terms::{Bench, Hypothesis, Known, Search};
 use finder::{Finder, size};
+use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What to look for.
@@ -45,6 +46,40 @@ impl Default for Options {
             without: Vec::new(),
         }
     }
+}
+
+/// What a first look promises, to first order.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Glance {
+    /// Where a term would act.
+    pub place: Place,
+    /// On what it would depend.
+    pub coordinate: String,
+    /// What it would take of the held-out error energy, %.
+    pub error_taken_percent: f64,
+}
+
+/// The curve that promises most beside `model` as it is, without refitting any: what
+/// [`discover`] would try first. `None` if nothing promises to be worth it.
+#[must_use]
+pub fn glance(model: &Model, records: &[Record], interrupt: &AtomicBool) -> Option<Glance> {
+    let bench = Bench::of(model, records)?;
+    let search = Search {
+        judge: &bench.judge,
+        known: Known::of(&bench.judge.learning(0)),
+        effects: false,
+        most_effects: 0,
+        interrupt,
+        progress: &|_| {},
+    };
+    let first = screening::screened(&search, &bench.given, 1)
+        .into_iter()
+        .next()?;
+    (first.score < 0.0).then(|| Glance {
+        place: first.term.entry.place(),
+        coordinate: outcome::coordinate_words(first.term.entry, &first.term),
+        error_taken_percent: 100.0 * first.held_out,
+    })
 }
 
 /// Looks for the terms that `given` lacks on `records`. `progress` is told what is

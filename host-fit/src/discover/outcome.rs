@@ -125,7 +125,7 @@ pub(super) fn told(found: &Found, written: &Term, fitted: &Fit, units: &Units) -
         comment += &format!("\nResembles {}.", found.resembles.join(", "));
     }
     for other in &found.alike {
-        let place = format!("{:?}", other.place).to_lowercase();
+        let place = other.place.word();
         comment += &format!(
             "\nThe records cannot tell it from one at the {place} by {}.",
             other.coordinate

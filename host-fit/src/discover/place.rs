@@ -18,6 +18,19 @@ pub enum Place {
     Sensor,
 }
 
+impl Place {
+    /// As documents name it.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Jet => "jet",
+            Self::Delay => "delay",
+            Self::Flow => "flow",
+            Self::Sensor => "sensor",
+        }
+    }
+}
+
 /// How a term enters at its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Entry {
@@ -27,7 +40,7 @@ pub enum Entry {
     Delay,
     /// The level that the flow tends to plus g, y.
     Level,
-    /// The rate at which the flow goes back, times 1 + g.
+    /// The rate at which the flow goes back without jets, times 1 + g.
     Rate,
     /// The reading plus g, y.
     Reading,
@@ -64,7 +77,7 @@ impl Entry {
             Self::Jet => "relative change of the jet's strength",
             Self::Delay => "change of the delay",
             Self::Level => "change of the level that the flow tends to",
-            Self::Rate => "relative change of the rate at which the flow goes back",
+            Self::Rate => "relative change of the rate at which the flow separates",
             Self::Reading => "change of the reading",
             Self::Sensitivity => "relative change of the sensor's sensitivity",
         }
@@ -100,13 +113,16 @@ impl Entry {
     }
 
     /// The expression of an effect with this `g`; a delay of the model was made
-    /// shorter by `shift` seconds for it, and becomes `longest` at most.
-    pub(super) fn expression(self, g: &str, shift: f64, longest: f64) -> String {
+    /// shorter by `shift` seconds for it, and becomes `longest` at most. A full jet has
+    /// the strength `full`.
+    pub(super) fn expression(self, g: &str, shift: f64, longest: f64, full: f64) -> String {
         match self {
             Self::Jet => format!("jet * (1.0 + ({g}))"),
             Self::Delay => format!("delayed(jet, {shift:?} + ({g}), {longest:?})"),
             Self::Level => format!("relaxation * ({g})"),
-            Self::Rate => format!("-(relaxation * y) * ({g})"),
+            Self::Rate => {
+                format!("-(relaxation * y * max(1.0 - arrived / {full:?}, 0.0)) * ({g})")
+            }
             Self::Reading => format!("reading + ({g})"),
             Self::Sensitivity => format!("reading * (1.0 + ({g}))"),
         }

@@ -19,6 +19,8 @@ pub(super) struct Screened {
     /// Half the logarithm of what it leaves of the held-out mean square error, and the
     /// price of its points: below 0 is worth it.
     pub(super) score: f64,
+    /// Share of the held-out error energy that it takes.
+    pub(super) held_out: f64,
     /// Size of a change, rms of its values, that would have been worth it.
     pub(super) smallest: f64,
 }
@@ -197,6 +199,7 @@ fn curve(
     term = term.with_values(&coefficients);
     Some(Screened {
         score: 0.5 * (1.0 - held_out).max(1e-6).ln() + crate::terms::RULES.price * cost,
+        held_out,
         smallest,
         term,
     })

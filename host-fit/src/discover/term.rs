@@ -226,7 +226,9 @@ impl Term {
             self.coordinate.words().replace(['"', '\\'], "")
         );
         let g = self.formula();
-        let expression = self.entry.expression(&g, self.shift, longest);
+        let expression = self
+            .entry
+            .expression(&g, self.shift, longest, 2.0 * self.on);
         let _ = writeln!(
             text,
             "name = \"{}\"\nplace = \"{}\"\nsummary = \"{summary}\"\nsource = \"found by discover\"",

@@ -8,6 +8,7 @@ use crate::data::DataSet;
 use crate::diagnose::{
     Diagnosis, HeldOutBy, Memory, NotTried, Options, Ranked, Rung, Verdict, diagnose as search,
 };
+use crate::discover::{Glance, glance};
 use crate::indicators::{Scores, score, score_new};
 use crate::model::{Model, Training};
 use crate::power::{Detectable, detectable};
@@ -35,6 +36,8 @@ pub struct Finding {
     pub runs_before: Option<Vec<Vec<f64>>>,
     /// The free run of the final model over each record, y; none if it diverges.
     pub runs: Option<Vec<Vec<f64>>>,
+    /// What a term that no catalogue has would do; looked for where the catalogue explains too little.
+    pub beyond: Option<Glance>,
     /// What of each effect would have been seen, had it been there; said where nothing is missing.
     pub detectable: Vec<Detectable>,
 }
@@ -54,6 +57,7 @@ impl Serialize for Finding {
             #[serde(rename = "where")]
             places: &'a [Where],
             detectable: &'a [Detectable],
+            beyond: Option<&'a Glance>,
             held_out_by: HeldOutBy,
             restarted_s: Option<f64>,
             noise_source: NoiseSource,
@@ -79,6 +83,7 @@ impl Serialize for Finding {
             not_tried: &found.not_tried,
             places: self.failures.as_ref().map_or(&[], |f| &f.by),
             detectable: &self.detectable,
+            beyond: self.beyond.as_ref(),
             held_out_by: found.held_out_by,
             restarted_s: found.restarted_s,
             noise_source: found.noise_source,
@@ -121,7 +126,7 @@ pub fn diagnose(
 ) -> Result<Finding, StepError> {
     check_period(model, set)?;
     let records = model.targets(&set.records);
-    let (diagnosis, failures, detectable) = watched(onlooker, "diagnosis", || {
+    let (diagnosis, failures, detectable, beyond) = watched(onlooker, "diagnosis", || {
         let progress = |what: &str| onlooker.now(what);
         let diagnosis = search(model, &records, options, onlooker.interrupt(), &progress)?;
         let failures = where_it_fails(&diagnosis.model, &records);
@@ -131,7 +136,14 @@ pub fn diagnose(
                 Ok(Vec::new())
             }
         };
-        Ok::<_, StepError>((diagnosis, failures, detectable))
+        let beyond = match diagnosis.verdict {
+            Verdict::PartlyExplained | Verdict::Unexplained => {
+                progress("a first look beyond the catalogue");
+                glance(&diagnosis.model, &records, onlooker.interrupt())
+            }
+            Verdict::NothingMissing | Verdict::EffectMissing => None,
+        };
+        Ok::<_, StepError>((diagnosis, failures, detectable, beyond))
     })?;
     let (failures, unstable) = match failures {
         Ok(failures) => (Some(failures), None),
@@ -148,7 +160,10 @@ pub fn diagnose(
         Ok((scores, runs)) => (scores, Some(runs)),
         Err(_) => (score_new(&diagnosis.model, &records)?.0, None),
     };
-    let (headline, meaning) = verdict::words(&diagnosis);
+    let (headline, mut meaning) = verdict::words(&diagnosis);
+    if let Some(beyond) = &beyond {
+        meaning += &verdict::beyond(beyond);
+    }
     Ok(Finding {
         model: Model {
             training: Training {
@@ -164,6 +179,7 @@ pub fn diagnose(
         scores,
         runs_before,
         runs,
+        beyond,
         detectable,
         diagnosis,
     })

@@ -142,11 +142,10 @@ fn words(discovery: &Discovery) -> (String, String) {
         }
         return ("no term was found".to_owned(), meaning);
     }
-    let place = |term: &FoundTerm| format!("{:?}", term.place).to_lowercase();
     let each = discovery
         .terms
         .iter()
-        .map(|term| format!("at the {} by {}", place(term), term.coordinate));
+        .map(|term| format!("at the {} by {}", term.place.word(), term.coordinate));
     let headline = format!(
         "a term was found {}",
         each.collect::<Vec<_>>().join(", and one ")
@@ -185,7 +184,7 @@ fn words(discovery: &Discovery) -> (String, String) {
         }
         if !term.alike.is_empty() {
             let others = term.alike.iter().map(|other| {
-                let place = format!("{:?}", other.place).to_lowercase();
+                let place = other.place.word();
                 format!("one at the {place} by {}", other.coordinate)
             });
             meaning += &format!(

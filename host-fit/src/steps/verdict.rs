@@ -1,6 +1,7 @@
 //! A diagnosis in plain language.
 
 use crate::diagnose::{Diagnosis, HeldOutBy, Rung, Verdict};
+use crate::discover::Glance;
 use crate::picture::significant;
 use crate::residual::NoiseSource;
 
@@ -38,6 +39,16 @@ pub(super) fn words(diagnosis: &Diagnosis) -> (String, String) {
         ));
     }
     (headline, meaning)
+}
+
+/// What a term beyond the catalogue promises, and how to go on.
+pub(super) fn beyond(glance: &Glance) -> String {
+    format!(
+        " Beyond the catalogue, a term at the {} by {} promises to take {:.0} % of what is left; `host-fit discover` looks for it.",
+        glance.place.word(),
+        glance.coordinate,
+        glance.error_taken_percent
+    )
 }
 
 fn finding(diagnosis: &Diagnosis) -> (String, String) {

@@ -139,6 +139,21 @@ impl Coordinate {
         }
     }
 
+    /// Whether what it remembers is no longer than so long.
+    pub(super) fn fits(&self, longest: f64) -> bool {
+        match self {
+            Self::PastY(t) | Self::MeanY(t) | Self::Blowing(t) => *t <= longest,
+            _ => true,
+        }
+    }
+
+    /// The same with its time multiplied; `None` if it has none.
+    pub(super) fn with_time_times(&self, factor: f64) -> Option<Self> {
+        let mut other = self.clone();
+        *other.time_mut()? *= factor;
+        Some(other)
+    }
+
     /// The fading time, where it can be fitted.
     pub(super) fn fading(&self) -> Option<f64> {
         match self {
@@ -258,6 +273,11 @@ impl Coordinate {
     }
 }
 
+/// Signals can be remembered for so long in records of `longest` seconds, both at 1 kHz.
+pub(super) fn remembered(longest: f64) -> f64 {
+    (0.25 * longest).min(2.0)
+}
+
 /// What terms are screened over: times are multiples of how long the flow takes, all
 /// within records of `longest` seconds.
 pub(super) fn coordinates(
@@ -269,8 +289,7 @@ pub(super) fn coordinates(
         let all = multiples.iter().map(|m| m * time_constant);
         all.filter(|t| *t <= most).collect()
     };
-    // Signals can be remembered for two seconds at 1 kHz.
-    let remembered = (0.25 * longest).min(2.0);
+    let remembered = remembered(longest);
     let mut all = vec![
         Coordinate::Y,
         Coordinate::SinceRisingEdge,

@@ -3,7 +3,7 @@
 use super::formula::FORMS;
 use super::outcome::{Alike, CurvePoint, Smallest, coordinate_words};
 use super::place::Entry;
-use super::screening::{Screened, reference, screened};
+use super::screening::{Context, Screened, reference};
 use super::term::{Shape, Term};
 use super::{Options, RULES};
 use crate::fit::{Fit, FitOptions, fit};
@@ -93,7 +93,9 @@ impl Finder<'_> {
         let mut pool: Vec<(usize, Screened)> = Vec::new();
         let mut smallest = BTreeMap::new();
         for (index, context) in contexts.iter().enumerate() {
-            let curves = screened(self.search, context.judged.model(), number);
+            let model = context.judged.model();
+            let context = Context::new(self.search, model, number);
+            let curves = context.map_or_else(Vec::new, |context| context.all());
             if index == 0 {
                 smallest = self.smallest(&curves);
             }
@@ -106,11 +108,7 @@ impl Finder<'_> {
         progress(&format!("term {number}: refitting {} curves", pool.len()));
         let tried: Vec<(Term, Fit)> = pool
             .into_par_iter()
-            .filter_map(|(index, curve)| {
-                let model = contexts[index].judged.model();
-                let brief = self.fitted(model, &curve.term, crate::terms::RULES.brief)?;
-                Some((curve.term, brief))
-            })
+            .filter_map(|(index, curve)| self.brief_of(contexts[index].judged.model(), curve))
             .collect();
         let mut finished = self.finished(tried);
         let by_size =
@@ -175,6 +173,19 @@ impl Finder<'_> {
         from(term).or_else(|| from(&term.with_values(&nothing)))
     }
 
+    /// A curve beside a model, followed for a few steps.
+    fn brief_of(&self, model: &Model, curve: Screened) -> Option<(Term, Fit)> {
+        let brief = self.fitted(model, &curve.term, crate::terms::RULES.brief)?;
+        Some((curve.term, brief))
+    }
+
+    fn brief(&self, model: &Model, curves: Vec<Screened>) -> Vec<(Term, Fit)> {
+        let curves = curves.into_par_iter();
+        curves
+            .filter_map(|curve| self.brief_of(model, curve))
+            .collect()
+    }
+
     /// The best of some brief fits, followed to the end.
     fn finished(&self, tried: Vec<(Term, Fit)>) -> Vec<(Term, Hypothesis)> {
         let judge = self.search.judge;
@@ -207,30 +218,16 @@ impl Finder<'_> {
         let progress = self.search.progress;
         progress(&format!("term {number}: what else it could be"));
         let without = judge.refitted(&term.taken_from(with.judged.model())).ok()?;
-        let curves = screened(self.search, without.model(), number);
-        let screen = Screen::new(judge, without.model())?;
-        let others = diverse(curves, RULES.tried, |curve| &curve.term);
-        let rivals: Vec<(Term, Hypothesis)> = {
-            let rivals = others.iter().filter(|curve| {
-                let same = curve.term.coordinate.is_like(&term.coordinate);
-                !(same && curve.term.entry == term.entry)
-            });
-            let brief: Vec<(Term, Fit)> = rivals
-                .collect::<Vec<_>>()
-                .into_par_iter()
-                .filter_map(|curve| {
-                    let steps = crate::terms::RULES.brief;
-                    Some((
-                        curve.term.clone(),
-                        self.fitted(without.model(), &curve.term, steps)?,
-                    ))
-                })
-                .collect();
-            self.finished(brief)
-        };
+        let context = Context::new(self.search, without.model(), number)?;
+        let kind = |other: &Term| (other.entry, other.coordinate.slug());
+        let own = kind(&term);
+        let others = context.all().into_iter().filter(|c| kind(&c.term) != own);
+        let others = diverse(others.collect(), RULES.tried, |curve| &curve.term);
+        let near = context.near(&term).into_iter().take(RULES.of_a_kind);
+        let mut all = self.finished(self.brief(without.model(), others));
+        all.extend(self.finished(self.brief(without.model(), near.collect())));
         // Beside the final base another one may do better.
         let (mut term, mut with) = (term, with);
-        let mut all = rivals;
         let better = (0..all.len()).min_by(|a, b| size(&all[*a].1).total_cmp(&size(&all[*b].1)));
         if let Some(index) = better.filter(|index| size(&all[*index].1) < size(&with)) {
             let other = all.swap_remove(index);
@@ -245,27 +242,24 @@ impl Finder<'_> {
         {
             return None;
         }
-        let alike = all.iter().filter(|(_, other)| {
+        let own = kind(&term);
+        let alike = all.iter().filter(|(rival, other)| {
             let (worse, better) = (&other.judged.held_out, &with.judged.held_out);
-            is_as_good(worse, better)
+            kind(rival) != own && is_as_good(worse, better)
         });
-        let alike: Vec<Alike> = alike
+        let mut alike: Vec<Alike> = alike
             .map(|(other, _)| Alike {
                 place: other.entry.place(),
                 coordinate: coordinate_words(other.entry, other),
             })
             .collect();
+        alike.dedup();
         let term = term.in_model(with.judged.model());
         let errors = errors(&term, &with.judged.fits[0]);
-        let direction = term
-            .added_to(
-                without.model(),
-                reference(&term.coordinate, &judge.learning(0)),
-            )
-            .and_then(|model| screen.tangent(&model, &term.name()))
-            .map(|tangent| tangent.direction);
-        let resembles =
-            direction.map_or_else(Vec::new, |direction| self.resembling(&screen, &direction));
+        let direction = context.direction(&term);
+        let resembles = direction.map_or_else(Vec::new, |direction| {
+            self.resembling(context.screen(), &direction)
+        });
         let excess = |judged: &Judged| judge.excess(&judged.held_out);
         let taken = 1.0 - excess(&with.judged) / excess(&without).max(f64::MIN_POSITIVE);
         Some(Found {

@@ -72,9 +72,8 @@ pub fn glance(model: &Model, records: &[Record], interrupt: &AtomicBool) -> Opti
         interrupt,
         progress: &|_| {},
     };
-    let first = screening::screened(&search, &bench.given, 1)
-        .into_iter()
-        .next()?;
+    let context = screening::Context::new(&search, &bench.given, 1)?;
+    let first = context.all().into_iter().next()?;
     (first.score < 0.0).then(|| Glance {
         place: first.term.entry.place(),
         coordinate: outcome::coordinate_words(first.term.entry, &first.term),

@@ -2,8 +2,8 @@
 //! to first order, beside everything that the base can do.
 
 use super::RULES;
-use super::coordinate::{Coordinate, coordinates};
-use super::place::Entry;
+use super::coordinate::{Coordinate, coordinates, remembered};
+use super::place::{Entry, Place};
 use super::term::{Shape, Term};
 use crate::data::Record;
 use crate::model::Model;
@@ -27,6 +27,11 @@ pub(super) struct Screened {
 
 /// The command is on above this, inner units.
 const ON: f64 = 0.5;
+/// Times of coordinates are multiples of the flow's, which is taken within these bounds, s at 1 kHz.
+const FASTEST_S: f64 = 0.005;
+const SLOWEST_S: f64 = 0.2;
+/// A time that was found is looked for again at so many times it.
+const NEARBY: [f64; 6] = [0.5, 0.63, 0.79, 1.26, 1.59, 2.0];
 /// Samples that show where a coordinate spends its time.
 const SHOWN: usize = 20_000;
 
@@ -102,105 +107,137 @@ fn points(mut values: Vec<f64>) -> Option<(Vec<f64>, usize)> {
     Some((x, nearest))
 }
 
-/// Every curve at `model`, the most promising first.
-pub(super) fn screened(search: &Search<'_>, model: &Model, number: usize) -> Vec<Screened> {
-    let judge = search.judge;
-    let Some(screen) = Screen::new(judge, model) else {
-        return Vec::new();
-    };
-    let learning = judge.learning(0);
-    let longest = learning.iter().map(|r| r.len()).max().unwrap_or(0) as f64;
-    let longest = longest * model.sample_period_s;
-    let channels: Vec<String> = learning
-        .first()
-        .map(|record| record.channels.keys().cloned().collect())
-        .unwrap_or_default();
-    let all = coordinates(model.time_constant().clamp(0.005, 0.2), longest, &channels);
-    let each = all.into_par_iter().map(|coordinate| {
-        let Some(series) = values_of(&coordinate, model, &learning) else {
-            return Vec::new();
-        };
-        let screened = |entry: Entry| {
-            let coordinate = match (&coordinate, entry.place()) {
-                // The sensor sees the reading.
-                (Coordinate::Y, super::place::Place::Sensor) => Coordinate::Reading,
-                (other, _) => other.clone(),
-            };
-            curve(
-                &screen, model, entry, coordinate, &series, &learning, number,
-            )
-        };
-        Entry::ALL
-            .into_iter()
-            .filter_map(screened)
-            .collect::<Vec<_>>()
-    });
-    let mut curves: Vec<Screened> = each.flatten().collect();
-    curves.sort_by(|a, b| a.score.total_cmp(&b.score));
-    curves
+/// A model that curves are screened beside.
+pub(super) struct Context<'a> {
+    screen: Screen<'a>,
+    model: &'a Model,
+    learning: Vec<&'a Record>,
+    /// Length of the longest record, s.
+    longest: f64,
+    /// Which term is looked for.
+    number: usize,
 }
 
-fn curve(
-    screen: &Screen<'_>,
-    model: &Model,
-    entry: Entry,
-    coordinate: Coordinate,
-    series: &[Vec<f64>],
-    learning: &[&Record],
-    number: usize,
-) -> Option<Screened> {
-    // A jet knows its coordinate only while it blows.
-    let of_jet = entry == Entry::Jet;
-    let pairs = series.iter().zip(learning);
-    let shown: Vec<f64> = pairs
-        .flat_map(|(series, record)| {
-            let pairs = series.iter().zip(&record.u);
-            let kept = pairs.filter(move |(_, u)| !of_jet || **u > ON);
-            kept.map(|(x, _)| *x)
+impl<'a> Context<'a> {
+    /// `None` if the model diverges.
+    pub(super) fn new(search: &Search<'a>, model: &'a Model, number: usize) -> Option<Self> {
+        let learning = search.judge.learning(0);
+        let longest = learning.iter().map(|r| r.len()).max().unwrap_or(0) as f64;
+        Some(Self {
+            screen: Screen::new(search.judge, model)?,
+            model,
+            learning,
+            longest: longest * model.sample_period_s,
+            number,
         })
-        .collect();
-    let stride = shown.len().div_ceil(SHOWN).max(1);
-    let (x, pinned) = points(shown.into_iter().step_by(stride).collect())?;
-    let shift = match entry {
-        Entry::Delay => {
-            let period = model.sample_period_s;
-            let room = model.delay.present(0.5, period).floor();
-            (0.8 * room).floor().clamp(0.0, 20.0) * period
-        }
-        _ => 0.0,
-    };
-    let pinned = entry.has_free_level().then_some(pinned);
-    let mut term = Term {
-        entry,
-        coordinate,
-        shape: Shape::Points {
-            g: vec![0.0; x.len()],
-            x,
-            pinned,
-        },
-        on: ON,
-        shift,
-        time: 1.0,
-        number,
-    };
-    let reference = reference(&term.coordinate, learning);
-    let with = term.added_to(model, reference)?;
-    let Tangent {
-        coefficients,
-        learned,
-        held_out,
-        ..
-    } = screen.tangent(&with, &term.name())?;
-    let cost = coefficients.len() as f64;
-    let size = (coefficients.iter().map(|c| c * c).sum::<f64>() / cost).sqrt();
-    // What would have been worth it takes so much of the error.
-    let wanted = 1.0 - (1.0 - RULES.worthwhile).powi(2);
-    let smallest = size * (wanted / learned.max(1e-12)).sqrt();
-    term = term.with_values(&coefficients);
-    Some(Screened {
-        score: 0.5 * (1.0 - held_out).max(1e-6).ln() + crate::terms::RULES.price * cost,
-        held_out,
-        smallest,
-        term,
-    })
+    }
+
+    /// Every curve, the most promising first.
+    pub(super) fn all(&self) -> Vec<Screened> {
+        let first = self.learning.first();
+        let channels: Vec<String> = first
+            .map(|record| record.channels.keys().cloned().collect())
+            .unwrap_or_default();
+        let time_constant = self.model.time_constant().clamp(FASTEST_S, SLOWEST_S);
+        let all = coordinates(time_constant, self.longest, &channels);
+        self.curves(all, &Entry::ALL)
+    }
+
+    /// The same term with its time nearby.
+    pub(super) fn near(&self, term: &Term) -> Vec<Screened> {
+        let longest = remembered(self.longest);
+        let other = |factor: &f64| term.coordinate.with_time_times(*factor);
+        let nearby = NEARBY.iter().filter_map(other);
+        let possible = nearby.filter(|other| other.fading().is_some() || other.fits(longest));
+        self.curves(possible.collect(), &[term.entry])
+    }
+
+    /// What a term changes in the free run, to first order.
+    pub(super) fn direction(&self, term: &Term) -> Option<Vec<f64>> {
+        let reference = reference(&term.coordinate, &self.learning);
+        let with = term.added_to(self.model, reference)?;
+        Some(self.screen.tangent(&with, &term.name())?.direction)
+    }
+
+    /// The screening itself.
+    pub(super) fn screen(&self) -> &Screen<'a> {
+        &self.screen
+    }
+
+    fn curves(&self, coordinates: Vec<Coordinate>, entries: &[Entry]) -> Vec<Screened> {
+        let each = coordinates.into_par_iter().map(|coordinate| {
+            let Some(series) = values_of(&coordinate, self.model, &self.learning) else {
+                return Vec::new();
+            };
+            let screened = |entry: &Entry| {
+                let coordinate = match (&coordinate, entry.place()) {
+                    // The sensor sees the reading.
+                    (Coordinate::Y, Place::Sensor) => Coordinate::Reading,
+                    (other, _) => other.clone(),
+                };
+                self.curve(*entry, coordinate, &series)
+            };
+            entries.iter().filter_map(screened).collect::<Vec<_>>()
+        });
+        let mut curves: Vec<Screened> = each.flatten().collect();
+        curves.sort_by(|a, b| a.score.total_cmp(&b.score));
+        curves
+    }
+
+    fn curve(&self, entry: Entry, coordinate: Coordinate, series: &[Vec<f64>]) -> Option<Screened> {
+        // A jet knows its coordinate only while it blows.
+        let of_jet = entry == Entry::Jet;
+        let pairs = series.iter().zip(&self.learning);
+        let shown: Vec<f64> = pairs
+            .flat_map(|(series, record)| {
+                let pairs = series.iter().zip(&record.u);
+                let kept = pairs.filter(move |(_, u)| !of_jet || **u > ON);
+                kept.map(|(x, _)| *x)
+            })
+            .collect();
+        let stride = shown.len().div_ceil(SHOWN).max(1);
+        let (x, pinned) = points(shown.into_iter().step_by(stride).collect())?;
+        let shift = match entry {
+            Entry::Delay => {
+                let period = self.model.sample_period_s;
+                let room = self.model.delay.present(0.5, period).floor();
+                (0.8 * room).floor().clamp(0.0, 20.0) * period
+            }
+            _ => 0.0,
+        };
+        let pinned = entry.has_free_level().then_some(pinned);
+        let mut term = Term {
+            entry,
+            coordinate,
+            shape: Shape::Points {
+                g: vec![0.0; x.len()],
+                x,
+                pinned,
+            },
+            on: ON,
+            shift,
+            time: 1.0,
+            number: self.number,
+        };
+        let reference = reference(&term.coordinate, &self.learning);
+        let with = term.added_to(self.model, reference)?;
+        let Tangent {
+            coefficients,
+            learned,
+            held_out,
+            ..
+        } = self.screen.tangent(&with, &term.name())?;
+        let cost = coefficients.len() as f64;
+        let size = (coefficients.iter().map(|c| c * c).sum::<f64>() / cost).sqrt();
+        // What would have been worth it takes so much of the error.
+        let wanted = 1.0 - (1.0 - RULES.worthwhile).powi(2);
+        let smallest = size * (wanted / learned.max(1e-12)).sqrt();
+        term = term.with_values(&coefficients);
+        Some(Screened {
+            score: 0.5 * (1.0 - held_out).max(1e-6).ln() + crate::terms::RULES.price * cost,
+            held_out,
+            smallest,
+            term,
+        })
+    }
 }

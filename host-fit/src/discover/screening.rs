@@ -79,17 +79,17 @@ fn points(mut values: Vec<f64>) -> Option<(Vec<f64>, usize)> {
     let last = values.len().checked_sub(1)?;
     let at = |share: f64| values[(share * last as f64).round() as usize];
     let (low, high) = (at(RULES.beyond), at(1.0 - RULES.beyond));
-    let extent = high - low;
-    if extent <= 1e-6 * low.abs().max(high.abs()).max(1e-6) {
+    if high - low <= 1e-6 * low.abs().max(high.abs()).max(1e-6) {
         return None;
     }
+    // Rests of a fraction of a second and one of ten: the tail does not set the scale.
+    let middle = at(0.9) - at(0.1);
+    let extent = if middle > 0.0 { middle } else { high - low };
     let count = RULES.points;
     let mut x: Vec<f64> = Vec::new();
     for i in 0..count {
         let along = i as f64 / (count - 1) as f64;
-        // Half by time spent, half by extent: a rare place may be where it matters.
-        let share = RULES.beyond + along * (1.0 - 2.0 * RULES.beyond);
-        let place = 0.5 * at(share) + 0.5 * (low + along * extent);
+        let place = at(RULES.beyond + along * (1.0 - 2.0 * RULES.beyond));
         if x.last()
             .is_none_or(|last| place - last > RULES.apart * extent)
         {

@@ -83,7 +83,7 @@ fn points(mut values: Vec<f64>) -> Option<(Vec<f64>, usize)> {
         return None;
     }
     // Rests of a fraction of a second and one of ten: the tail does not set the scale.
-    let middle = at(0.9) - at(0.1);
+    let middle = at(0.75) - at(0.25);
     let extent = if middle > 0.0 { middle } else { high - low };
     let count = RULES.points;
     let mut x: Vec<f64> = Vec::new();

@@ -11,7 +11,8 @@ use crate::command::{Command, LEAD_SAMPLES};
 use crate::family::{Nuisances, Units};
 use crate::instrument::{Instrument, InstrumentError};
 use crate::plant::{
-    Effect, EffectError, Fault, FreeStream, PlantError, PlantSpec, Rig, SAMPLE_PERIOD_S, ShowsWith,
+    Beyond, Effect, EffectError, Fault, FreeStream, PlantError, PlantSpec, Rig, SAMPLE_PERIOD_S,
+    ShowsWith,
 };
 use crate::stream::{Stream, stream};
 
@@ -91,8 +92,17 @@ impl Session<'_> {
             let measured = self.instrument.measure(&truth, noise.random())?;
             let time = |k: usize| (lead + k) as f64 * SAMPLE_PERIOD_S;
             let channels = stream.map_or_else(BTreeMap::new, |stream| {
-                let u_inf = (0..n).map(|k| stream.velocity(time(k))).collect();
-                BTreeMap::from([("u_inf".to_owned(), u_inf)])
+                let measured = |of: fn(&FreeStream, f64) -> f64| -> Vec<f64> {
+                    (0..n).map(|k| of(&stream, time(k))).collect()
+                };
+                let mut channels =
+                    BTreeMap::from([("u_inf".to_owned(), measured(FreeStream::velocity))]);
+                let mut beyond = self.plant.beyond.iter();
+                if beyond.any(|physics| physics.channel() == Some(Beyond::TEMPERATURE)) {
+                    let temperature = measured(FreeStream::temperature);
+                    channels.insert(Beyond::TEMPERATURE.to_owned(), temperature);
+                }
+                channels
             });
             let scaled = |x: Vec<f64>| -> Vec<f64> { x.iter().map(|y| y * self.units.y).collect() };
             records.push(Record {

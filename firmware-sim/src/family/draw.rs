@@ -10,8 +10,8 @@ use crate::command::Command;
 use crate::instrument::{Instrument, Noise, Unrest};
 use crate::plant::effects::exclude;
 use crate::plant::{
-    Altered, BasePlant, Character, Effect, EffectError, Fault, FlowDelay, FreeStream, PastTerm,
-    Place, PlantSpec, RateLaw, log_uniform,
+    Altered, BasePlant, Beyond, Character, Effect, EffectError, Fault, FlowDelay, FreeStream,
+    PastTerm, Place, PlantSpec, RateLaw, log_uniform,
 };
 use crate::recording::RigError;
 use crate::stream::{Stream, stream};
@@ -19,10 +19,11 @@ use crate::stream::{Stream, stream};
 /// Draws of an effect before the heaviest so far is taken.
 const ATTEMPTS: usize = 12;
 
-/// An effect as it is drawn: of the catalogue, or altered.
+/// An effect as it is drawn: of the catalogue, altered, or beyond the catalogue.
 enum Drawn {
     Effect(Effect),
     Altered(Altered),
+    Beyond(Beyond),
 }
 
 impl Drawn {
@@ -30,14 +31,18 @@ impl Drawn {
         if Altered::NAMES.contains(&name) {
             return Altered::draw(name, base, rng).map(Self::Altered);
         }
+        if Beyond::NAMES.contains(&name) {
+            return Beyond::draw(name, base, rng).map(Self::Beyond);
+        }
         Effect::draw(name, base, rng)
             .map(Self::Effect)
             .map_err(|error| match error {
                 EffectError::UnknownEffect { name, known } => EffectError::UnknownEffect {
                     name,
                     known: format!(
-                        "{known}, {}, {}",
+                        "{known}, {}, {}, {}",
                         Altered::NAMES.join(", "),
+                        Beyond::NAMES.join(", "),
                         Fault::NAMES.join(", ")
                     ),
                 },
@@ -50,6 +55,7 @@ impl Drawn {
         match self {
             Self::Effect(e) => (e.name(), e.resembles(), e.place()),
             Self::Altered(e) => (e.name(), e.resembles(), e.place()),
+            Self::Beyond(e) => (e.name(), e.resembles(), e.place()),
         }
     }
 
@@ -57,6 +63,7 @@ impl Drawn {
         match self {
             Self::Effect(e) => plant.effects.push(e),
             Self::Altered(e) => plant.altered.push(e),
+            Self::Beyond(e) => plant.beyond.push(e),
         }
     }
 }
@@ -110,9 +117,13 @@ impl RigPlan {
         if kinds.effects.iter().any(Effect::needs_levels) {
             self.plant.base = self.plant.base.with_one_time_constant();
         }
-        let wanders = kinds.effects.iter().any(|e| e.channel().is_some());
+        let beyond = kinds.beyond.iter().map(Beyond::channel);
+        let mut channels = kinds.effects.iter().map(Effect::channel).chain(beyond);
+        let wanders = channels.any(|channel| channel.is_some());
         self.free_stream = wanders || rng.random_bool(0.2);
 
+        // What depends on the time or breaks late shows in the whole record only.
+        let late = !kinds.beyond.is_empty();
         let bare = self.plant.clone();
         // Effects are drawn for the friction that the flow reaches, not for what drives it.
         let reached = BasePlant {
@@ -130,7 +141,13 @@ impl RigPlan {
             FreeStream::draw(&mut stream(self.seed, Stream::Tunnel), command.levels.len())
         });
         let standard_error = self.instrument.standard_error();
-        let weight = Weight::new(&bare, &command.levels, tunnel, standard_error)?;
+        let samples = if late {
+            command.levels.len()
+        } else {
+            Weight::SAMPLES
+        };
+        let levels = &command.levels[..samples.min(command.levels.len())];
+        let weight = Weight::new(&bare, levels, tunnel, standard_error)?;
         let mut lightest = f64::INFINITY;
         for name in names {
             let mut best: Option<(f64, PlantSpec)> = None;
@@ -148,6 +165,7 @@ impl RigPlan {
             if let Some((found, alone)) = best {
                 self.plant.effects.extend(alone.effects);
                 self.plant.altered.extend(alone.altered);
+                self.plant.beyond.extend(alone.beyond);
                 lightest = lightest.min(found);
             }
         }

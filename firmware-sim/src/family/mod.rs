@@ -5,6 +5,7 @@
 
 mod draw;
 mod nuisance;
+mod truth;
 mod weight;
 
 use std::fmt::Write as _;
@@ -157,7 +158,7 @@ pub struct RigPlan {
 
 impl RigPlan {
     /// A random rig of a family that hides the named effects: of the catalogue, laws of
-    /// [`Altered`](crate::plant::Altered), or [`Fault`](crate::plant::Fault)s.
+    /// [`Altered`](crate::plant::Altered), physics [`Beyond`](crate::plant::Beyond) it, or [`Fault`](crate::plant::Fault)s.
     ///
     /// Effects are drawn from their usual ranges until they matter, and the flow anew where none does: on a
     /// telegraph they change the readings by four standard errors of the average; by 1.2 that no change of the

@@ -22,9 +22,6 @@ const POSSIBLE: RangeInclusive<f64> = -0.8..=2.8;
 /// How far the flow's constants are moved to see what they do, relative.
 const STEP: f64 = 0.02;
 
-/// Samples that are looked at.
-const SAMPLES: usize = 5000;
-
 /// The memories that the flow is given, alone and times the jet: every 40 ms up to 0.48 s.
 const MEMORIES: usize = 12;
 const BETWEEN_MEMORIES: usize = 40;
@@ -46,6 +43,9 @@ pub(super) struct Weight {
 }
 
 impl Weight {
+    /// Samples that are enough for effects of the catalogue.
+    pub(super) const SAMPLES: usize = 5000;
+
     /// For effects that are added to `bare`.
     pub(super) fn new(
         bare: &PlantSpec,
@@ -54,10 +54,10 @@ impl Weight {
         standard_error: f64,
     ) -> Result<Self, PlantError> {
         let mut weight = Self {
-            levels: levels.iter().copied().take(SAMPLES).collect(),
+            levels: levels.to_vec(),
             stream,
             standard_error,
-            before: vec![0.0; levels.len().min(SAMPLES)],
+            before: vec![0.0; levels.len()],
             constants: Vec::new(),
             memories: Vec::new(),
         };
@@ -184,7 +184,8 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         let command = Command::random("random", &mut rng);
         let bare = PlantSpec::new(BasePlant::draw(&mut rng), &[]);
-        let weight = Weight::new(&bare, &command.levels, None, 0.01).unwrap();
+        let levels = &command.levels[..Weight::SAMPLES];
+        let weight = Weight::new(&bare, levels, None, 0.01).unwrap();
         // A gain of half as much again is loud, and a change of the constants.
         let mut louder = bare.clone();
         louder.base.gain *= 1.5;

@@ -7,7 +7,7 @@ use super::fault::Fault;
 use super::rig::PlantSpec;
 
 impl PlantSpec {
-    /// The tables `[base]`, `[[effect]]` and `[[fault]]`.
+    /// The tables `[base]`, `[[effect]]`, `[[beyond]]` and `[[fault]]`.
     pub fn to_toml(&self) -> String {
         let base = &self.base;
         let mut text = format!(
@@ -59,6 +59,19 @@ impl PlantSpec {
                 let _ = writeln!(text, "resembles = \"{resembles}\"");
             }
             for p in parameters {
+                let _ = writeln!(text, "{} = {} # {}", p.name, p.value, p.unit);
+            }
+        }
+        for physics in &self.beyond {
+            let truth = physics.truth();
+            let _ = writeln!(
+                text,
+                "\n[[beyond]]\nname = \"{}\"\nplace = \"{}\"\ncoordinates = {:?}",
+                physics.name(),
+                truth.port.word(),
+                truth.coordinates
+            );
+            for p in physics.parameters() {
                 let _ = writeln!(text, "{} = {} # {}", p.name, p.value, p.unit);
             }
         }

@@ -194,6 +194,9 @@ impl Flow {
     /// The arriving jet jumps.
     pub(crate) fn jump(&mut self, jet: f64) {
         self.jet = jet;
+        for part in &mut self.parts {
+            part.arrives(jet);
+        }
     }
 }
 

@@ -1,12 +1,16 @@
-//! The free-stream velocity over a record.
+//! What the tunnel does over a record: velocity and temperature of the free stream.
 
-use rand::RngExt;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// Mean free-stream velocity of every record (m/s).
 pub const MEAN_FREE_STREAM: f64 = 10.0;
 
-/// U∞(t): a mean and three slow waves, the same in every repeat of the record.
+/// Mean temperature of the air (°C).
+pub(crate) const MEAN_TEMPERATURE: f64 = 20.0;
+
+/// U∞(t): a mean and three slow waves, the same in every repeat of the record; and the temperature of the air,
+/// which goes its own way.
 ///
 /// The mean over the sampled record is exactly [`MEAN_FREE_STREAM`], so "its mean" is the same number
 /// for one record and for all.
@@ -15,6 +19,8 @@ pub struct FreeStream {
     /// (amplitude in m/s, frequency in Hz, phase in rad)
     waves: [(f64, f64, f64); 3],
     offset: f64,
+    /// (amplitude in K, frequency in Hz, phase in rad)
+    warmth: [(f64, f64, f64); 2],
 }
 
 impl FreeStream {
@@ -30,7 +36,20 @@ impl FreeStream {
                 rng.random_range(0.0..std::f64::consts::TAU),
             );
         }
-        let mut stream = Self { waves, offset: 0.0 };
+        // From numbers of its own, so that streams without a temperature stay what they were.
+        let mut own = ChaCha8Rng::seed_from_u64(waves[0].2.to_bits());
+        let warmth = [(2.5, 0.12, 0.30), (1.5, 0.35, 0.80)].map(|(size, low, high)| {
+            (
+                size * own.random_range(0.6..1.4),
+                own.random_range(low..high),
+                own.random_range(0.0..std::f64::consts::TAU),
+            )
+        });
+        let mut stream = Self {
+            waves,
+            offset: 0.0,
+            warmth,
+        };
         let sum: f64 = (0..samples)
             .map(|k| stream.velocity(k as f64 * super::SAMPLE_PERIOD_S))
             .sum();
@@ -43,6 +62,15 @@ impl FreeStream {
         self.waves.iter().fold(self.offset, |v, (a, f, phase)| {
             v + a * (std::f64::consts::TAU * f * t + phase).sin()
         })
+    }
+
+    /// Temperature of the air at `t` seconds from the record's start (°C).
+    pub fn temperature(&self, t: f64) -> f64 {
+        self.warmth
+            .iter()
+            .fold(MEAN_TEMPERATURE, |v, (a, f, phase)| {
+                v + a * (std::f64::consts::TAU * f * t + phase).sin()
+            })
     }
 
     /// U∞/mean − 1 at `t`.

@@ -5,6 +5,7 @@
 
 pub mod altered;
 mod base;
+pub mod beyond;
 mod character;
 mod describe;
 pub mod effects;
@@ -20,6 +21,7 @@ mod transport;
 pub use altered::Altered;
 pub(crate) use base::log_uniform;
 pub use base::{BasePlant, BasePlantError, FlowDelay, RateLaw};
+pub use beyond::{Beyond, Port, Region, Truth};
 pub use character::{Character, PastTerm};
 pub use effects::{Effect, EffectError, Parameter, ShowsWith};
 pub use fault::Fault;

@@ -13,6 +13,8 @@ use super::free_stream::FreeStream;
 pub enum Place {
     /// The way from the jet's mouth to the sensor.
     Transport,
+    /// The line from the coil to the valve.
+    Line,
     /// The valve's moving part.
     Valve,
     /// What an opening lets through.
@@ -118,6 +120,9 @@ pub(crate) trait FlowPart: Debug + Send + Sync + BoxedFlow {
     fn resistance(&self) -> Resistance {
         Resistance::default()
     }
+
+    /// The arriving jet jumps to `jet`.
+    fn arrives(&mut self, _jet: f64) {}
 
     /// A piece of the arriving jet has passed; the friction is `s` now.
     fn passed(&mut self, _jet: &Piece, _s: f64) {}

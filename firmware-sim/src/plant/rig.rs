@@ -4,6 +4,7 @@ use thiserror::Error;
 
 use super::altered::Altered;
 use super::base::{BasePlant, BasePlantError, FlowDelay};
+use super::beyond::Beyond;
 use super::character::Character;
 use super::effects::{Effect, EffectError};
 use super::fault::Fault;
@@ -38,6 +39,8 @@ pub struct PlantSpec {
     pub effects: Vec<Effect>,
     /// Effects in other laws than the catalogue's.
     pub altered: Vec<Altered>,
+    /// Physics that the catalogue lacks.
+    pub beyond: Vec<Beyond>,
     /// Faults.
     pub faults: Vec<Fault>,
 }
@@ -50,6 +53,7 @@ impl PlantSpec {
             character: Character::FirstOrder,
             effects: effects.to_vec(),
             altered: Vec::new(),
+            beyond: Vec::new(),
             faults: Vec::new(),
         }
     }
@@ -73,7 +77,11 @@ impl PlantSpec {
             .altered
             .iter()
             .map(|e| (e.order(), e.part(surroundings)));
-        let mut all: Vec<_> = effects.chain(altered).collect();
+        let beyond = self
+            .beyond
+            .iter()
+            .map(|e| (e.order(), e.part(surroundings)));
+        let mut all: Vec<_> = effects.chain(altered).chain(beyond).collect();
         all.sort_by_key(|(order, _)| *order);
         all.into_iter().map(|(_, part)| part).collect()
     }
@@ -107,6 +115,9 @@ impl Rig {
         }
         for altered in &spec.altered {
             altered.validate()?;
+        }
+        for beyond in &spec.beyond {
+            beyond.validate()?;
         }
         let surroundings = Surroundings {
             free_stream: free_stream.as_ref(),

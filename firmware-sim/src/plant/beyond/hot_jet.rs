@@ -1,0 +1,92 @@
+//! Blowing heats the valve; a hot valve lets less through and regains its strength over seconds.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::{Hidden, Port, Truth};
+use crate::plant::base::{BasePlant, log_uniform};
+use crate::plant::effects::{Card, Limits, Physics};
+use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
+
+/// time·ḣ = u − h; strength 1 − loss·h²/(h² + knee²).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HotJet {
+    /// What the heat costs at most (-).
+    pub loss: f64,
+    /// Time constant of heating and cooling (s).
+    pub time: f64,
+    /// Heat at which half of it is lost, 1 under blowing for ever (-).
+    pub knee: f64,
+}
+
+impl Physics for HotJet {
+    const NAME: &'static str = "hot-jet";
+    const PLACE: Place = Place::Plenum;
+    const PARAMETERS: &'static [Card<Self>] = &[
+        Card::new("loss", "-", Limits::FINITE, |e| &mut e.loss),
+        Card::new("time", "s", Limits::TIME, |e| &mut e.time),
+        Card::new("knee", "-", Limits::POSITIVE, |e| &mut e.knee),
+    ];
+
+    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
+        Self {
+            loss: rng.random_range(0.35..0.65),
+            time: log_uniform(rng, 0.5, 2.0),
+            knee: rng.random_range(0.3..0.6),
+        }
+    }
+
+    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+        Part::Jet(Box::new(Valve {
+            law: *self,
+            heat: 0.0,
+        }))
+    }
+}
+
+impl Hidden for HotJet {
+    fn truth(&self) -> Truth {
+        Truth::new(Port::Jet, &[&format!("memory of u ({} s)", self.time)])
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Valve {
+    law: HotJet,
+    heat: f64,
+}
+
+impl JetPart for Valve {
+    fn jump(&mut self, _t: f64, _from: f64, to: f64) -> f64 {
+        let square = self.heat * self.heat;
+        to * (1.0 - self.law.loss * square / (square + self.law.knee * self.law.knee))
+    }
+
+    /// Exact for a jet that stays at its mean over the piece.
+    fn advance(&mut self, t: f64, piece: &Piece) -> f64 {
+        let mean = 0.5 * (piece.from + piece.to);
+        self.heat = mean + (self.heat - mean) * (-piece.dt / self.law.time).exp();
+        self.jump(t, piece.from, piece.to)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::beyond::strength::bench::strengths;
+
+    #[test]
+    fn it_weakens_under_blowing_and_recovers_at_rest() {
+        let law = HotJet {
+            loss: 0.4,
+            time: 0.5,
+            knee: 0.5,
+        };
+        let seen = strengths(law.at_rest(), &[0.1, 5.1, 5.6], &[0.101, 5.0, 5.6]);
+        assert!(seen[0] > 0.999, "{seen:?}");
+        assert!((seen[1] - (1.0 - 0.4 / 1.25)).abs() < 1e-3, "{seen:?}");
+        let square = (-2.0_f64).exp();
+        let recovered = 1.0 - 0.4 * square / (square + 0.25);
+        assert!((seen[2] - recovered).abs() < 1e-3, "{seen:?}");
+    }
+}

@@ -1,0 +1,218 @@
+//! Physics that the catalogue lacks: what a search for an unknown term is tried on.
+//!
+//! Each knows where it acts and on what it depends, in the words in which a finding is told. The laws and
+//! their ranges were fixed from what rigs do (pulses of 20–600 ms, flow times of 20–150 ms, friction of order
+//! 1) before any search was run on them.
+
+mod bubble_memory;
+mod convective_line;
+mod drifting_line;
+mod fading_sensitivity;
+mod faster_separation;
+mod hot_jet;
+mod late_slip;
+mod line;
+mod long_rest;
+mod power_law;
+mod pulses;
+mod quadratic_drive;
+mod reluctant_separation;
+mod rest_line;
+mod short_rest;
+mod stall_above;
+mod strength;
+mod swelling_jet;
+mod tiring_jet;
+mod unrest;
+mod warm_gas;
+mod zero_of_rate;
+
+use rand_chacha::ChaCha8Rng;
+
+use super::base::BasePlant;
+use super::effects::{
+    EffectError, Parameter, Physics, ShowsWith, catalogue, parameters, validate, with,
+};
+use super::part::{Part, Place, Surroundings};
+
+/// Where a term acts, as a finding says it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Port {
+    /// The jet's strength.
+    Jet,
+    /// The way from the coil to the flow.
+    Delay,
+    /// What drives the flow.
+    Flow,
+    /// What the sensor shows.
+    Sensor,
+}
+
+impl Port {
+    /// The word of a finding.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Jet => "jet",
+            Self::Delay => "delay",
+            Self::Flow => "flow",
+            Self::Sensor => "sensor",
+        }
+    }
+}
+
+/// Where physics breaks that is as modelled everywhere else: above a value of the coordinate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Region {
+    /// From which value on, in the rig's own units.
+    pub above: f64,
+}
+
+/// Where a term acts and on what it depends.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Truth {
+    /// Where.
+    pub port: Port,
+    /// On what, in the words of a finding: the first is how the rig is built, the others are the same to
+    /// everybody who has only the commands and the readings. A time in brackets is the rig's (s); words
+    /// without one stand for any.
+    pub coordinates: Vec<String>,
+    /// Where it acts alone, if it does.
+    pub region: Option<Region>,
+}
+
+impl Truth {
+    /// A term that acts everywhere.
+    pub fn new(port: Port, coordinates: &[&str]) -> Self {
+        Self {
+            port,
+            coordinates: coordinates.iter().map(|word| (*word).to_owned()).collect(),
+            region: None,
+        }
+    }
+
+    fn above(self, above: f64) -> Self {
+        Self {
+            region: Some(Region { above }),
+            ..self
+        }
+    }
+}
+
+/// What one file of this folder defines beside its physics.
+trait Hidden: Physics {
+    /// What a search should find.
+    fn truth(&self) -> Truth;
+}
+
+macro_rules! beyond {
+    ($($file:ident :: $physics:ident),+ $(,)?) => {
+        catalogue! {
+            /// One physical mechanism that the catalogue lacks, with its parameters.
+            Beyond { $($file :: $physics),+ }
+        }
+
+        impl Beyond {
+            /// The channel of the temperature of the air (°C), beside that of the free stream.
+            pub const TEMPERATURE: &'static str = "temperature";
+
+            /// What a search should find.
+            pub fn truth(&self) -> Truth {
+                match self { $(Self::$physics(physics) => physics.truth(),)+ }
+            }
+        }
+    };
+}
+
+beyond! {
+    tiring_jet::TiringJet,
+    short_rest::ShortRest,
+    swelling_jet::SwellingJet,
+    hot_jet::HotJet,
+    warm_gas::WarmGas,
+    long_rest::LongRest,
+    drifting_line::DriftingLine,
+    rest_line::RestLine,
+    convective_line::ConvectiveLine,
+    quadratic_drive::QuadraticDrive,
+    faster_separation::FasterSeparation,
+    reluctant_separation::ReluctantSeparation,
+    bubble_memory::BubbleMemory,
+    unrest::Unrest,
+    stall_above::StallAbove,
+    power_law::PowerLaw,
+    fading_sensitivity::FadingSensitivity,
+    zero_of_rate::ZeroOfRate,
+    late_slip::LateSlip,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::altered::Altered;
+    use crate::plant::effects::Effect;
+    use crate::plant::{FreeStream, PlantSpec, Rig};
+    use rand::SeedableRng;
+
+    #[test]
+    fn every_physics_draws_valid_values_changes_the_reading_and_has_a_place_and_a_coordinate() {
+        for name in Beyond::NAMES {
+            assert!(!Effect::NAMES.contains(name) && !Altered::NAMES.contains(name));
+            for seed in 0..3 {
+                let mut rng = ChaCha8Rng::seed_from_u64(seed);
+                let base = BasePlant::draw(&mut rng);
+                let physics = Beyond::draw(name, &base, &mut rng).unwrap();
+                physics.validate().unwrap();
+                let truth = physics.truth();
+                assert!(!truth.coordinates.is_empty() && !physics.parameters().is_empty());
+                // Two hertz, and a second of rest before the end.
+                let on = |k: usize| k < 7500 && k % 500 >= 250;
+                let command: Vec<f64> = (0..8500).map(|k| f64::from(u8::from(on(k)))).collect();
+                let stream = FreeStream::draw(&mut rng, command.len());
+                let play = |beyond: Vec<Beyond>| {
+                    let plain = PlantSpec::new(base, &[]);
+                    let spec = PlantSpec { beyond, ..plain };
+                    let rig = Rig::new(&spec, Some(stream.clone()));
+                    rig.unwrap().play(&command)
+                };
+                let (without, with) = (play(Vec::new()), play(vec![physics]));
+                let off = with.iter().zip(&without).map(|(a, b)| (a - b) * (a - b));
+                let rms = (off.sum::<f64>() / 8500.0).sqrt();
+                assert!((0.003..1.0).contains(&rms), "{name}: {rms}, {physics:?}");
+            }
+        }
+    }
+
+    /// Words that [`Truth::coordinates`] may have.
+    #[test]
+    fn coordinates_are_told_in_the_words_of_a_finding() {
+        const WORDS: &[&str] = &[
+            "y",
+            "reading",
+            "past y",
+            "mean y",
+            "since rising edge",
+            "since falling edge",
+            "rest before",
+            "pulse length",
+            "pulse number",
+            "blowing in the last",
+            "memory of u",
+            "memory of y",
+            "memory of rate",
+            "time in record",
+            "u_inf",
+            "temperature",
+        ];
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let base = BasePlant::draw(&mut rng);
+        for name in Beyond::NAMES {
+            let truth = Beyond::draw(name, &base, &mut rng).unwrap().truth();
+            for coordinate in &truth.coordinates {
+                for factor in coordinate.split(" × ") {
+                    let kind = factor.split(" (").next().unwrap_or(factor);
+                    assert!(WORDS.contains(&kind), "{name}: {coordinate}");
+                }
+            }
+        }
+    }
+}

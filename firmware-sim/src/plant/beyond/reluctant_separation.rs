@@ -1,0 +1,98 @@
+//! After a blow the flow is in no hurry to separate.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::pulses::Pulses;
+use super::{Hidden, Port, Truth};
+use crate::plant::base::{BasePlant, log_uniform};
+use crate::plant::effects::{Card, Limits, Physics};
+use crate::plant::part::{FlowPart, Part, Piece, Place, Surroundings};
+
+/// Where no jet arrives, the rate is 1 − reluctance·exp(−t/time) times what it was, t since the jet ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReluctantSeparation {
+    /// What of the rate is missing at first (-).
+    pub reluctance: f64,
+    /// Time constant of its recovery (s).
+    pub time: f64,
+}
+
+impl Physics for ReluctantSeparation {
+    const NAME: &'static str = "reluctant-separation";
+    const PLACE: Place = Place::Flow;
+    const PARAMETERS: &'static [Card<Self>] = &[
+        Card::new("reluctance", "-", Limits::FINITE, |e| &mut e.reluctance),
+        Card::new("time", "s", Limits::TIME, |e| &mut e.time),
+    ];
+
+    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
+        Self {
+            reluctance: rng.random_range(0.5..0.95),
+            time: log_uniform(rng, 0.03, 0.12),
+        }
+    }
+
+    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+        Part::Flow(Box::new(Left {
+            law: *self,
+            time: 0.0,
+            pulses: Pulses::default(),
+        }))
+    }
+}
+
+impl Hidden for ReluctantSeparation {
+    fn truth(&self) -> Truth {
+        Truth::new(Port::Flow, &["since falling edge × y"])
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Left {
+    law: ReluctantSeparation,
+    time: f64,
+    pulses: Pulses,
+}
+
+impl FlowPart for Left {
+    fn drive(&self, s: f64, _z: f64) -> f64 {
+        if self.pulses.is_on() {
+            return 0.0;
+        }
+        let since = self.pulses.since_fall(self.time);
+        self.law.reluctance * (-since / self.law.time).exp() * s
+    }
+
+    fn arrives(&mut self, jet: f64) {
+        self.pulses.see(self.time, jet);
+    }
+
+    fn passed(&mut self, jet: &Piece, _s: f64) {
+        self.time += jet.dt;
+        self.pulses.see(self.time, jet.to);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::flow::bench::{flow, hold};
+
+    /// ṡ = −r·(1 − q·exp(−t/τ))·s: ln(s/s₀) = −r·(t − q·τ·(1 − exp(−t/τ))).
+    #[test]
+    fn the_rate_comes_back_with_time() {
+        let law = ReluctantSeparation {
+            reluctance: 0.8,
+            time: 0.05,
+        };
+        let mut flow = flow([law.at_rest()]);
+        flow.jump(1.0);
+        let s = hold(&mut flow, 1.0, 0.5);
+        flow.jump(0.0);
+        let t = 0.1_f64;
+        let expected = s * (-10.0 * (t - 0.04 * (1.0 - (-t / 0.05).exp()))).exp();
+        // The part's clock stands still within a sub-step.
+        assert!((hold(&mut flow, 0.0, t) - expected).abs() < 1e-3);
+    }
+}

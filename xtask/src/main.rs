@@ -4,11 +4,11 @@ mod bench_law;
 mod bench_search;
 mod bench_step;
 mod budgets;
+mod campaigns;
 mod ci;
 mod elf;
 mod faults;
 mod firmware;
-mod hidden_effects;
 mod identified;
 mod new_effect;
 mod pil;
@@ -32,7 +32,8 @@ const TASKS: &[Task] = &[
     ci::TASK,
     faults::TASK,
     firmware::TASK,
-    hidden_effects::TASK,
+    campaigns::EFFECTS,
+    campaigns::TERMS,
     identified::TASK,
     new_effect::TASK,
     pil::TASK,

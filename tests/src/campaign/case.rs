@@ -26,10 +26,12 @@ pub enum Group {
     Outside,
     /// A rig with one effect, written down in several units.
     Units,
+    /// Physics beyond the catalogue, which a search for unknown terms should find.
+    Beyond,
 }
 
 impl Group {
-    /// Every group, in the order of tables.
+    /// The groups of the diagnosis, in the order of tables.
     pub const ALL: [Self; 6] = [
         Self::Single,
         Self::Altered,
@@ -49,6 +51,7 @@ impl Group {
             Self::Pair => "pair",
             Self::Outside => "outside",
             Self::Units => "units",
+            Self::Beyond => "beyond",
         }
     }
 }
@@ -203,6 +206,27 @@ const UNITS: [Units; 5] = [
 const CAMPAIGN_SEEDS: u64 = 1_000_000;
 const GROUP_SEEDS: u64 = 100_000;
 
+/// Hands every rig of a campaign a seed of its own.
+pub(super) struct Seeds {
+    campaign: u64,
+    used: [u64; 7],
+}
+
+impl Seeds {
+    pub(super) fn of(campaign: u64) -> Self {
+        Self {
+            campaign,
+            used: [0; 7],
+        }
+    }
+
+    pub(super) fn next(&mut self, group: Group) -> u64 {
+        let used = &mut self.used[group as usize];
+        *used += 1;
+        self.campaign * CAMPAIGN_SEEDS + group as u64 * GROUP_SEEDS + *used
+    }
+}
+
 /// One in so many rigs with an effect that shows on off and on is told levels between them nevertheless.
 const GRADED: u32 = 8;
 
@@ -211,12 +235,8 @@ const GRADED: u32 = 8;
 #[must_use]
 pub fn cases(sizes: &Sizes, given: Given, seed: u64) -> Vec<Case> {
     let mut all: Vec<Case> = Vec::new();
-    let mut seeds = [0; 6];
-    let mut next = |group: Group| {
-        let used = &mut seeds[group as usize];
-        *used += 1;
-        seed * CAMPAIGN_SEEDS + group as u64 * GROUP_SEEDS + *used
-    };
+    let mut seeds = Seeds::of(seed);
+    let mut next = |group: Group| seeds.next(group);
     let mut add = |group, family, hidden: &[&str], seed| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x9013e);
         let mut case = Case::new(group, family, hidden, seed);
@@ -283,21 +303,27 @@ pub fn cases(sizes: &Sizes, given: Given, seed: u64) -> Vec<Case> {
         }
     }
     for number in 0..sizes.nulls {
-        let mut case = Case {
+        all.push(Case {
             given,
-            ..Case::new(Group::Nothing, turn(number, 0), &[], next(Group::Nothing))
-        };
-        // In sixty rigs each family meets each noise and each nuisance once.
-        let kinds = NoiseKind::ALL.len() + Nuisance::ALL.len();
-        let kind = (number as usize + number as usize / families) % kinds;
-        match NoiseKind::ALL.get(kind) {
-            Some(noise) => case.noise = *noise,
-            None => case.nuisances = vec![Nuisance::ALL[kind - NoiseKind::ALL.len()]],
-        }
-        all.push(case);
+            ..nothing(number, next(Group::Nothing))
+        });
     }
     all.shuffle(&mut rng);
     all
+}
+
+/// The so-manieth rig that hides nothing: in sixty of them each family meets each noise and each nuisance once.
+pub(super) fn nothing(number: u64, seed: u64) -> Case {
+    let families = Family::ALL.len();
+    let number = number as usize;
+    let mut case = Case::new(Group::Nothing, Family::ALL[number % families], &[], seed);
+    let kinds = NoiseKind::ALL.len() + Nuisance::ALL.len();
+    let kind = (number + number / families) % kinds;
+    match NoiseKind::ALL.get(kind) {
+        Some(noise) => case.noise = *noise,
+        None => case.nuisances = vec![Nuisance::ALL[kind - NoiseKind::ALL.len()]],
+    }
+    case
 }
 
 /// Effects that need levels between off and on are asked for on the plain flow only: on others, what a part

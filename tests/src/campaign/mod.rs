@@ -1,16 +1,22 @@
-//! The hidden-effects campaign: rigs of every family that hide something, the program that is told nothing,
-//! and the count of what it found.
+//! Campaigns: rigs of every family that hide something, the program that is told nothing, and the count of
+//! what it found.
 //!
-//! Each case is a data set in a folder, `host-fit identify`, `host-fit diagnose --json` and the model that it
-//! writes: what a user would do, with what a user would get. One line of JSON a case is kept in a file, so
-//! that a campaign can be stopped, taken up again and run in pieces.
+//! Each case is a data set in a folder, `host-fit identify` and then `host-fit diagnose --json` (hidden
+//! effects) or `host-fit discover --json` (hidden terms) with the model that it writes: what a user would do,
+//! with what a user would get. One line of JSON a case is kept in a file.
 
 mod case;
+mod counts;
+mod ledger;
+mod program;
 mod row;
 mod run;
 mod table;
+pub mod terms;
 
 pub use case::{Case, Given, Group, Sizes, cases};
-pub use row::{Found, Row, Spent};
-pub use run::{Program, run};
+pub use ledger::{Entry, Ledger};
+pub use program::{Program, Spent};
+pub use row::{Found, Row};
+pub use run::run;
 pub use table::table;

@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::case::Group;
+use super::ledger::Entry;
+use super::program::Spent;
 
 /// A parameter of a hidden effect, as it is and as it was found, in the units of the record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -69,20 +71,17 @@ pub struct Row {
     pub diagnose: Spent,
 }
 
-/// How long a run of the program took.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Spent {
-    /// On the clock (s).
-    pub wall_s: f64,
-    /// Of all its threads (s); none where the system does not tell.
-    pub cpu_s: Option<f64>,
-}
-
 /// A model is at the noise floor up to this factor.
 pub(super) const AT_FLOOR: f64 = 1.1;
 
 /// Parameters are right up to this share of themselves.
 const NEAR: f64 = 0.2;
+
+impl Entry for Row {
+    fn key(&self) -> &str {
+        &self.key
+    }
+}
 
 impl Row {
     /// The names that count: without those that are true of the rig though nobody hid them.
@@ -125,7 +124,7 @@ impl Row {
                 .iter()
                 .all(|name| named.contains(&name.as_str())),
             Group::Nothing => named.is_empty(),
-            Group::Outside => named.is_empty() && self.verdict != "nothing-missing",
+            Group::Outside | Group::Beyond => named.is_empty() && self.verdict != "nothing-missing",
         }
     }
 

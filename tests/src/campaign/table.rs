@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use firmware_sim::family::Family;
 
 use super::case::Group;
+use super::counts::{bounded, seconds, share};
 use super::row::{AT_FLOOR, Row};
 
 /// Everything that was counted.
@@ -68,27 +69,11 @@ pub fn table(rows: &[Row]) -> String {
     text
 }
 
-/// "3/4", or nothing of nothing.
-fn share<'a>(rows: &[&'a Row], test: impl Fn(&'a Row) -> bool) -> String {
-    let hits = rows.iter().filter(|row| test(row)).count();
-    format!("{hits}/{}", rows.len())
-}
-
 fn parameters(rows: &[&Row]) -> String {
     let compared: Vec<&Row> = (rows.iter().copied())
         .filter(|row| row.parameters_hit().is_some())
         .collect();
     share(&compared, |row| row.parameters_hit() == Some(true))
-}
-
-/// Median and longest (s).
-fn seconds(rows: &[&Row], of: impl Fn(&Row) -> Option<f64>) -> String {
-    let mut all: Vec<f64> = rows.iter().filter_map(|row| of(row)).collect();
-    all.sort_by(f64::total_cmp);
-    let (Some(median), Some(longest)) = (all.get(all.len() / 2), all.last()) else {
-        return "-".to_owned();
-    };
-    format!("{median:.0} / {longest:.0}")
 }
 
 /// Four cells: wall and processor times of both programs.
@@ -296,27 +281,4 @@ fn totals(rows: &[Row]) -> String {
         let _ = writeln!(text, "- without a diagnosis: {failed} of {}", rows.len());
     }
     text
-}
-
-/// "95 of 100 (95 %, 89–98 %)": the share and Wilson's bounds with 95 % confidence.
-fn bounded(hits: usize, all: usize) -> String {
-    const Z: f64 = 1.959_964;
-    let (k, n) = (hits as f64, all as f64);
-    let share = k / n;
-    let middle = (k + Z * Z / 2.0) / (n + Z * Z);
-    let half = Z * n.sqrt() / (n + Z * Z) * (share * (1.0 - share) + Z * Z / (4.0 * n)).sqrt();
-    let [share, low, high] = [share, middle - half, middle + half].map(|x| 100.0 * x);
-    format!("{hits} of {all} ({share:.1} %, {low:.1}–{high:.1} %)")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Worked out by hand; 0 of n has the upper bound z²/(n + z²).
-    #[test]
-    fn shares_have_wilsons_bounds() {
-        assert_eq!(bounded(95, 100), "95 of 100 (95.0 %, 88.8–97.8 %)");
-        assert_eq!(bounded(0, 100), "0 of 100 (0.0 %, 0.0–3.7 %)");
-    }
 }

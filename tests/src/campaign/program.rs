@@ -1,0 +1,104 @@
+//! The program that a campaign asks, and how long it takes to answer.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// How long a run of the program took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Spent {
+    /// On the clock (s).
+    pub wall_s: f64,
+    /// Of all its threads (s); none where the system does not tell.
+    pub cpu_s: Option<f64>,
+}
+
+/// The program that is asked.
+#[derive(Clone, Debug)]
+pub struct Program {
+    /// The binary `host-fit`.
+    pub path: PathBuf,
+    /// After how long it is stopped.
+    pub limit: Duration,
+    /// Threads that a diagnosis may use; as many as there are cores if 0.
+    pub threads: usize,
+    /// Where the folders of cases that are not as they should be are kept: data set, answer, models and
+    /// documents; nowhere if none.
+    pub keep: Option<PathBuf>,
+}
+
+/// How often a running program is looked at.
+const POLL: Duration = Duration::from_millis(5);
+
+impl Program {
+    /// The binary, as many threads as it wants, stopped after `limit`.
+    #[must_use]
+    pub fn new(path: PathBuf, limit: Duration) -> Self {
+        Self {
+            path,
+            limit,
+            threads: 0,
+            keep: None,
+        }
+    }
+
+    /// Runs a command with `--json`; its document and how long it took.
+    pub(super) fn json(
+        &self,
+        arguments: &[&str],
+        scratch: &Path,
+    ) -> Result<(Value, Spent), String> {
+        let failed = |what: &dyn std::fmt::Display| format!("{}: {what}", arguments[0]);
+        let [out, err] = ["json", "err"].map(|end| scratch.join(format!("{}.{end}", arguments[0])));
+        let file = |path: &Path| fs::File::create(path).map_err(|e| failed(&e));
+        let start = Instant::now();
+        let mut child = Command::new(&self.path)
+            .args(arguments)
+            .arg("--json")
+            .env("RAYON_NUM_THREADS", self.threads.to_string())
+            .stdin(Stdio::null())
+            .stdout(file(&out)?)
+            .stderr(file(&err)?)
+            .spawn()
+            .map_err(|e| failed(&e))?;
+        let mut spent = Spent::default();
+        let status = loop {
+            spent.cpu_s = cpu_seconds(child.id()).or(spent.cpu_s);
+            if let Some(status) = child.try_wait().map_err(|e| failed(&e))? {
+                break status;
+            }
+            if start.elapsed() > self.limit {
+                // Gone already is as good as killed.
+                let _ = child.kill();
+                let _ = child.wait();
+                return Err(failed(&format!("stopped after {} s", self.limit.as_secs())));
+            }
+            std::thread::sleep(POLL);
+        };
+        spent.wall_s = start.elapsed().as_secs_f64();
+        if !status.success() {
+            let said = fs::read_to_string(&err).unwrap_or_default();
+            return Err(failed(&said.trim()));
+        }
+        let text = fs::read_to_string(&out).map_err(|e| failed(&e))?;
+        let document = serde_json::from_str(&text).map_err(|e| failed(&e))?;
+        Ok((document, spent))
+    }
+}
+
+/// Ticks of the processor's clock in Linux's accounts; the same on every machine.
+const TICKS_PER_SECOND: f64 = 100.0;
+
+/// What a process has used of the processor so far, all its threads; none where there is no `/proc`.
+fn cpu_seconds(process: u32) -> Option<f64> {
+    let text = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
+    // The second field, the name, may hold blanks; the times are the 14th and 15th.
+    let (_, fields) = text.rsplit_once(')')?;
+    let mut times = fields.split_whitespace().skip(11);
+    let mut ticks = || times.next()?.parse::<f64>().ok();
+    Some((ticks()? + ticks()?) / TICKS_PER_SECOND)
+}

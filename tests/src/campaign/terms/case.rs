@@ -1,0 +1,120 @@
+//! What is tried: the cases of a campaign, from a seed.
+
+use firmware_sim::family::{Family, NoiseKind};
+use firmware_sim::plant::Beyond;
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::spot::Truth;
+use crate::campaign::case::{Case, Group, Seeds, nothing};
+
+/// How many of each group.
+#[derive(Clone, Copy, Debug)]
+pub struct Sizes {
+    /// Rigs for each physics and family.
+    pub draws: u64,
+    /// Rigs for each effect that is taken out of the catalogue; the families take turns.
+    pub without: u64,
+    /// Rigs with nothing missing, over all families, noises and nuisances.
+    pub nulls: u64,
+}
+
+/// Effects of the catalogue that are a curve over one coordinate, and what a search that has never heard of
+/// them should say. Lags, echoes, friction and hysteresis are none.
+const CURVES: &[(&str, &[(&str, &[&str])])] = &[
+    (
+        "state-dependent-delay",
+        &[("delay", &["mean y (0.25 s)", "memory of y (0.15 s)"])],
+    ),
+    (
+        "plenum-droop",
+        &[("jet", &["memory of u", "blowing in the last"])],
+    ),
+    ("free-stream-variation", &[("jet", &["u_inf"])]),
+    // It adds to the jet while that is there: both are the same time.
+    (
+        "starting-vortex",
+        &[("jet", &["since rising edge", "pulse length"])],
+    ),
+    // There is no jet to be changed when it acts: the flow feels it.
+    ("stopping-vortex", &[("flow", &["since falling edge"])]),
+    ("amplitude-saturation", &[("flow", &["y"])]),
+    ("hot-film-nonlinearity", &[("sensor", &["reading", "y"])]),
+    ("sensor-saturation", &[("sensor", &["reading", "y"])]),
+    ("thermal-drift", &[("sensor", &["time in record"])]),
+];
+
+/// What would be right for an effect that was taken out of the catalogue.
+pub(super) fn of_the_catalogue(name: &str) -> Vec<Truth> {
+    let own = CURVES.iter().find(|(effect, _)| *effect == name);
+    let spots = own.map_or(&[][..], |(_, spots)| spots);
+    let truth = |(place, coordinates): &(&str, &[&str])| Truth {
+        place: (*place).to_owned(),
+        coordinates: coordinates.iter().map(|c| (*c).to_owned()).collect(),
+    };
+    spots.iter().map(truth).collect()
+}
+
+/// The cases of a campaign in an order that mixes them, so that the first of them are a sample of all. Every
+/// rig has a seed of its own, and with it a flow of its own. Half have noise that is white and coloured, the
+/// others any.
+#[must_use]
+pub fn cases(sizes: &Sizes, seed: u64) -> Vec<Case> {
+    let mut all: Vec<Case> = Vec::new();
+    let mut seeds = Seeds::of(seed);
+    let mut add = |group, family, hidden: &str| {
+        let seed = seeds.next(group);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x7e55);
+        let mut case = Case::new(group, family, &[hidden], seed);
+        if rng.random_bool(0.5) {
+            case.noise = NoiseKind::ALL[rng.random_range(0..NoiseKind::ALL.len())];
+        }
+        all.push(case);
+    };
+    for _ in 0..sizes.draws {
+        for family in Family::ALL {
+            for name in Beyond::NAMES {
+                add(Group::Beyond, family, name);
+            }
+        }
+    }
+    for round in 0..sizes.without {
+        for (index, (name, _)) in CURVES.iter().enumerate() {
+            let family = Family::ALL[(round as usize + index) % Family::ALL.len()];
+            add(Group::Single, family, name);
+        }
+    }
+    for number in 0..sizes.nulls {
+        all.push(nothing(number, seeds.next(Group::Nothing)));
+    }
+    all.shuffle(&mut ChaCha8Rng::seed_from_u64(seed ^ 0x9a12));
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use firmware_sim::plant::Effect;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_physics_meets_every_family_and_every_rig_is_another() {
+        let sizes = Sizes {
+            draws: 1,
+            without: 1,
+            nulls: 60,
+        };
+        let all = cases(&sizes, 77);
+        let physics = Beyond::NAMES.len();
+        assert!(physics >= 12);
+        assert_eq!(all.len(), 6 * physics + CURVES.len() + 60);
+        let seeds: BTreeSet<u64> = all.iter().map(|case| case.seed).collect();
+        assert_eq!(seeds.len(), all.len());
+        let mut beyond = all.iter().filter(|case| case.group == Group::Beyond);
+        assert!(beyond.all(|case| Beyond::NAMES.contains(&case.label().as_str())));
+        for (name, _) in CURVES {
+            assert!(Effect::NAMES.contains(name) && !of_the_catalogue(name).is_empty());
+        }
+    }
+}

@@ -18,7 +18,7 @@ mod size;
 
 use std::process::ExitCode;
 
-/// A subcommand; each has a file of its own.
+/// A subcommand; each has a file of its own, but for the campaigns, which are run alike.
 struct Task {
     name: &'static str,
     does: &'static str,

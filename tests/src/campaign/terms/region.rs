@@ -25,7 +25,7 @@ pub(super) fn f1(set: &Recorded, coordinate: &str, above: f64, curve: &[(f64, f6
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), g| {
             (l.min(*g), h.max(*g))
         });
-    if !(high > low) {
+    if high <= low {
         return 0.0;
     }
     let middle = 0.5 * (low + high);

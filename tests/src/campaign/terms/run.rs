@@ -21,16 +21,7 @@ use crate::campaign::run::structure;
 /// Runs a case; at most `terms` are asked for. What goes wrong is a row too.
 #[must_use]
 pub fn run(case: &Case, program: &Program, terms: u32) -> Row {
-    let nuisances = case.nuisances.iter().map(|n| n.name());
-    let circumstances: Vec<&str> = [case.noise.name()].into_iter().chain(nuisances).collect();
-    let mut row = Row {
-        key: case.to_string(),
-        group: Some(case.group),
-        family: case.family.name().to_owned(),
-        label: case.label(),
-        circumstances: circumstances.join(", "),
-        ..Row::default()
-    };
+    let mut row = Row::of(case);
     let kept = (program.keep.as_ref()).map(|keep| keep.join(row.key.replace('/', "_")));
     let outcome = match &kept {
         Some(folder) => fill(&mut row, case, program, terms, folder),
@@ -57,13 +48,7 @@ fn fill(
 ) -> Result<(), String> {
     let plan = case.plan().map_err(|e| e.to_string())?;
     let beyond = plan.truths();
-    row.weight = plan.weight.is_finite().then_some(plan.weight);
-    row.regional = beyond.iter().any(|truth| truth.region.is_some());
-    row.truths = match case.group {
-        Group::Single => of_the_catalogue(&row.label),
-        _ => beyond.iter().cloned().map(Truth::from).collect(),
-    };
-    row.also_true = plan.also_true().into_iter().map(Truth::from).collect();
+    row.expect(&plan);
     let inside = |name: &str| folder.join(name).to_string_lossy().into_owned();
     let [data, given, found, own] =
         ["set", "given.toml", "found.toml", "own.toml"].map(|name| inside(name));
@@ -89,8 +74,7 @@ fn fill(
     let document;
     (document, row.discover) = program.json(&arguments, folder)?;
 
-    row.terms = read(&document)?;
-    errors(row, &document);
+    row.hear(&document)?;
     let model = |path: &str| Model::load(Path::new(path)).map_err(|e| e.to_string());
     let (given, found) = (model(&given)?, model(&found)?);
     let (before, after) = (distance(&given, &set)?, distance(&found, &set)?);
@@ -98,6 +82,45 @@ fn fill(
     row.region_f1 = row.regional.then(|| region(row, &beyond[0], &set));
     row.base_bias = row.regional.then(|| bias(&plan, &found)).flatten();
     Ok(())
+}
+
+impl Row {
+    /// Of a case that nobody has looked at.
+    #[must_use]
+    pub fn of(case: &Case) -> Self {
+        let nuisances = case.nuisances.iter().map(|n| n.name());
+        let circumstances: Vec<&str> = [case.noise.name()].into_iter().chain(nuisances).collect();
+        Self {
+            key: case.to_string(),
+            group: Some(case.group),
+            family: case.family.name().to_owned(),
+            label: case.label(),
+            circumstances: circumstances.join(", "),
+            ..Self::default()
+        }
+    }
+
+    /// What should be found in its rig.
+    pub fn expect(&mut self, plan: &RigPlan) {
+        let beyond = plan.truths();
+        self.weight = plan.weight.is_finite().then_some(plan.weight);
+        self.regional = beyond.iter().any(|truth| truth.region.is_some());
+        self.truths = match self.group {
+            Some(Group::Single) => of_the_catalogue(&self.label),
+            _ => beyond.into_iter().map(Truth::from).collect(),
+        };
+        self.also_true = plan.also_true().into_iter().map(Truth::from).collect();
+    }
+
+    /// What `discover --json` says.
+    ///
+    /// # Errors
+    /// A document without terms.
+    pub fn hear(&mut self, document: &Value) -> Result<(), String> {
+        self.terms = read(document)?;
+        errors(self, document);
+        Ok(())
+    }
 }
 
 /// F1 of the region that is told; 0 where the term is another.
@@ -211,11 +234,8 @@ mod tests {
                 {"effects": ["jet-rest-before"], "validate_rmse": 0.02, "noise_rmse": 0.01},
             ],
         });
-        let mut row = Row {
-            terms: read(&document).unwrap(),
-            ..Row::default()
-        };
-        errors(&mut row, &document);
+        let mut row = Row::default();
+        row.hear(&document).unwrap();
         let told = &row.terms[0];
         assert_eq!(told.spot.coordinate, "rest before");
         assert_eq!(told.curve, [(0.1, -0.3)]);

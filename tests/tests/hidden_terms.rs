@@ -1,0 +1,108 @@
+//! A small draw of the hidden-terms campaign on short records, with seeds of its own; the whole of it is
+//! `cargo xtask hidden-terms`.
+
+use firmware_sim::family::Family;
+use host_fit::data::{DataSet, Record};
+use host_fit::discover::Options;
+use host_fit::model::Model;
+use host_fit::steps::discover;
+use scenarios::campaign::terms::Row;
+use scenarios::campaign::{Case, Group};
+
+/// Of each record, so many samples …
+const SAMPLES: usize = 5000;
+
+/// … of these: two squares and a telegraph to learn from, a square and a telegraph held out.
+const RECORDS: [usize; 5] = [1, 2, 4, 5, 7];
+
+/// A rough guess, as an engineer would hand it in.
+const GUESS: &str = r#"
+format_version = 1
+sample_period_s = 0.001
+lag_convention = "one-step"
+[structure]
+averaged = false
+window = 250
+state_lags = [1]
+product_lags = [1]
+[coefficients]
+a = [0.98]
+b = [0.02]
+c = [[0.0]]
+[delay]
+law = "state-dependent"
+delay_floor = 35.0
+delay_rise = 10.0
+delay_rate = 6.0
+factors = [1.0]
+interpolated = true
+"#;
+
+fn asked(group: Group, family: Family, hidden: &[&str], seed: u64) -> Row {
+    let case = Case::new(group, family, hidden, seed);
+    let plan = case.plan().expect("a rig");
+    let set = plan.build().expect("records").data;
+    let records = RECORDS.map(|index| shortened(&set.records[index]));
+    let set = DataSet::from_records(set.title, records.into()).expect("a data set");
+    let guess = Model::from_toml(GUESS, "guess.toml").expect("a model");
+    let options = Options {
+        terms: 1,
+        ..Options::default()
+    };
+    let start = std::time::Instant::now();
+    let found = discover(&guess, &set, &options, &()).expect("a search");
+    let document = serde_json::to_value(&found).expect("a document");
+    let mut row = Row::of(&case);
+    row.expect(&plan);
+    row.hear(&document).expect("terms");
+    eprintln!(
+        "{case}: {}, curve {:?}, formula {:?}, {:.1} s",
+        row.said(),
+        row.curve_taken,
+        row.formula_taken,
+        start.elapsed().as_secs_f64()
+    );
+    row
+}
+
+fn shortened(record: &Record) -> Record {
+    let mut record = record.clone();
+    let cut = |x: &mut Vec<f64>| x.truncate(SAMPLES);
+    cut(&mut record.u);
+    cut(&mut record.y);
+    [&mut record.y_sd, &mut record.y_min, &mut record.y_max]
+        .into_iter()
+        .flatten()
+        .for_each(cut);
+    record.channels.values_mut().for_each(cut);
+    record
+}
+
+fn is_found(family: Family, hidden: &str, seed: u64) {
+    let row = asked(Group::Beyond, family, &[hidden], seed);
+    assert!(row.has_place_in_set(), "{}", row.said());
+    assert!(row.has_coordinate_in_set(), "{}", row.said());
+    assert!(row.curve_taken >= Some(0.6), "{:?}", row.curve_taken);
+    assert!(row.formula_taken >= Some(0.6), "{:?}", row.formula_taken);
+}
+
+#[test]
+fn a_jet_that_tires_with_every_pulse_is_found() {
+    is_found(Family::FirstOrder, "tiring-jet", 1301);
+}
+
+#[test]
+fn a_line_that_takes_longer_after_a_rest_is_found() {
+    is_found(Family::FirstOrder, "rest-line", 1302);
+}
+
+#[test]
+fn a_sensor_with_a_power_law_is_found_beside_a_memory_of_the_flow() {
+    is_found(Family::Memory1, "power-law", 1303);
+}
+
+#[test]
+fn where_nothing_is_missing_no_term_is_told() {
+    let row = asked(Group::Nothing, Family::Memory1, &[], 1304);
+    assert!(!row.is_needless(), "{}", row.said());
+}

@@ -44,15 +44,7 @@ impl Physics for FasterSeparation {
 
 impl Hidden for FasterSeparation {
     fn truth(&self) -> Truth {
-        // With blows and rests as long as these nobody can tell the last blow from recent ones.
-        Truth::new(
-            Port::Flow,
-            &[
-                "pulse length × y",
-                "blowing in the last × y",
-                "memory of u × y",
-            ],
-        )
+        Truth::new(Port::Flow, &["pulse length × y"])
     }
 }
 

@@ -3,7 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Hidden, Port, Truth};
+use super::{Hidden, MEMORY_PER_WINDOW, Port, Truth};
 use crate::plant::base::{BasePlant, log_uniform};
 use crate::plant::effects::{Card, Limits, Physics};
 use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
@@ -46,7 +46,9 @@ impl Physics for HotJet {
 
 impl Hidden for HotJet {
     fn truth(&self) -> Truth {
-        Truth::new(Port::Jet, &[&format!("memory of u ({} s)", self.time)])
+        let memory = format!("memory of u ({} s)", self.time);
+        let window = format!("blowing in the last {} s", self.time / MEMORY_PER_WINDOW);
+        Truth::new(Port::Jet, &[&memory, &window])
     }
 }
 

@@ -20,6 +20,7 @@ mod reluctant_separation;
 mod rest_line;
 mod short_rest;
 mod stall_above;
+mod stirred_layer;
 mod strength;
 mod swelling_jet;
 mod tiring_jet;
@@ -98,6 +99,10 @@ impl Truth {
     }
 }
 
+/// A window and a fading memory of this share of its length say nearly the same of what was blown: with the
+/// commands of the rigs, a curve over the one describes 84–94 % of one over the other, the most at this ratio.
+const MEMORY_PER_WINDOW: f64 = 0.6;
+
 /// What one file of this folder defines beside its physics.
 trait Hidden: Physics {
     /// What a search should find.
@@ -135,6 +140,7 @@ beyond! {
     convective_line::ConvectiveLine,
     quadratic_drive::QuadraticDrive,
     faster_separation::FasterSeparation,
+    stirred_layer::StirredLayer,
     reluctant_separation::ReluctantSeparation,
     bubble_memory::BubbleMemory,
     unrest::Unrest,
@@ -195,7 +201,7 @@ mod tests {
             "rest before",
             "pulse length",
             "pulse number",
-            "blowing in the last",
+            "blowing",
             "memory of u",
             "memory of y",
             "memory of rate",
@@ -210,6 +216,7 @@ mod tests {
             for coordinate in &truth.coordinates {
                 for factor in coordinate.split(" × ") {
                     let kind = factor.split(" (").next().unwrap_or(factor);
+                    let kind = kind.split(" in the last ").next().unwrap_or(kind);
                     assert!(WORDS.contains(&kind), "{name}: {coordinate}");
                 }
             }

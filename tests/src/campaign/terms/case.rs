@@ -23,10 +23,7 @@ pub struct Sizes {
 /// Effects of the catalogue that are a curve over one coordinate, and what a search that has never heard of
 /// them should say. Lags, echoes, friction and hysteresis are none.
 const CURVES: &[(&str, &[(&str, &[&str])])] = &[
-    (
-        "state-dependent-delay",
-        &[("delay", &["mean y (0.25 s)", "memory of y (0.15 s)"])],
-    ),
+    ("state-dependent-delay", &[("delay", &["mean y (0.25 s)"])]),
     (
         "plenum-droop",
         &[("jet", &["memory of u", "blowing in the last"])],

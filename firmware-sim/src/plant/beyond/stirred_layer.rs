@@ -1,0 +1,121 @@
+//! After much blowing the flow separates faster.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::pulses::Pulses;
+use super::{Hidden, MEMORY_PER_WINDOW, Port, Truth};
+use crate::plant::base::{BasePlant, log_uniform};
+use crate::plant::effects::{Card, Limits, Physics};
+use crate::plant::part::{FlowPart, Part, Piece, Place, Surroundings};
+use crate::waveform::{Cursor, Waveform};
+
+/// Where no jet arrives, the rate is 1 + gain·b times what it was, b the share of the last `window` seconds in which a jet arrived.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StirredLayer {
+    /// How much faster when it has been blown on all the time (-).
+    pub gain: f64,
+    /// How long blowing counts (s).
+    pub window: f64,
+}
+
+impl Physics for StirredLayer {
+    const NAME: &'static str = "stirred-layer";
+    const PLACE: Place = Place::Flow;
+    const PARAMETERS: &'static [Card<Self>] = &[
+        Card::new("gain", "-", Limits::NOT_NEGATIVE, |e| &mut e.gain),
+        Card::new("window", "s", Limits::TIME, |e| &mut e.window),
+    ];
+
+    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
+        Self {
+            gain: rng.random_range(0.8..2.5),
+            window: log_uniform(rng, 0.25, 1.0),
+        }
+    }
+
+    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+        Part::Flow(Box::new(Stirred {
+            law: *self,
+            time: 0.0,
+            blown: 0.0,
+            pulses: Pulses::default(),
+            past: Waveform::at_rest(0.0, self.window),
+            cursor: Cursor::default(),
+        }))
+    }
+}
+
+impl Hidden for StirredLayer {
+    fn truth(&self) -> Truth {
+        let window = format!("blowing in the last {} s × y", self.window);
+        let memory = format!("memory of u ({} s) × y", MEMORY_PER_WINDOW * self.window);
+        Truth::new(Port::Flow, &[&window, &memory])
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Stirred {
+    law: StirredLayer,
+    time: f64,
+    /// For how long a jet has arrived within the window (s).
+    blown: f64,
+    pulses: Pulses,
+    /// For how long one has arrived since the start (s).
+    past: Waveform,
+    cursor: Cursor,
+}
+
+impl FlowPart for Stirred {
+    fn drive(&self, s: f64, _z: f64) -> f64 {
+        if self.pulses.is_on() {
+            return 0.0;
+        }
+        -self.law.gain * self.blown / self.law.window * s
+    }
+
+    fn arrives(&mut self, jet: f64) {
+        self.pulses.see(self.time, jet);
+    }
+
+    fn passed(&mut self, jet: &Piece, _s: f64) {
+        self.time += jet.dt;
+        self.pulses.see(self.time, jet.to);
+        let now = self.past.before(self.time, &mut self.cursor);
+        let now = if self.pulses.is_on() {
+            now + jet.dt
+        } else {
+            now
+        };
+        self.past.line_to(self.time, now);
+        let then = self.time - self.law.window;
+        self.blown = now - self.past.before(then, &mut self.cursor);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::flow::bench::{flow, hold};
+
+    /// Within the window, the longer the rest, the less it has been blown on: here not yet.
+    #[test]
+    fn recent_blowing_sets_the_rate() {
+        let law = StirredLayer {
+            gain: 1.5,
+            window: 0.5,
+        };
+        let mut flow = flow([law.at_rest()]);
+        flow.jump(1.0);
+        let s = hold(&mut flow, 1.0, 0.2);
+        assert!((s - (1.0 - (-5.0_f64).exp())).abs() < 1e-9);
+        flow.jump(0.0);
+        let left = hold(&mut flow, 0.0, 0.1);
+        let rate: f64 = 10.0 * (1.0 + 1.5 * 0.2 / 0.5);
+        assert!((left - s * (-0.1 * rate).exp()).abs() < 1e-6, "{left}");
+        // All of it forgotten.
+        let s = hold(&mut flow, 0.0, 0.7);
+        let left = hold(&mut flow, 0.0, 0.1);
+        assert!((left - s * (-1.0_f64).exp()).abs() < 1e-9 * s);
+    }
+}

@@ -13,7 +13,7 @@ rules! {
     /// Share of the samples beyond the first and the last point.
     beyond: f64 = 0.01, "share of the samples", "judgement";
     /// Points are at least this far apart.
-    apart: f64 = 0.01, "share of the coordinate's middle half", "judgement";
+    apart: f64 = 0.05, "of the way from the first point", "judgement: rests and times since edges span three decades";
     /// Curves that are refitted for a few steps per round …
     tried: usize = 10, "", "judgement";
     /// … no more of them of one place and one kind of coordinate than this …

@@ -82,17 +82,15 @@ fn points(mut values: Vec<f64>) -> Option<(Vec<f64>, usize)> {
     if high - low <= 1e-6 * low.abs().max(high.abs()).max(1e-6) {
         return None;
     }
-    // Rests of a fraction of a second and one of ten: the tail does not set the scale.
-    let middle = at(0.75) - at(0.25);
-    let extent = if middle > 0.0 { middle } else { high - low };
+    // Rests of a fraction of a second and one of ten: what is apart is a matter of place.
+    let least = (0.01 * (at(0.5) - low)).max(1e-6 * (high - low));
     let count = RULES.points;
-    let mut x: Vec<f64> = Vec::new();
-    for i in 0..count {
+    let mut x: Vec<f64> = vec![low];
+    for i in 1..count {
         let along = i as f64 / (count - 1) as f64;
         let place = at(RULES.beyond + along * (1.0 - 2.0 * RULES.beyond));
-        if x.last()
-            .is_none_or(|last| place - last > RULES.apart * extent)
-        {
+        let last = x[x.len() - 1];
+        if place - last > (RULES.apart * (last - low)).max(least) {
             x.push(place);
         }
     }

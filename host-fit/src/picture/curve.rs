@@ -36,12 +36,17 @@ pub struct CurvePlot<'a> {
     pub formula_label: &'a str,
 }
 
+/// Points of a curve that are drawn.
+const MOST_POINTS: usize = 400;
+
 /// Draws a curve with its confidence band, and its formula. Returns SVG.
 #[must_use]
 pub fn curve(plot: &CurvePlot<'_>) -> String {
     let description = format!("{}: {} against {}", plot.title, plot.y_label, plot.x_label);
     draw(&description, |canvas| {
-        let points = plot.points;
+        // Hundreds of points look like thousands.
+        let thin = plot.points.len().div_ceil(MOST_POINTS).max(1);
+        let points: Vec<&BandPoint> = plot.points.iter().step_by(thin).collect();
         let values = points.iter().map(|p| p.value);
         let formula = plot.formula.iter().map(|p| p.1);
         let Some(shown) = extent(values.chain(formula)) else {
@@ -88,7 +93,7 @@ pub fn curve(plot: &CurvePlot<'_>) -> String {
             points.iter().map(|p| (p.x, p.value)),
             Ink::new(BLUE, 2.25),
         );
-        for point in points {
+        for point in &points {
             if let Some(at) = panel.point(point.x, point.value) {
                 canvas.dot(at, 3.5, Ink::new(BLUE, 1.0), true);
             }

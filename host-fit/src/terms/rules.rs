@@ -63,6 +63,38 @@ rules! {
     /// Where records do not begin at rest, 0 is the level of rest unless it is further from all of y than this.
     far: f64 = 1.0, "times the range of y", "judgement";
 
+    /// Series are screened with so many numbers at most: longer ones are averaged over neighbours.
+    longest_series: usize = 24_000, "values", "judgement: for the time it takes";
+    /// Lags that are screened below the regular steps …
+    short_lags: [usize; 6] = [3, 5, 8, 12, 16, 20], "samples", "a grid";
+    /// … which begin here.
+    regular_lags: u16 = 26, "samples", "the next of that grid";
+    /// Second lags of the flow that are screened.
+    second_lags: [f64; 5] = [1.5, 4.0, 10.0, 20.0, 40.0], "samples", "a grid in steps of 2 to 3";
+    /// Slow wakes that are screened.
+    wakes_s: [f64; 5] = [0.1, 0.2, 0.4, 0.8, 1.6], "s at 1 kHz", "a grid in steps of 2";
+    /// Change of the rate with the level, and pull of a wake, by which their effect is seen.
+    slope: f64 = 0.1, "", "judgement: small, and far above rounding";
+    /// A term whose effect is not proportional must be wanted at least this many times.
+    some: f64 = 0.1, "times its size in the grid", "judgement";
+    /// Points of a curve that are hardly ever met stay where they are: the ridge that holds them there.
+    ridge: f64 = 1e-4, "share of the mean square of the points", "judgement";
+    /// Grid points of an effect that are kept for sets …
+    kept_points: usize = 2, "", "judgement: for the time it takes";
+    /// … of a kind of lag …
+    kept_lags: usize = 5, "", "judgement: for the time it takes";
+    /// … and how far apart those are.
+    lags_apart: usize = 20, "samples", "judgement: neighbours say the same";
+    /// Grid points of a jet effect that are tried with every response to part jets.
+    regraded: usize = 3, "", "judgement, on the rigs of six families";
+    /// Single candidates from which pairs are made.
+    paired: usize = 24, "", "judgement: for the time it takes";
+    /// Samples by which a lag is moved to see where it should be …
+    lag_probe: u16 = 2, "samples", "judgement";
+    /// … the longest move at a time …
+    longest_move: f64 = 12.0, "samples", "judgement: one and a half steps of the grid";
+    /// … and what a move must promise.
+    worth_moving: f64 = 2e-4, "share of the error energy", "judgement: a twentieth of the price of a parameter";
     /// Rounds of moving all lags of a model …
     lag_rounds: usize = 4, "", "judgement";
     /// … the steps of a fit after each move …

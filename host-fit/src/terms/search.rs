@@ -4,7 +4,9 @@ use super::RULES;
 use super::evidence::p_value;
 use super::grid::longest_lag;
 use super::judge::{Judge, Judged};
-use super::screen::{Proposal, SERIES, Screen, has_jet_effect};
+use super::proposal::Proposal;
+use super::screen::Screen;
+use super::table::has_jet_effect;
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, Known, fit, lean_base, settle_fixed_delay};
 use crate::model::{Model, Start};
@@ -369,7 +371,7 @@ impl Search<'_> {
             return self.set_out_from(model, proposal, &proposal.terms, iterations);
         }
         // A second order has more than one valley: from several second lags.
-        let starts = SERIES.into_par_iter().filter_map(|samples| {
+        let starts = RULES.second_lags.into_par_iter().filter_map(|samples| {
             let other = |term: &Term| match term {
                 Term::Inertia(_) => Term::Inertia(samples),
                 term => term.clone(),

@@ -1,0 +1,342 @@
+//! Everything that could be added to a model, and what it takes of the error alone.
+
+use super::RULES;
+use super::grid::{grid, longest_lag};
+use super::screen::Screen;
+use super::term::Term;
+use crate::fit::{Known, channel_reference, sensitivities};
+use crate::model::{Model, Start};
+use model_core::effect::{Place, Sign, Spec};
+use model_core::effects::{LEVEL_RATE, SLOW_WAKE, ZERO_OFFSET};
+use model_core::recursion::Grading;
+use rayon::prelude::*;
+
+/// Lags whose derivatives are carried by one run, two each.
+const LAGS_AT_ONCE: usize = 4;
+
+/// A term that could be added, and what it takes alone.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The term, an effect's amplitude as it fits best.
+    pub term: Term,
+    /// Share of the error energy that it takes where it was learned.
+    pub learned: f64,
+    /// The same on what was held out.
+    pub held_out: f64,
+    /// Its columns in the table of changes.
+    pub(super) columns: Vec<usize>,
+}
+
+/// Everything that could be added, and its changes to the free run.
+pub struct Table {
+    /// The candidates, the best held-out share first.
+    pub candidates: Vec<Candidate>,
+    pub(super) columns: Vec<Vec<f64>>,
+}
+
+impl Screen<'_> {
+    fn lags(&self) -> Vec<u16> {
+        let shortest = self.records.iter().map(|r| r.len()).min().unwrap_or(0);
+        let longest = longest_lag(self.model.sample_period_s, shortest);
+        let regular = (RULES.regular_lags..=longest).step_by(RULES.lag_step);
+        let all = RULES
+            .short_lags
+            .iter()
+            .map(|lag| *lag as u16)
+            .chain(regular);
+        all.filter(|lag| *lag <= longest && !self.model.state_lags.contains(lag))
+            .collect()
+    }
+
+    /// Changes by lags: the derivatives by a coefficient that is 0, of y and of y
+    /// times the jet.
+    fn lag_columns(&self) -> Vec<(u16, [Vec<f64>; 2])> {
+        let (n1, n2) = (self.model.a.len(), self.model.product_lags.len());
+        let lags = self.lags();
+        let lags: Vec<u16> = lags
+            .into_iter()
+            .filter(|lag| !self.model.product_lags.contains(lag))
+            .collect();
+        let each = lags.par_chunks(LAGS_AT_ONCE).map(|lags| {
+            let terms = lags.iter().map(|lag| Term::Memory(*lag));
+            let model = terms.fold(self.model.clone(), |m, term| term.added_to(&m, &[]));
+            // The vector is d, a, b, c by columns: the first input's c at the end of its own.
+            let first = 1 + n1;
+            let product = 1 + n1 + lags.len() + model.b.len() + n2;
+            let indices: Vec<usize> = (0..lags.len())
+                .flat_map(|i| [first + i, product + i])
+                .collect();
+            let slopes: Option<Vec<Vec<Vec<f64>>>> = self
+                .records
+                .iter()
+                .map(|record| Some(sensitivities(&model, record, &indices)?.1))
+                .collect();
+            let Some(slopes) = slopes else {
+                return Vec::new();
+            };
+            let column = |index: usize| {
+                let mut column = self.joined(slopes.iter().map(|record| record[index].as_slice()));
+                self.residualise(&mut column);
+                column
+            };
+            let of = |(i, lag): (usize, &u16)| (*lag, [column(2 * i), column(2 * i + 1)]);
+            lags.iter().enumerate().map(of).collect()
+        });
+        each.flatten().collect()
+    }
+
+    /// Changes by a second lag of the flow.
+    fn series(&self) -> Vec<(Term, Vec<f64>)> {
+        let order = |lags: &[u16]| lags.contains(&1) && !lags.contains(&2);
+        if !order(&self.model.state_lags) {
+            return Vec::new();
+        }
+        let changes = RULES.second_lags.into_par_iter().filter_map(|samples| {
+            let term = Term::Inertia(samples);
+            let mut column = self.change(&term.added_to(self.model, &[]))?;
+            self.residualise(&mut column);
+            Some((term, column))
+        });
+        changes.collect()
+    }
+
+    /// Changes by a slow wake, per pull.
+    fn wakes(&self) -> Vec<(Term, Vec<f64>)> {
+        // Nobody knows the wake of a flow that was blown before.
+        let present = self.model.effects.iter().any(|e| e.name == SLOW_WAKE.name);
+        if present || self.model.start == Start::Measured {
+            return Vec::new();
+        }
+        let changes = RULES.wakes_s.into_par_iter().filter_map(|time_constant| {
+            let term = Term::Wake(time_constant);
+            let mut column = self.change(&term.added_to(self.model, &[RULES.slope]))?;
+            column.iter_mut().for_each(|x| *x /= RULES.slope);
+            self.residualise(&mut column);
+            Some((term, column))
+        });
+        changes.collect()
+    }
+
+    /// Changes by a rate that depends on the level, without jets and under them.
+    fn level_rate(&self) -> Option<[Vec<f64>; 2]> {
+        if self.model.effects.iter().any(|e| e.name == LEVEL_RATE.name) {
+            return None;
+        }
+        let of = |slopes: [f64; 2]| {
+            let mut column = self.change(&Term::LevelRate.added_to(self.model, &slopes))?;
+            column.iter_mut().for_each(|x| *x /= RULES.slope);
+            self.residualise(&mut column);
+            Some(column)
+        };
+        Some([of([RULES.slope, 0.0])?, of([0.0, RULES.slope])?])
+    }
+
+    /// The model's lags and the sensor's zero, with what each takes alone.
+    fn base_candidates(&self, columns: &mut Vec<Vec<f64>>) -> Vec<Candidate> {
+        let mut all: Vec<(Term, Vec<usize>)> = Vec::new();
+        for (lag, [state, product]) in self.lag_columns() {
+            let at = columns.len();
+            columns.push(state);
+            columns.push(product);
+            all.push((Term::Memory(lag), vec![at, at + 1]));
+            all.push((Term::State(lag), vec![at]));
+            all.push((Term::Product(lag), vec![at + 1]));
+        }
+        for (term, column) in self.series() {
+            all.push((term, vec![columns.len()]));
+            columns.push(column);
+        }
+        for (term, column) in self.wakes() {
+            all.push((term, vec![columns.len()]));
+            columns.push(column);
+        }
+        if let Some([separating, attaching]) = self.level_rate() {
+            all.push((Term::LevelRate, vec![columns.len(), columns.len() + 1]));
+            columns.push(separating);
+            columns.push(attaching);
+        }
+        let has_zero = self
+            .model
+            .effects
+            .iter()
+            .any(|e| e.name == ZERO_OFFSET.name);
+        if !has_zero && !self.judge.options.constant {
+            let mut column = self.joined(self.runs.iter().map(Vec::as_slice));
+            column.iter_mut().for_each(|x| *x = 1.0);
+            self.residualise(&mut column);
+            all.push((Term::Offset, vec![columns.len()]));
+            columns.push(column);
+        }
+        let mut rated: Vec<Candidate> = all
+            .into_iter()
+            .filter_map(|(term, own)| {
+                let chosen: Vec<&[f64]> = own.iter().map(|i| columns[*i].as_slice()).collect();
+                let (scale, learned, held_out) = self.regress(&chosen)?;
+                Self::is_feasible(&term, scale[0]).then_some(Candidate {
+                    term,
+                    learned: 1.0 - learned,
+                    held_out: 1.0 - held_out,
+                    columns: own,
+                })
+            })
+            .collect();
+        rated.sort_by(|a, b| b.learned.total_cmp(&a.learned));
+        // Neighbours say the same: the best of each neighbourhood.
+        let mut kept: Vec<Candidate> = Vec::new();
+        for candidate in rated {
+            let same_kind = |k: &&Candidate| {
+                std::mem::discriminant(&k.term) == std::mem::discriminant(&candidate.term)
+            };
+            let near = |k: &Candidate| match (k.term.lag(), candidate.term.lag()) {
+                (Some(a), Some(b)) => {
+                    (i32::from(a) - i32::from(b)).abs() <= RULES.lags_apart as i32
+                }
+                _ => true,
+            };
+            // Time constants say different things: which one shows beside an effect.
+            let alike: Vec<&Candidate> = kept.iter().filter(same_kind).collect();
+            let has_time = matches!(candidate.term, Term::Inertia(_) | Term::Wake(_));
+            if has_time || (alike.len() < RULES.kept_lags && !alike.iter().any(|k| near(k))) {
+                kept.push(candidate);
+            }
+        }
+        kept
+    }
+
+    /// Whether so many times its change makes sense for a term.
+    pub(super) fn is_feasible(term: &Term, scale: f64) -> bool {
+        let (spec, parameters) = match term {
+            Term::Effect {
+                spec, parameters, ..
+            } => (spec, parameters),
+            Term::Inertia(_) => return scale > RULES.some,
+            _ => return true,
+        };
+        let linear = spec.amplitude.filter(|amplitude| amplitude.linear);
+        match linear.and_then(|amplitude| spec.parameter(amplitude.parameter)) {
+            Some(index) => {
+                let physical = spec.parameters[index].sign == Sign::Either;
+                physical || parameters[index] * scale >= 0.0
+            }
+            // What is not proportional keeps its direction, and some of its size.
+            None => spec.parameters.is_empty() || scale > RULES.some,
+        }
+    }
+
+    /// An effect with its amplitude so many times as large.
+    pub(super) fn scaled(term: &Term, scale: f64) -> Term {
+        let mut term = term.clone();
+        if let Term::Effect {
+            spec, parameters, ..
+        } = &mut term
+        {
+            let linear = spec.amplitude.filter(|amplitude| amplitude.linear);
+            if let Some(index) = linear.and_then(|a| spec.parameter(a.parameter)) {
+                let range = &spec.parameters[index];
+                parameters[index] = (parameters[index] * scale).clamp(range.low, range.high);
+            }
+        }
+        term
+    }
+
+    /// Effects with what they change, best first; those that make no sense left out.
+    fn rated(&self, terms: Vec<Term>) -> Vec<(Candidate, Vec<f64>)> {
+        let rated = terms.into_par_iter().filter_map(|term| {
+            let mut column = self.change(&term.added_to(self.model, &[]))?;
+            let before = self.learned_square(&column);
+            self.residualise(&mut column);
+            let after = self.learned_square(&column);
+            let shows = after > 1e-10 * before && after > 0.0;
+            let (scale, learned, held_out) = self.regress(&[&column]).filter(|_| shows)?;
+            let candidate = Candidate {
+                learned: 1.0 - learned,
+                held_out: 1.0 - held_out,
+                columns: Vec::new(),
+                term,
+            };
+            Self::is_feasible(&candidate.term, scale[0]).then_some((candidate, column))
+        });
+        let mut rated: Vec<_> = rated.collect();
+        rated.sort_by(|a, b| b.0.learned.total_cmp(&a.0.learned));
+        rated
+    }
+
+    fn effect_candidates(&self, known: &Known, columns: &mut Vec<Vec<f64>>) -> Vec<Candidate> {
+        let specs = self.model.candidates();
+        let specs = specs.filter(|spec| self.pointless(spec).is_none());
+        let with_grading = |spec: &'static Spec, parameters: Vec<f64>, grading: Grading| {
+            let reference = channel_reference(spec, &self.records).ok().flatten();
+            Term::Effect {
+                spec,
+                parameters,
+                grading,
+                reference,
+            }
+        };
+        let terms: Vec<Term> = specs
+            .flat_map(|spec| {
+                let grid = grid(spec, self.model, known).into_iter();
+                grid.map(move |parameters| (spec, parameters))
+            })
+            .map(|(spec, parameters)| with_grading(spec, parameters, self.model.grading))
+            .collect();
+        let mut rated = self.rated(terms);
+        // How the flow takes jets of part strength shows only once there are some.
+        if self.judge.on_off && !has_jet_effect(self.model) {
+            let mut met: Vec<&str> = Vec::new();
+            let mut others = Vec::new();
+            for (candidate, _) in &rated {
+                let Term::Effect {
+                    spec, parameters, ..
+                } = &candidate.term
+                else {
+                    continue;
+                };
+                let before = met.iter().filter(|name| **name == spec.name).count();
+                if spec.place != Place::Jet || before >= RULES.regraded {
+                    continue;
+                }
+                met.push(spec.name);
+                let gradings = Grading::ALL
+                    .into_iter()
+                    .filter(|g| *g != self.model.grading);
+                others.extend(gradings.map(|g| with_grading(spec, parameters.clone(), g)));
+            }
+            rated.extend(self.rated(others));
+            rated.sort_by(|a, b| b.0.learned.total_cmp(&a.0.learned));
+        }
+        let mut met = Vec::new();
+        let mut kept = Vec::new();
+        for (mut candidate, column) in rated {
+            let key = candidate.term.key();
+            if met.iter().filter(|m| **m == key).count() < RULES.kept_points {
+                met.push(key);
+                candidate.columns = vec![columns.len()];
+                columns.push(column);
+                kept.push(candidate);
+            }
+        }
+        kept
+    }
+
+    /// Everything that could be added: lags and the zero, and effects if wanted.
+    #[must_use]
+    pub fn table(&self, known: &Known, effects: bool) -> Table {
+        let mut columns = Vec::new();
+        let mut candidates = self.base_candidates(&mut columns);
+        if effects {
+            candidates.extend(self.effect_candidates(known, &mut columns));
+        }
+        candidates.sort_by(|a, b| b.held_out.total_cmp(&a.held_out));
+        Table {
+            candidates,
+            columns,
+        }
+    }
+}
+
+/// Whether the model has an effect on the jet: it has a response to part jets then.
+pub(super) fn has_jet_effect(model: &Model) -> bool {
+    let places = model.effects.iter().filter_map(|e| model.spec(&e.name));
+    places.into_iter().any(|spec| spec.place == Place::Jet)
+}

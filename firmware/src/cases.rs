@@ -5,25 +5,15 @@ use crate::controller::{Controller, Reading, Settings};
 use crate::law::{Driven, Law, driven};
 use crate::link::lockstep::BATCH;
 use crate::relay::Relay;
-use crate::sensor::{Calibration, Channel, Range};
+use crate::sensor::Channel;
 use model_core::average::MovingAverage;
 use model_core::control::{HoldTimes, Pulses, Tracking};
 
-/// Calibration and limits of the lockstep rig, without a measured channel.
+/// The lockstep rig, without a measured channel.
 pub const SETTINGS: Settings = Settings {
-    calibration: Calibration {
-        zero: 800.0,
-        per_count: 0.0005,
-    },
-    range: Range {
-        lower_rail: 8.0,
-        upper_rail: 4087.0,
-        stuck_after: 500,
-    },
-    channel: None,
-    hold: RELAY.hold,
     // The plant is not what the models are of.
     residual_envelope: f32::INFINITY,
+    ..Settings::RIG
 };
 
 /// The law of models without one.

@@ -3,6 +3,7 @@
 use crate::fault::Fault;
 use crate::law::Law;
 use crate::sensor::{Calibration, Channel, Range, Watch};
+use identified::rig;
 use model_core::control::HoldTimes;
 
 /// What the operator set.
@@ -33,6 +34,27 @@ pub struct Settings {
     /// Largest residual, averaged over about 64 samples, that the model's
     /// envelope allows, y.
     pub residual_envelope: f32,
+}
+
+impl Settings {
+    /// Those of the rig file, without a channel.
+    pub const RIG: Self = Self {
+        calibration: Calibration {
+            zero: rig::ZERO,
+            per_count: rig::PER_COUNT,
+        },
+        range: Range {
+            lower_rail: rig::RAILS[0],
+            upper_rail: rig::RAILS[1],
+            stuck_after: rig::STUCK_AFTER,
+        },
+        channel: None,
+        hold: HoldTimes {
+            on: rig::SHORTEST[0],
+            off: rig::SHORTEST[1],
+        },
+        residual_envelope: rig::RESIDUAL_ENVELOPE,
+    };
 }
 
 /// What the sensor gave at a sample.

@@ -3,30 +3,18 @@
 use crate::controller::{Controller, Settings};
 use crate::law::{Designed, Driven, driven};
 use crate::link::service::Board;
-use crate::sensor::{Calibration, Channel, Range};
+use crate::sensor::Channel;
 use crate::start::{self, Failure};
 use identified::on_board as model;
 use model_core::average::MovingAverage;
-use model_core::control::HoldTimes;
 
-/// The rig's constants: measure them before the air is on (`WIRING.md`).
+/// The rig's constants, of the rig file that this was built with.
 pub const SETTINGS: Settings = Settings {
-    calibration: Calibration {
-        zero: 800.0,
-        per_count: 0.0005,
-    },
-    range: Range {
-        lower_rail: 8.0,
-        upper_rail: 4087.0,
-        stuck_after: 500,
-    },
-    // The channel's own calibration goes here, if the model needs a channel.
     channel: match model::REFERENCES.as_slice() {
         [] => None,
-        [reference, ..] => Some(Channel::around(*reference)),
+        [reference, ..] => Some(Channel::of(*reference)),
     },
-    hold: HoldTimes { on: 4, off: 4 },
-    residual_envelope: 0.5,
+    ..Settings::RIG
 };
 
 /// What the board says of itself.

@@ -51,6 +51,25 @@ pub struct Channel {
 }
 
 impl Channel {
+    /// The rig's channel, usually at `reference`; one [around](Self::around) it
+    /// where the rig file has none.
+    #[must_use]
+    pub const fn of(reference: f32) -> Self {
+        let Some([zero, per_count, lower_rail, upper_rail]) = identified::rig::CHANNEL else {
+            return Self::around(reference);
+        };
+        Self {
+            calibration: Calibration { zero, per_count },
+            range: Range {
+                lower_rail,
+                upper_rail,
+                // A slow quantity may well stay the same.
+                stuck_after: u32::MAX,
+            },
+            reference,
+        }
+    }
+
     /// A channel whose middle counts are its reference and whose whole range is
     /// twice the reference, or 2 units where that is more: to be replaced by
     /// what was measured.

@@ -5,6 +5,7 @@
 
 mod commands;
 mod plants;
+mod rig_port;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -37,6 +38,8 @@ enum Command {
     Simulate(commands::simulate::Args),
     Effects(commands::effects::Args),
     Rules(commands::rules::Args),
+    Record(Box<commands::record::Args>),
+    Watch(commands::watch::Args),
     Codegen(commands::codegen::Args),
 }
 
@@ -57,6 +60,8 @@ fn main() -> ExitCode {
         Command::Simulate(args) => commands::simulate::run(args, console),
         Command::Effects(args) => commands::effects::run(args, console),
         Command::Rules(args) => commands::rules::run(args, console),
+        Command::Record(args) => commands::record::run(args, console),
+        Command::Watch(args) => commands::watch::run(args, console),
         Command::Codegen(args) => commands::codegen::run(args, console),
     };
     match result {

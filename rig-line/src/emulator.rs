@@ -11,7 +11,6 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex};
-use std::time::Duration;
 
 use crate::error::LineError;
 use crate::port::Port;
@@ -19,8 +18,6 @@ use crate::port::Port;
 /// Samples that the rig runs ahead of what the host was told: well below the
 /// half second after which a board gives its host up.
 const AHEAD: u64 = 150;
-/// A host that is silent for so long has died: time goes on without it.
-const DEAD: Duration = Duration::from_millis(1500);
 
 /// What is measured and driven.
 pub trait Rig: Send {
@@ -31,30 +28,56 @@ pub trait Rig: Send {
 
 /// How far host and rig are.
 #[derive(Clone, Debug, Default)]
-pub struct Pace(Arc<(Mutex<u64>, Condvar)>);
+pub struct Pace(Arc<(Mutex<Ahead>, Condvar)>);
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Ahead {
+    /// Samples until the host must be heard.
+    left: u64,
+    /// Hosts that live.
+    hosts: u32,
+}
+
+/// A host that lives; time waits for it, and goes on when it has died.
+#[derive(Debug)]
+pub struct Presence(Pace);
 
 impl Pace {
-    /// The host was there.
-    pub fn touch(&self) {
-        let (count, changed) = &*self.0;
-        if let Ok(mut left) = count.lock() {
-            *left = AHEAD;
+    /// A host comes.
+    #[must_use]
+    pub fn enter(&self) -> Presence {
+        self.change(|ahead| ahead.hosts += 1);
+        Presence(self.clone())
+    }
+
+    fn change(&self, change: impl FnOnce(&mut Ahead)) {
+        let (ahead, changed) = &*self.0;
+        if let Ok(mut ahead) = ahead.lock() {
+            change(&mut ahead);
             changed.notify_one();
         }
     }
 
     /// Waits until the host is near enough for another sample.
     pub fn wait(&self) {
-        let (count, changed) = &*self.0;
-        let Ok(left) = count.lock() else { return };
-        let waited = changed.wait_timeout_while(left, DEAD, |left| *left == 0);
-        if let Ok((mut left, timeout)) = waited {
-            if timeout.timed_out() {
-                // So long that the board notices.
-                *left = 5 * AHEAD;
-            }
-            *left -= 1;
+        let (ahead, changed) = &*self.0;
+        let Ok(ahead) = ahead.lock() else { return };
+        if let Ok(mut ahead) = changed.wait_while(ahead, |a| a.hosts > 0 && a.left == 0) {
+            ahead.left = ahead.left.saturating_sub(1);
         }
+    }
+}
+
+impl Presence {
+    /// The host was there.
+    pub fn touch(&self) {
+        self.0.change(|ahead| ahead.left = AHEAD);
+    }
+}
+
+impl Drop for Presence {
+    fn drop(&mut self) {
+        self.0.change(|ahead| ahead.hosts -= 1);
     }
 }
 

@@ -9,7 +9,7 @@ use wire::reply::{Answer, Info, PROTOCOL, Phase, Reply, Status};
 use wire::request::{Ask, Request};
 use wire::samples::{Sample, Samples};
 
-use crate::emulator::Pace;
+use crate::emulator::{Pace, Presence};
 use crate::error::LineError;
 use crate::port::Port;
 
@@ -17,6 +17,8 @@ use crate::port::Port;
 const ATTEMPTS: u32 = 8;
 /// How long an answer may take.
 const ANSWER: Duration = Duration::from_millis(250);
+/// An emulated board may be slower than a real one by this factor.
+const SLOW: u32 = 20;
 /// The board hears of its host after so long, and after so many samples.
 const ALIVE: Duration = Duration::from_millis(100);
 const ALIVE_SAMPLES: usize = 48;
@@ -87,7 +89,8 @@ pub struct Host {
     waiting: VecDeque<Streamed>,
     /// Frames that came damaged.
     pub damaged: u64,
-    pace: Option<Pace>,
+    /// Of an emulated board, whose time waits for its host.
+    presence: Option<Presence>,
 }
 
 impl Host {
@@ -103,8 +106,19 @@ impl Host {
             unheard: 0,
             waiting: VecDeque::new(),
             damaged: 0,
-            pace,
+            presence: pace.map(|pace| pace.enter()),
         }
+    }
+
+    /// The line, for whoever comes next.
+    #[must_use]
+    pub fn into_port(self) -> Port {
+        self.port
+    }
+
+    /// The line, to do to it what a host does not do.
+    pub fn port(&mut self) -> &mut Port {
+        &mut self.port
     }
 
     /// This host's number.
@@ -239,7 +253,9 @@ impl Host {
 
     /// Sends a request until its answer has come; samples that come meanwhile wait.
     fn answer(&mut self, asked: &'static str, frame: &[u8]) -> Result<Answer, LineError> {
-        for _ in 0..ATTEMPTS {
+        // An emulated board has time of its own, and what it runs on may be busy.
+        let attempts = if self.presence.is_some() { SLOW } else { 1 } * ATTEMPTS;
+        for _ in 0..attempts {
             self.port.send(frame)?;
             self.touch();
             let until = Instant::now() + ANSWER;
@@ -259,7 +275,8 @@ impl Host {
     /// # Errors
     /// [`LineError::Gone`].
     pub fn next(&mut self, patience: Duration) -> Result<Event, LineError> {
-        let until = Instant::now() + patience;
+        let slow = if self.presence.is_some() { SLOW } else { 1 };
+        let until = Instant::now() + slow * patience;
         loop {
             if let Some(streamed) = self.waiting.pop_front() {
                 return Ok(Event::Samples(streamed));
@@ -275,8 +292,11 @@ impl Host {
         }
     }
 
-    /// Tells the board that its host is there.
-    fn alive(&mut self) -> Result<(), LineError> {
+    /// Tells the board that its host is there; [`Self::next`] does it by itself.
+    ///
+    /// # Errors
+    /// [`LineError::Gone`].
+    pub fn alive(&mut self) -> Result<(), LineError> {
         let request = Request {
             number: 0,
             session: self.session,
@@ -290,8 +310,8 @@ impl Host {
     fn touch(&mut self) {
         self.unheard = 0;
         self.alive_at = Instant::now();
-        if let Some(pace) = &self.pace {
-            pace.touch();
+        if let Some(presence) = &self.presence {
+            presence.touch();
         }
     }
 

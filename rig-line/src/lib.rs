@@ -5,6 +5,7 @@
 //! Nothing here knows of models. The dialogue itself is in the crate `wire`, which
 //! the board uses, too.
 
+pub mod alarm;
 pub mod calibrate;
 pub mod command;
 pub mod emulator;
@@ -14,6 +15,7 @@ pub mod log;
 mod port;
 pub mod record;
 mod rig_file;
+pub mod watch;
 
 pub use command::Command;
 pub use error::LineError;

@@ -13,6 +13,7 @@ use crate::command::Command;
 use crate::error::LineError;
 use crate::host::Host;
 use crate::record::{Connect, Gap, Part, Progress, Recording, record};
+use crate::rig_file::RigFile;
 
 /// A recording and its files. Serialises to the keys of `record --json`.
 #[derive(Clone, Debug, Serialize)]
@@ -37,8 +38,32 @@ pub struct Written {
     pub cut_short: Option<String>,
 }
 
-/// Plays `command` and writes `NAME.csv` and `NAME.toml` into `folder`; `channel`
-/// is the name that the measured channel gets, if it is to be kept.
+/// What the columns of a recording are.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Columns {
+    /// From counts to y; the board's own where none is given.
+    pub sensor: Option<Scale>,
+    /// Name and scale of the measured channel, if it is to be kept.
+    pub channel: Option<(String, Scale)>,
+}
+
+impl Columns {
+    /// Those of a rig.
+    #[must_use]
+    pub fn of(rig: &RigFile) -> Self {
+        let scale = |zero: f64, per_count: f64| Scale {
+            zero: zero as f32,
+            per_count: per_count as f32,
+        };
+        Self {
+            sensor: Some(scale(rig.sensor.zero_counts, rig.sensor.per_count)),
+            channel: (rig.channel.as_ref())
+                .map(|c| (c.name.clone(), scale(c.zero_counts, c.per_count))),
+        }
+    }
+}
+
+/// Plays `command` and writes `NAME.csv` and `NAME.toml` into `folder`.
 ///
 /// # Errors
 /// [`LineError`]; nothing is left behind then.
@@ -47,7 +72,7 @@ pub fn to_files(
     connect: &mut Connect<'_>,
     command: &Command,
     repeats: u32,
-    channel: Option<&str>,
+    columns: &Columns,
     folder: &Path,
     watch: &mut dyn FnMut(&Progress),
 ) -> Result<Written, LineError> {
@@ -61,12 +86,12 @@ pub fn to_files(
     let rows = Rows {
         period_s: command.sample_period_s,
         samples: command.samples(),
-        sensor: board.sensor,
-        channel: channel.map(|_| board.channel),
+        sensor: columns.sensor.unwrap_or(board.sensor),
+        channel: columns.channel.clone(),
     };
     let mut outcome = Err(LineError::Silent("who are you"));
     let written = write_atomic(&file, |out| {
-        rows.head(out, channel)?;
+        rows.head(out)?;
         let mut keep = |repeat, samples: &[Sample]| rows.repeat(out, repeat, samples);
         outcome = record(host, connect, command, repeats, &mut keep, watch);
         match &outcome {
@@ -83,7 +108,7 @@ pub fn to_files(
         return Err(LineError::Nothing(reason.clone()));
     }
     written?;
-    let text = Header::of(&recording, command, channel).text();
+    let text = Header::of(&recording, command, &rows).text();
     write_atomic(&header, |out| out.write_all(text.as_bytes()))?;
     Ok(Written {
         file,
@@ -103,13 +128,13 @@ struct Rows {
     period_s: f64,
     samples: u64,
     sensor: Scale,
-    channel: Option<Scale>,
+    channel: Option<(String, Scale)>,
 }
 
 impl Rows {
-    fn head(&self, out: &mut dyn Write, channel: Option<&str>) -> io::Result<()> {
-        match channel {
-            Some(name) => writeln!(out, "t,u,y,{name}"),
+    fn head(&self, out: &mut dyn Write) -> io::Result<()> {
+        match &self.channel {
+            Some((name, _)) => writeln!(out, "t,u,y,{name}"),
             None => writeln!(out, "t,u,y"),
         }
     }
@@ -121,8 +146,8 @@ impl Rows {
             let t = (k as f64 * self.period_s * 1e9).round() / 1e9;
             let y = value(self.sensor, sample.counts);
             write!(out, "{t},{},{y}", u8::from(sample.open))?;
-            if let Some(scale) = self.channel {
-                write!(out, ",{}", value(scale, sample.channel))?;
+            if let Some((_, scale)) = &self.channel {
+                write!(out, ",{}", value(*scale, sample.channel))?;
             }
             writeln!(out)?;
         }
@@ -180,7 +205,7 @@ struct Line {
 }
 
 impl<'a> Header<'a> {
-    fn of(recording: &'a Recording, command: &'a Command, channel: Option<&str>) -> Self {
+    fn of(recording: &'a Recording, command: &'a Command, rows: &Rows) -> Self {
         let board = &recording.board;
         let [major, minor, patch] = board.version;
         let line = |scale: Scale, name: Option<&str>| Line {
@@ -207,8 +232,8 @@ impl<'a> Header<'a> {
                 hold_on_samples: board.hold[0],
                 hold_off_samples: board.hold[1],
             },
-            sensor: line(board.sensor, None),
-            channel: channel.map(|name| line(board.channel, Some(name))),
+            sensor: line(rows.sensor, None),
+            channel: (rows.channel.as_ref()).map(|(name, scale)| line(*scale, Some(name))),
             part: &recording.parts,
             lost: &recording.gaps,
         }

@@ -4,6 +4,8 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Write};
 use std::path::Path;
 use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -16,6 +18,7 @@ pub struct Port {
     /// Keeps other hosts out while the line is open.
     _lock: Option<File>,
     bad: Option<Bad>,
+    reads: Arc<AtomicBool>,
 }
 
 /// A line that loses and changes bytes, to show that it is noticed.
@@ -85,9 +88,14 @@ impl Port {
     #[must_use]
     pub fn over(to: impl Write + Send + 'static, mut from: impl Read + Send + 'static) -> Self {
         let (sender, receiver) = channel();
+        let reads = Arc::new(AtomicBool::new(true));
+        let may_read = reads.clone();
         std::thread::spawn(move || {
             let mut buffer = [0; 4096];
             while let Ok(count @ 1..) = from.read(&mut buffer) {
+                while !may_read.load(Ordering::Relaxed) {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
                 let bytes = buffer.iter().copied().take(count).collect();
                 if sender.send(bytes).is_err() {
                     return;
@@ -99,6 +107,7 @@ impl Port {
             from: receiver,
             _lock: None,
             bad: None,
+            reads,
         }
     }
 
@@ -109,6 +118,12 @@ impl Port {
             bad: Some(bad),
             ..self
         }
+    }
+
+    /// Whether this end reads: one that does not lets the line fill up, to show what
+    /// the board does then.
+    pub fn reads(&self, reads: bool) {
+        self.reads.store(reads, Ordering::Relaxed);
     }
 
     /// Sends bytes.

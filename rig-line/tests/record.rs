@@ -205,6 +205,8 @@ fn two_hosts_do_not_mix() {
         next = streamed.next;
     }
     first.disarm().expect("disarmed");
+    // Another answer, another sample.
+    first.hello().expect("an answer");
     assert!(!hands.is_open.load(Ordering::Relaxed));
 }
 
@@ -262,4 +264,60 @@ fn a_rig_without_air_or_at_a_rail_is_not_calibrated() {
         let message = result.expect_err("refused").to_string();
         assert!(message.contains(word), "{message}");
     }
+}
+
+/// The law at work, then a sensor whose zero moves: logged from rest, judged, and
+/// found out.
+#[test]
+fn a_loop_is_watched_logged_and_judged() {
+    use rig_line::alarm::{Test, Verdict};
+    let (hands, line) = board();
+    hands.as_modelled.store(true, Ordering::Relaxed);
+    let mut host = host(&line, &hands, None, 5);
+    let plan = rig_line::watch::Plan {
+        arm: true,
+        rest_s: 1.0,
+        duration_s: 60.0,
+        log_s: 10.0,
+        test: Test {
+            block_s: 1.0,
+            learn: 20,
+            false_alarms_per_day: 0.01,
+        },
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = folder.path().join("service");
+    let mut seen = Vec::new();
+    let watched = rig_line::watch::watch(
+        &mut host,
+        &plan,
+        &Default::default(),
+        Some(&log),
+        &mut |now| {
+            if now.t > 40.0 {
+                // A fifth of what latches a fault.
+                hands.shift.store(200, Ordering::Relaxed);
+            } else {
+                seen.push(now.verdict);
+            }
+            true
+        },
+    );
+    let watched = watched.expect("watched");
+    assert!(watched.ended.is_none(), "{watched:?}");
+    assert!(
+        matches!(seen.last(), Some(Verdict::True { .. })),
+        "{watched:?}"
+    );
+    let Some(Verdict::Stopped { at_s, .. }) = watched.verdict else {
+        panic!("{watched:?}");
+    };
+    // The judgement counts the time of the law, from the second second on.
+    assert!((39.0..43.0).contains(&at_s), "{at_s}");
+    assert_eq!((watched.lost_samples, watched.logged), (0, 10_000));
+    assert!(watched.rms_error.is_some_and(|e| e < 0.2), "{watched:?}");
+    let set = recordings::DataSet::load(&log).expect("a data set");
+    let record = &set.records[0];
+    assert!(record.u[..1000].iter().all(|u| *u == 0.0) && record.u.contains(&1.0));
+    assert!(!hands.is_open.load(Ordering::Relaxed));
 }

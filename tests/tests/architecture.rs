@@ -31,7 +31,13 @@ const CRATES: [(&str, &[&str]); 7] = [
     (
         "host-fit",
         // The simulator is for the program alone: an optional dependency, see the CI step "library alone".
-        &["closed-loop", "firmware-sim", "model-core", "recordings"],
+        &[
+            "closed-loop",
+            "firmware-sim",
+            "model-core",
+            "recordings",
+            "rig-line",
+        ],
     ),
 ];
 

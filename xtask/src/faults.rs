@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 pub(crate) const TASK: Task = Task {
     name: "faults",
-    does: "fault injection under QEMU: each fault shuts the valve, is latched and logged",
+    does: "fault injection under QEMU: each fault shuts the valve, is latched and logged; faults on the line",
     run: faults,
 };
 
@@ -30,6 +30,7 @@ const INJECTED: [(&str, &str); 6] = [
 const DAMAGED: [(&str, &str); 2] = [("7", "self-test: Checksum"), ("8", "self-test: Golden")];
 
 pub(crate) fn faults(_arguments: &[String]) -> Result<()> {
+    crate::line_faults::line_faults()?;
     let elf = build("qemu-mps2", "qemu-mps2", &["--features", "defmt"], None)?;
     let log = elf.with_extension("log");
     let mut process = qemu(&elf)

@@ -11,7 +11,7 @@ use std::process::Command;
 
 pub(crate) const TASK: Task = Task {
     name: "firmware",
-    does: "builds the flashable ELF: --board nucleo-f446re|qemu-mps2, --model FILE",
+    does: "builds the flashable ELF: --board nucleo-f446re|qemu-mps2|qemu-rig, --model FILE, --rig FILE",
     run: firmware,
 };
 
@@ -19,7 +19,16 @@ pub(crate) const TASK: Task = Task {
 pub(crate) const BOARD_TARGET: &str = TARGETS[0];
 
 /// A board with a program of its own name.
-pub(crate) const BOARDS: [&str; 2] = ["nucleo-f446re", "qemu-mps2"];
+pub(crate) const BOARDS: [&str; 3] = ["nucleo-f446re", "qemu-mps2", "qemu-rig"];
+
+/// The package that a board's program is in.
+pub(crate) fn package(board: &str) -> &str {
+    if board == "qemu-rig" {
+        "qemu-mps2"
+    } else {
+        board
+    }
+}
 
 /// What to build, as the command line says.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -28,10 +37,12 @@ pub(crate) struct Chosen {
     pub(crate) board: Option<&'static str>,
     /// A user's model instead of the bundled one.
     pub(crate) model: Option<PathBuf>,
+    /// A user's rig instead of the bundled one.
+    pub(crate) rig: Option<PathBuf>,
 }
 
 impl Chosen {
-    /// Reads `--board` and `--model`.
+    /// Reads `--board`, `--model` and `--rig`.
     pub(crate) fn read(arguments: &[String]) -> Result<Self> {
         let mut chosen = Self::default();
         let mut rest = arguments.iter();
@@ -47,7 +58,8 @@ impl Chosen {
                     })?);
                 }
                 "--model" => chosen.model = Some(value.into()),
-                _ => bail!("unknown option {option}; there are --board and --model"),
+                "--rig" => chosen.rig = Some(value.into()),
+                _ => bail!("unknown option {option}; there are --board, --model and --rig"),
             }
         }
         Ok(chosen)
@@ -55,18 +67,19 @@ impl Chosen {
 
     /// The board's own program, with the model that was chosen.
     pub(crate) fn build(&self, board: &str) -> Result<PathBuf> {
-        let Some(model) = &self.model else {
-            return build(board, board, &[], None);
+        let (model, rig) = (self.model.as_deref(), self.rig.as_deref());
+        let Some(named) = model.or(rig) else {
+            return build(package(board), board, &[], None);
         };
-        let constants = identified::of(model)?;
-        let elf = build(board, board, &[], Some(&constants)).with_context(|| {
+        let constants = identified::of(model, rig)?;
+        let elf = build(package(board), board, &[], Some(&constants)).with_context(|| {
             format!(
                 "{} does not fit the board; the message above says what of it",
-                model.display()
+                named.display()
             )
         })?;
         // The next build of the bundled model must not take its place.
-        let stem = model.file_stem().unwrap_or_default().to_string_lossy();
+        let stem = named.file_stem().unwrap_or_default().to_string_lossy();
         let own = firmware_target().join(format!("{board}-{stem}"));
         std::fs::copy(&elf, &own).with_context(|| own.display().to_string())?;
         Ok(own)

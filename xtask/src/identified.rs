@@ -12,6 +12,10 @@ pub(crate) const TASK: Task = Task {
     run: identified,
 };
 
+/// The rig file in `firmware/identified/models`, without `.toml`; its constants are written with
+/// those of the first model.
+const RIG: &str = "rig";
+
 /// The model files in `firmware/identified/models`, without `.toml`.
 const MODELS: [&str; 4] = ["full", "averaged", "effects", "own"];
 
@@ -22,21 +26,26 @@ pub(crate) fn identified(arguments: &[String]) -> Result<()> {
         _ => bail!("the only option is --check"),
     };
     let folder = root().join("firmware/identified");
-    for model in MODELS {
-        let kept = folder.join("generated").join(model).with_extension("rs");
-        let written = if check {
-            std::env::temp_dir().join(format!("{}-{model}.rs", std::process::id()))
-        } else {
-            kept.clone()
-        };
-        let file = folder.join("models").join(model).with_extension("toml");
-        generate(&file, &written, &[])?;
-        if check {
+    let (models, generated) = (folder.join("models"), folder.join("generated"));
+    let written = if check {
+        std::env::temp_dir().join(format!("identified-{}", std::process::id()))
+    } else {
+        generated.clone()
+    };
+    std::fs::create_dir_all(&written)?;
+    let rig = models.join(RIG).with_extension("toml");
+    for (i, model) in MODELS.into_iter().enumerate() {
+        let file = models.join(model).with_extension("toml");
+        let to = written.join(model).with_extension("rs");
+        generate(&file, &to, (i == 0).then_some(rig.as_path()), &[])?;
+    }
+    if check {
+        for name in MODELS.into_iter().chain([RIG]) {
+            let kept = generated.join(name).with_extension("rs");
             let read = |path: &Path| {
                 std::fs::read(path).with_context(|| format!("could not read {}", path.display()))
             };
-            let equal = read(&written)? == read(&kept)?;
-            std::fs::remove_file(&written)?;
+            let equal = read(&written.join(name).with_extension("rs"))? == read(&kept)?;
             if !equal {
                 bail!(
                     "{} is not what codegen writes now; run `cargo xtask identified`",
@@ -44,28 +53,44 @@ pub(crate) fn identified(arguments: &[String]) -> Result<()> {
                 );
             }
         }
+        std::fs::remove_dir_all(&written)?;
     }
     Ok(())
 }
 
-/// A folder with the constants of a user's model, for a build of the firmware;
-/// a model that no board can run is refused.
-pub(crate) fn of(model: &Path) -> Result<PathBuf> {
+/// A folder with the constants of a user's model and rig, for a build of the
+/// firmware; a model that no board can run, and a rig that contradicts it, are
+/// refused. Without a model the bundled one counts.
+pub(crate) fn of(model: Option<&Path>, rig: Option<&Path>) -> Result<PathBuf> {
+    let bundled = root().join("firmware/identified/models/full.toml");
     // As the user typed it: relative to where the task was called.
-    let model = std::path::absolute(model)?;
+    let model = model.map_or(Ok(bundled), std::path::absolute)?;
+    let rig = rig.map(std::path::absolute).transpose()?;
     let folder = firmware_target().join("identified");
+    // Another rig's constants must not stay.
+    if folder.exists() {
+        std::fs::remove_dir_all(&folder)?;
+    }
     std::fs::create_dir_all(&folder)?;
-    generate(&model, &folder.join("on_board.rs"), &["--board"])?;
+    generate(
+        &model,
+        &folder.join("on_board.rs"),
+        rig.as_deref(),
+        &["--board"],
+    )?;
     Ok(folder)
 }
 
-fn generate(model: &Path, to: &Path, options: &[&str]) -> Result<()> {
-    run(
-        cargo(&["run", "--release", "--quiet", "--package", "host-fit", "--"])
-            .arg("codegen")
-            .arg(model)
-            .arg("--output")
-            .arg(to)
-            .args(options),
-    )
+fn generate(model: &Path, to: &Path, rig: Option<&Path>, options: &[&str]) -> Result<()> {
+    let mut codegen = cargo(&["run", "--release", "--quiet", "--package", "host-fit", "--"]);
+    codegen
+        .arg("codegen")
+        .arg(model)
+        .arg("--output")
+        .arg(to)
+        .args(options);
+    if let Some(rig) = rig {
+        codegen.arg("--rig").arg(rig);
+    }
+    run(&mut codegen)
 }

@@ -10,6 +10,7 @@ mod elf;
 mod faults;
 mod firmware;
 mod identified;
+mod line_faults;
 mod new_effect;
 mod pil;
 mod setup;

@@ -84,7 +84,7 @@ pub(crate) fn pil(arguments: &[String]) -> Result<Outcome> {
 /// The folder of constants that the board's program is built with.
 fn constants(model: Option<&Path>) -> Result<PathBuf> {
     if let Some(model) = model {
-        return crate::identified::of(model);
+        return crate::identified::of(Some(model), None);
     }
     let folder = firmware_target().join("cases");
     std::fs::create_dir_all(&folder)?;

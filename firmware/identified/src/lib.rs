@@ -1,5 +1,5 @@
 //! Constants that `host-fit codegen` wrote, a module for each model; `on_board` is
-//! the one that the boards run.
+//! the one that the boards run, and `rig` what they are connected to.
 //!
 //! Those in `generated/` are of the model files in `models/`: `cargo xtask
 //! identified` writes them anew, and CI compares. `cargo xtask firmware --model

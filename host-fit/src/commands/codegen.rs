@@ -2,13 +2,14 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use host_fit::codegen::board;
 use host_fit::model::Model;
 use host_fit::output::write_atomic;
 use host_fit::steps;
+use rig_line::RigFile;
 
-use super::Console;
+use super::{Console, rig_constants};
 
 /// Write a model's constants as Rust for a no_std crate on model-core, the designed law's with them.
 #[derive(Debug, clap::Args)]
@@ -22,6 +23,10 @@ pub(crate) struct Args {
     /// than one measured channel, or too large.
     #[arg(long)]
     board: bool,
+    /// The rig that it is for: one that contradicts the model is refused, and its constants are
+    /// written beside the output, as `rig.rs`.
+    #[arg(long, value_name = "rig.toml")]
+    rig: Option<PathBuf>,
 }
 
 /// Runs the command.
@@ -30,8 +35,20 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     if args.board {
         board::check(&model).with_context(|| format!("no board runs {}", args.model.display()))?;
     }
+    let rig = args.rig.as_deref().map(RigFile::load).transpose()?;
+    if let (Some(rig), Some(file)) = (&rig, &args.rig) {
+        rig_constants::fits(rig, &model).map_err(|reason| {
+            let (rig, model) = (file.display(), args.model.display());
+            anyhow!("{rig} contradicts {model}: {reason}")
+        })?;
+    }
     let constants = steps::constants(&model)
         .with_context(|| format!("no constants from {}", args.model.display()))?;
+    if let Some(rig) = &rig {
+        let text = rig_constants::rust(rig);
+        let path = args.output.with_file_name("rig.rs");
+        write_atomic(&path, |file| file.write_all(text.as_bytes()))?;
+    }
     write_atomic(&args.output, |file| {
         file.write_all(constants.text.as_bytes())
     })?;

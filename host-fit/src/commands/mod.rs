@@ -30,8 +30,11 @@ pub(crate) mod import;
 mod interrupt;
 mod load;
 mod page;
+pub(crate) mod record;
+mod rig_constants;
 pub(crate) mod rules;
 pub(crate) mod simulate;
+pub(crate) mod watch;
 mod words;
 
 /// How a command talks to the user.

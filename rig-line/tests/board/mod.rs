@@ -8,6 +8,8 @@ use std::sync::atomic::{AtomicBool, AtomicU16, AtomicU64, Ordering};
 use firmware::controller::Reading;
 use firmware::link::desk::Desk;
 use firmware::on_board;
+use identified::on_board as model;
+use model_core::{Input, step};
 use rig_line::emulator::Pace;
 use rig_line::{Bad, Host, LineError, Port};
 use wire::Outbox;
@@ -28,6 +30,10 @@ pub(crate) struct Hands {
     /// Air shut off by hand.
     pub(crate) no_air: Arc<AtomicBool>,
     pub(crate) pace: Pace,
+    /// The flow is the one that the board's model is of.
+    pub(crate) as_modelled: Arc<AtomicBool>,
+    /// Added to the reading, counts.
+    pub(crate) shift: Arc<AtomicU16>,
 }
 
 /// A board, and its line.
@@ -88,6 +94,8 @@ impl Valve {
 
 fn run(hands: &Hands, mut line: UnixStream) {
     line.set_nonblocking(true).expect("a line");
+    let flow = model::model();
+    let mut state = model::state(&flow);
     let mut friction = 0.0_f32;
     let mut valve = Valve {
         asked: false,
@@ -113,7 +121,21 @@ fn run(hands: &Hands, mut line: UnixStream) {
                 valve.follow(open) && !hands.no_air.load(Ordering::Relaxed),
             )) - friction)
                 / 40.0;
-            let [mut counts, channel] = shown(k, friction);
+            let [mut counts, channel] = if hands.as_modelled.load(Ordering::Relaxed) {
+                let input = Input {
+                    command: f32::from(u8::from(open)),
+                    channels: &model::REFERENCES,
+                };
+                let y = step(&flow, &mut state, &input).measured;
+                // In the units of `shown`: 800 counts are y = 0, 2000 more y = 1.
+                shown(
+                    k,
+                    (on_board::SETTINGS.calibration.counts(y) - 900.0) / 1800.0,
+                )
+            } else {
+                shown(k, friction)
+            };
+            counts += hands.shift.load(Ordering::Relaxed);
             let reading = hands.reading.load(Ordering::Relaxed);
             if reading > 0 {
                 counts = reading;

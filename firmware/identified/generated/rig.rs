@@ -1,0 +1,16 @@
+//! Constants of a rig. Generated from its rig.toml; measure the rig anew instead.
+
+/// Counts of the separated flow, y = 0.
+pub const ZERO: f32 = 800.0;
+/// y per count.
+pub const PER_COUNT: f32 = 0.0005;
+/// Readings at or beyond these are at a rail, counts.
+pub const RAILS: [f32; 2] = [8.0, 4087.0];
+/// Equal readings in a row that mean a stuck sensor.
+pub const STUCK_AFTER: u32 = 500;
+/// Largest residual, averaged over about 64 samples, y.
+pub const RESIDUAL_ENVELOPE: f32 = 0.5;
+/// The valve's shortest times open and shut, samples.
+pub const SHORTEST: [u32; 2] = [4, 4];
+/// The measured channel: counts of 0, units per count, rails in counts; `None` if it was not measured.
+pub const CHANNEL: Option<[f32; 4]> = None;

@@ -1,0 +1,245 @@
+//! `host-fit record`: has the board play commands and writes what it sampled; or
+//! measures the rig.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use rig_line::calibrate::{self, ChannelSaid};
+use rig_line::log::{Columns, Written, to_files};
+use rig_line::record::Progress;
+use rig_line::{Command, RigFile};
+use serde::Serialize;
+
+use super::average::{not_negative, positive};
+use super::words::Words;
+use super::{Console, interrupt};
+use crate::rig_port::PortArgs;
+
+/// Have the board at the rig play commands, and write every sample: raw recordings that `average` reads.
+///
+/// The valve is shut at the end, on any fault, and when the link breaks. Repeats of which a sample was lost, or in
+/// which the link broke, are played again: what is written came whole, each repeat from rest. With `--calibrate` the
+/// rig is measured instead: rig.toml, for `--rig` and for the next build of the firmware.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    port: PortArgs,
+    /// Command to play: a CSV file with the columns t and u (0 or 1); repeatable, one after the other.
+    #[arg(
+        long,
+        value_name = "experiment.csv",
+        required_unless_present = "calibrate"
+    )]
+    command: Vec<PathBuf>,
+    /// How often each command is played.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    repeats: u32,
+    /// How long the valve has been shut at least when a repeat begins, in seconds: the flow must have come to rest.
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.5, value_parser = not_negative)]
+    rest: f64,
+    /// Folder for the recordings; with `--calibrate` the rig file.
+    #[arg(short, long, value_name = "DIR|rig.toml")]
+    output: PathBuf,
+    /// The rig: what counts stand for. Without it the board's own constants count.
+    #[arg(long, value_name = "rig.toml", conflicts_with = "calibrate")]
+    rig: Option<PathBuf>,
+    /// Measure the rig: zero, steady blowing, noise, rails, the valve's shortest times.
+    #[arg(long)]
+    calibrate: bool,
+    /// With `--calibrate`: the measured channel, which the board cannot know: its name, unit, counts of 0 and units
+    /// per count.
+    #[arg(long, value_name = "NAME,UNIT,ZERO,PER_COUNT", requires = "calibrate", value_parser = said)]
+    channel: Option<ChannelSaid>,
+    /// With `--calibrate`: how long steady flow is waited for, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 4.0, value_parser = positive, requires = "calibrate")]
+    steady: f64,
+    /// Take note of a latched fault, or disarm the law, first.
+    #[arg(long)]
+    disarm: bool,
+}
+
+fn said(text: &str) -> Result<ChannelSaid, String> {
+    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+    let number = |text: &str| {
+        text.parse::<f64>()
+            .map_err(|_| format!("`{text}` is no number"))
+    };
+    match parts[..] {
+        [name, unit, zero, per_count] => Ok(ChannelSaid {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            zero_counts: number(zero)?,
+            per_count: number(per_count)?,
+        }),
+        _ => Err("it has four parts: u_inf,m/s,0,0.005".into()),
+    }
+}
+
+/// What was recorded.
+#[derive(Serialize)]
+struct Recorded {
+    recordings: Vec<Written>,
+}
+
+impl Words for Recorded {
+    fn words(&self) -> String {
+        let each = self.recordings.iter().map(|r| {
+            let mut text = format!(
+                "{}: {} whole repeats of {} s, in {}",
+                r.file.display(),
+                r.repeats,
+                r.period_s,
+                if r.parts == 1 { "one go".into() } else { format!("{} goes", r.parts) },
+            );
+            if r.lost_samples > 0 {
+                text.push_str(&format!(
+                    "; {} samples were lost ({} of them found no room on the board) and their repeats played again",
+                    r.lost_samples, r.left_out_samples
+                ));
+            }
+            text
+        });
+        let mut lines: Vec<String> = each.collect();
+        if let [first, rest @ ..] = &self.recordings[..] {
+            let same = rest.iter().all(|r| r.period_s == first.period_s);
+            let folder = first.file.parent().unwrap_or(&first.file);
+            lines.push(if same {
+                format!(
+                    "next: host-fit average {}/*.csv --period {} --out DIR",
+                    folder.display(),
+                    first.period_s
+                )
+            } else {
+                "next: host-fit average each with its own --period".into()
+            });
+        }
+        lines.join("\n")
+    }
+}
+
+/// A rig that was measured.
+#[derive(Serialize)]
+struct Measured(RigFile);
+
+impl Words for Measured {
+    fn words(&self) -> String {
+        let rig = &self.0;
+        let [on, off] = rig.hold_samples();
+        let noise = rig
+            .sensor
+            .noise_counts
+            .unwrap_or_default()
+            .map(|n| n * rig.sensor.per_count.abs());
+        format!(
+            "sensor: {} counts is y = 0, {:.1} is y = 1; noise {:.4} shut, {:.4} open (y)\n\
+             valve: the flow answers {on} samples open and {off} shut\n\
+             residual's envelope: {} (y)",
+            rig.sensor.zero_counts,
+            rig.sensor.zero_counts + 1.0 / rig.sensor.per_count,
+            noise[0],
+            noise[1],
+            rig.residual_envelope
+        )
+    }
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
+    let commands = args.command.iter().map(|path| Command::load(path));
+    let commands = commands.collect::<Result<Vec<_>, _>>()?;
+    let twice = commands
+        .iter()
+        .enumerate()
+        .find(|(i, c)| commands[..*i].iter().any(|o| o.name == c.name));
+    if let Some((_, command)) = twice {
+        bail!(
+            "two commands are named `{}`, and so would be their recordings; rename a file",
+            command.name
+        );
+    }
+    let columns = match &args.rig {
+        Some(path) => Columns::of(&RigFile::load(path)?),
+        None => Columns::default(),
+    };
+    let mut connected = args.port.connect()?;
+    if args.disarm {
+        connected.host.disarm()?;
+    }
+    if args.calibrate {
+        return calibrate(args, connected, console);
+    }
+    let mut recordings = Vec::new();
+    for command in commands {
+        let rest = (args.rest / command.sample_period_s).round() as u32;
+        let command = command.with_rest(rest);
+        let total = u64::from(args.repeats) * command.samples();
+        let bar = console.progress(total, "{wide_bar} {msg} {eta}");
+        let sensor = columns.sensor;
+        let mut watch = |now: &Progress| {
+            let done = u64::from(now.whole) * command.samples() + u64::from(now.sample);
+            bar.set_position(done);
+            let reading = sensor.map_or_else(
+                || format!("{} counts", now.newest.counts),
+                |scale| format!("y {:6.3}", rig_line::log::value(scale, now.newest.counts)),
+            );
+            bar.set_message(format!(
+                "{} {}/{}  {reading}  valve {}  lost {}",
+                command.name,
+                now.whole,
+                args.repeats,
+                u8::from(now.newest.open),
+                now.lost
+            ));
+        };
+        let (host, mut again) = connected.ends();
+        let written = to_files(
+            host,
+            &mut again,
+            &command,
+            args.repeats,
+            &columns,
+            &args.output,
+            &mut watch,
+        )?;
+        bar.finish_and_clear();
+        let cut = written.cut_short.clone();
+        recordings.push(written);
+        if let Some(why) = cut {
+            let recorded = Recorded { recordings };
+            console.show(&recorded, &[], &[])?;
+            bail!("the recording was cut short: {why}");
+        }
+    }
+    let files: Vec<PathBuf> = recordings.iter().map(|r| r.header.clone()).collect();
+    let written: Vec<&std::path::Path> = files.iter().map(PathBuf::as_path).collect();
+    console.show(&Recorded { recordings }, &[], &written)
+}
+
+fn calibrate(
+    args: &Args,
+    mut connected: crate::rig_port::Connected,
+    console: Console,
+) -> anyhow::Result<()> {
+    let plan = calibrate::Plan {
+        steady_s: args.steady,
+        ..calibrate::Plan::default()
+    };
+    let bar = console.progress(0, "{spinner} {msg} ({elapsed})");
+    let interrupt = interrupt::watch();
+    let rig = calibrate::calibrate(
+        &mut connected.host,
+        &plan,
+        args.channel.clone(),
+        &mut |what, now| {
+            bar.set_message(format!("{what}: {} counts", now.newest.counts));
+            if interrupt.load(std::sync::atomic::Ordering::Relaxed) {
+                // The board shuts the valve when its host is silent.
+                std::process::exit(130);
+            }
+        },
+    )
+    .context("no rig file was written")?;
+    bar.finish_and_clear();
+    rig.save(&args.output)?;
+    console.show(&Measured(rig), &[("output", &args.output)], &[&args.output])
+}

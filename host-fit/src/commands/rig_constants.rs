@@ -1,0 +1,218 @@
+//! A rig's constants for the firmware, and whether they fit a model.
+
+use host_fit::model::{Law, Model};
+use rig_line::RigFile;
+
+/// The constants as Rust: plain numbers, for the firmware's `identified::rig`.
+pub(crate) fn rust(rig: &RigFile) -> String {
+    let [on, off] = rig.hold_samples();
+    let sensor = &rig.sensor;
+    let mut text = format!(
+        "//! Constants of a rig. Generated from its rig.toml; measure the rig anew instead.\n\n\
+         /// Counts of the separated flow, y = 0.\n\
+         pub const ZERO: f32 = {:?};\n\
+         /// y per count.\n\
+         pub const PER_COUNT: f32 = {:?};\n\
+         /// Readings at or beyond these are at a rail, counts.\n\
+         pub const RAILS: [f32; 2] = [{:?}, {:?}];\n\
+         /// Equal readings in a row that mean a stuck sensor.\n\
+         pub const STUCK_AFTER: u32 = {};\n\
+         /// Largest residual, averaged over about 64 samples, y.\n\
+         pub const RESIDUAL_ENVELOPE: f32 = {:?};\n\
+         /// The valve's shortest times open and shut, samples.\n\
+         pub const SHORTEST: [u32; 2] = [{on}, {off}];\n",
+        sensor.zero_counts as f32,
+        sensor.per_count as f32,
+        sensor.lower_rail_counts as f32,
+        sensor.upper_rail_counts as f32,
+        sensor.stuck_after_samples,
+        rig.residual_envelope as f32,
+    );
+    text.push_str(
+        "/// The measured channel: counts of 0, units per count, rails in counts; `None` if it was not measured.\n",
+    );
+    text.push_str(&match &rig.channel {
+        None => "pub const CHANNEL: Option<[f32; 4]> = None;\n".to_owned(),
+        Some(channel) => format!(
+            "// {} in {}.\npub const CHANNEL: Option<[f32; 4]> = Some([{:?}, {:?}, {:?}, {:?}]);\n",
+            channel.name.escape_default(),
+            channel.unit.escape_default(),
+            channel.zero_counts as f32,
+            channel.per_count as f32,
+            channel.lower_rail_counts as f32,
+            channel.upper_rail_counts as f32,
+        ),
+    });
+    text
+}
+
+/// Says whether `model` can run at `rig`.
+///
+/// # Errors
+/// What contradicts what, with the keys of both files and what to do.
+pub(crate) fn fits(rig: &RigFile, model: &Model) -> Result<(), String> {
+    if !model.is_sampled_at(rig.sample_period_s) {
+        return Err(format!(
+            "`sample_period_s`: the rig was measured at {} s and the model is for {} s; calibrate with the board at the \
+             model's period, or identify at the rig's",
+            rig.sample_period_s, model.sample_period_s
+        ));
+    }
+    let sensor = &rig.sensor;
+    let ends = [sensor.lower_rail_counts, sensor.upper_rail_counts].map(|c| rig.friction(c));
+    let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+    let inside = |y: f64| low < y && y < high;
+    let [least, most] = model.training.y_range;
+    // A model without records says nothing of its range.
+    if least < most && !(inside(least) && inside(most)) {
+        return Err(format!(
+            "`sensor` and the model's training range: y from {least:.3} to {most:.3} was seen, and this rig shows {low:.3} to \
+             {high:.3} between its rails; the model is of another rig or another divider: calibrate anew, or identify here"
+        ));
+    }
+    if let Some(Law::Track(track)) = &model.law
+        && !inside(track.reference)
+    {
+        return Err(format!(
+            "`sensor` and `law.reference`: y* = {} is outside of what this rig shows, {low:.3} to {high:.3}; design for another",
+            track.reference
+        ));
+    }
+    let hold = match &model.law {
+        Some(Law::Track(track)) => Some(track.hold),
+        Some(Law::Maximise(maximise)) => Some(maximise.hold),
+        _ => None,
+    };
+    let [on, off] = rig.hold_samples();
+    if let Some(hold) = hold
+        && (hold.on < on || hold.off < off)
+    {
+        return Err(format!(
+            "`valve` and `law.hold`: the valve's shortest times are {on} samples open and {off} shut, and the law takes {} and \
+             {}; design with --min-on {} --min-off {}",
+            hold.on, hold.off, rig.valve.shortest_on_s, rig.valve.shortest_off_s
+        ));
+    }
+    for needed in model.memory().channels {
+        let Some(channel) = &rig.channel else {
+            return Err(format!(
+                "`channel`: the model's effects need `{}`, and the rig file has no channel; calibrate with --channel",
+                needed.name
+            ));
+        };
+        if channel.name != needed.name {
+            return Err(format!(
+                "`channel.name`: the model's effects need `{}`, and the rig's channel is `{}`",
+                needed.name, channel.name
+            ));
+        }
+        let counts = needed.reference / channel.per_count + channel.zero_counts;
+        if !(channel.lower_rail_counts < counts && counts < channel.upper_rail_counts) {
+            return Err(format!(
+                "`channel` and the model's reference of it: {} {} would read {counts:.0} counts, which is at a rail; is the unit \
+                 the same?",
+                needed.reference, channel.unit
+            ));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rig_line::{ChannelEntry, SensorEntry, ValveEntry};
+
+    fn model() -> Model {
+        let text = include_str!("../../../firmware/identified/models/full.toml");
+        Model::from_toml(text, "full.toml").expect("a model file")
+    }
+
+    fn rig() -> RigFile {
+        RigFile {
+            format_version: 1,
+            sample_period_s: 0.001,
+            residual_envelope: 0.5,
+            sensor: SensorEntry {
+                zero_counts: 800.0,
+                per_count: 0.0005,
+                lower_rail_counts: 8.0,
+                upper_rail_counts: 4087.0,
+                stuck_after_samples: 500,
+                noise_counts: None,
+            },
+            valve: ValveEntry {
+                shortest_on_s: 0.02,
+                shortest_off_s: 0.02,
+            },
+            channel: None,
+        }
+    }
+
+    #[test]
+    fn what_contradicts_is_refused_with_both_keys() {
+        assert_eq!(fits(&rig(), &model()), Ok(()));
+        type Change = fn(&mut RigFile, &mut Model);
+        let wrong: [(&str, Change); 7] = [
+            ("sample_period_s", |r, _| r.sample_period_s = 0.002),
+            ("training range", |_, m| m.training.y_range = [-0.1, 2.0]),
+            ("law.reference", |r, _| r.sensor.per_count = 1e-4),
+            ("--min-on 0.03", |r, _| r.valve.shortest_on_s = 0.03),
+            ("no channel", |_, m| needs(m, "u_inf")),
+            ("channel is `u_inf`", |r, m| {
+                r.channel = Some(channel());
+                needs(m, "temperature");
+            }),
+            ("at a rail", |r, m| {
+                r.channel = Some(ChannelEntry {
+                    per_count: 1e-3,
+                    ..channel()
+                });
+                needs(m, "u_inf");
+            }),
+        ];
+        for (word, change) in wrong {
+            let (mut rig, mut model) = (rig(), model());
+            change(&mut rig, &mut model);
+            let reason = fits(&rig, &model).expect_err(word);
+            assert!(reason.contains(word), "{reason}");
+        }
+        let (mut rig, mut model) = (rig(), model());
+        rig.channel = Some(channel());
+        needs(&mut model, "u_inf");
+        assert_eq!(fits(&rig, &model), Ok(()));
+    }
+
+    fn needs(model: &mut Model, channel: &str) {
+        model.effects.push(host_fit::model::Added {
+            name: "free-stream-variation".to_owned(),
+            parameters: vec![-1.0],
+            channel: Some(channel.to_owned()),
+            reference: Some(10.0),
+        });
+    }
+
+    fn channel() -> ChannelEntry {
+        ChannelEntry {
+            name: "u_inf".into(),
+            unit: "m/s".into(),
+            zero_counts: 0.0,
+            per_count: 0.005,
+            lower_rail_counts: 8.0,
+            upper_rail_counts: 4087.0,
+        }
+    }
+
+    #[test]
+    fn the_constants_are_the_files() {
+        let text = rust(&rig());
+        for line in [
+            "pub const ZERO: f32 = 800.0;",
+            "pub const PER_COUNT: f32 = 0.0005;",
+            "pub const SHORTEST: [u32; 2] = [20, 20];",
+            "pub const CHANNEL: Option<[f32; 4]> = None;",
+        ] {
+            assert!(text.contains(line), "{text}");
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! `host-fit watch`: the closed loop live, logged, and its model judged.
+
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+use anyhow::bail;
+use rig_line::RigFile;
+use rig_line::alarm::{DAY_S, Test, Verdict};
+use rig_line::log::Columns;
+use rig_line::watch::{Now, Plan, Watched, watch};
+use rig_line::word;
+
+use super::average::positive;
+use super::words::Words;
+use super::{Console, interrupt};
+use crate::rig_port::PortArgs;
+
+/// Watch the law at work: a live line, a log that `compare` and `diagnose` read, and whether the model is still true.
+///
+/// The residual (reading minus the model, which runs free beside the loop) is averaged over blocks, and each block
+/// judged against the first ones; the chance of any false alarm on a day of 8 hours is what is stated. The log begins
+/// at rest, and ends where a sample was lost: a record needs its whole history.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    port: PortArgs,
+    /// Let the law have the valve after a second of rest, and shut it in the end; without it the loop is watched as it is.
+    #[arg(long)]
+    arm: bool,
+    /// How long, in seconds; until Ctrl-C if not given.
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    seconds: Option<f64>,
+    /// Folder for the log, a data set.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Longest log, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = positive)]
+    log: f64,
+    /// Length of a block, in seconds; many times what the noise remembers.
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = positive)]
+    block: f64,
+    /// Blocks that say what is usual.
+    #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(3..))]
+    learn: u32,
+    /// Chance of a false alarm on a day of 8 hours.
+    #[arg(long, value_name = "CHANCE", default_value_t = 0.01, value_parser = positive)]
+    false_alarms: f64,
+    /// The rig: what counts stand for. Without it the board's own constants count.
+    #[arg(long, value_name = "rig.toml")]
+    rig: Option<PathBuf>,
+    /// Take note of a latched fault, or disarm the law, first.
+    #[arg(long)]
+    disarm: bool,
+}
+
+impl Words for Watched {
+    fn words(&self) -> String {
+        let mut lines = vec![format!(
+            "{:.1} s, {} samples, {} lost",
+            self.seconds, self.samples, self.lost_samples
+        )];
+        let shown = |name: &str, value: Option<f64>| value.map(|v| format!("{name} {v:.4}"));
+        let figures = [
+            shown("mean y", self.mean),
+            shown("rms error", self.rms_error),
+            shown("rms residual", self.rms_residual),
+            shown("air", self.air),
+            self.switches_per_s.map(|s| format!("switches/s {s:.1}")),
+        ];
+        let figures: Vec<String> = figures.into_iter().flatten().collect();
+        if !figures.is_empty() {
+            lines.push(figures.join(", "));
+        }
+        lines.extend(self.verdict.map(|verdict| judged(&verdict)));
+        if self.log.is_some() {
+            lines.push(format!("log: {} samples", self.logged));
+        }
+        lines.join("\n")
+    }
+}
+
+fn judged(verdict: &Verdict) -> String {
+    match verdict {
+        Verdict::Learning { blocks_left } => {
+            format!(
+                "the model is not judged yet: {blocks_left} blocks are missing that say what is usual"
+            )
+        }
+        Verdict::True { largest, threshold } => format!(
+            "the model is as true as it was: no block was further off than {largest:.1} standard deviations ({threshold:.1} \
+             would be an alarm)"
+        ),
+        Verdict::Stopped {
+            at_s,
+            residual,
+            usual,
+            distance,
+            threshold,
+        } => format!(
+            "THE MODEL HAS STOPPED BEING TRUE at {at_s:.1} s: the residual went from {usual:.4} to {residual:.4}, {:.1} \
+             standard deviations ({threshold:.1} are an alarm); `compare` and `diagnose` read the log",
+            distance.abs()
+        ),
+    }
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
+    let columns = match &args.rig {
+        Some(path) => Columns::of(&RigFile::load(path)?),
+        None => Columns::default(),
+    };
+    let plan = Plan {
+        arm: args.arm,
+        rest_s: 1.0,
+        duration_s: args.seconds.unwrap_or(f64::INFINITY),
+        log_s: args.log,
+        test: Test {
+            block_s: args.block,
+            learn: args.learn,
+            false_alarms_per_day: args.false_alarms.min(1.0),
+        },
+    };
+    let mut connected = args.port.connect()?;
+    if args.disarm {
+        connected.host.disarm()?;
+    }
+    let bar = console.progress(0, "{msg}");
+    let interrupt = interrupt::watch();
+    let watched = watch(
+        &mut connected.host,
+        &plan,
+        &columns,
+        args.output.as_deref(),
+        &mut |now: &Now| {
+            let shown = |name: &str, value: Option<f64>| {
+                value.map_or_else(String::new, |v| format!("  {name} {v:6.3}"))
+            };
+            let state = match now.verdict {
+                Verdict::Learning { .. } => "learning",
+                Verdict::True { .. } => "true",
+                Verdict::Stopped { .. } => "STOPPED BEING TRUE",
+            };
+            bar.set_message(format!(
+                "{:8.1} s  {}  y {:6.3}{}{}  valve {}  lost {}  model: {state}",
+                now.t,
+                word(now.phase),
+                now.y,
+                shown("y*", now.reference),
+                shown("model", now.model),
+                u8::from(now.open),
+                now.lost
+            ));
+            !interrupt.load(Ordering::Relaxed)
+        },
+    )?;
+    bar.finish_and_clear();
+    let written = watched.log.clone();
+    let written: Vec<_> = written.iter().map(PathBuf::as_path).collect();
+    console.show(&watched, &[], &written)?;
+    console.say(&format!(
+        "chance of a false alarm in {} h: {}",
+        DAY_S / 3600.0,
+        plan.test.false_alarms_per_day
+    ))?;
+    match &watched.ended {
+        Some(why) => bail!("{why}"),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,129 @@
+//! A board at a serial port, or one under QEMU with a simulated rig behind it.
+
+use std::hash::{BuildHasher, Hasher, RandomState};
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use firmware_sim::hidden_set::HiddenSetPlan;
+use firmware_sim::instrument::{Converter, Noise, NoiseSignal};
+use firmware_sim::plant::{FreeStream, Rig};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rig_line::emulator::{self, Emulator, Pace};
+use rig_line::{Host, LineError, Port};
+
+/// Which board.
+#[derive(Debug, Clone, clap::Args)]
+pub(crate) struct PortArgs {
+    /// Serial port of the board, or `qemu`: a board under QEMU with a simulated rig behind it.
+    #[arg(long, value_name = "PATH|qemu")]
+    port: PathBuf,
+    /// With `--port qemu`: the board's program, as `cargo xtask firmware --board qemu-rig` builds it.
+    #[arg(long, value_name = "ELF")]
+    firmware: Option<PathBuf>,
+    /// With `--port qemu`: an effect that the simulated rig has; repeatable.
+    #[arg(long, value_name = "EFFECT")]
+    rig_effect: Vec<String>,
+    /// With `--port qemu`: which simulated rig.
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    rig_seed: u64,
+    /// With `--port qemu`: which noise it has.
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    noise_seed: u64,
+}
+
+/// A board on the line; it ends with this.
+pub(crate) struct Connected {
+    /// The host's end.
+    pub(crate) host: Host,
+    port: PathBuf,
+    _emulator: Option<Emulator>,
+}
+
+impl PortArgs {
+    /// Opens the port, or starts the board.
+    pub(crate) fn connect(&self) -> anyhow::Result<Connected> {
+        if self.port != Path::new("qemu") {
+            return Ok(Connected {
+                host: open(&self.port, None)?,
+                port: self.port.clone(),
+                _emulator: None,
+            });
+        }
+        let elf = self.firmware.clone().unwrap_or_else(|| {
+            let target =
+                std::env::var_os("CARGO_TARGET_DIR").map_or("target".into(), PathBuf::from);
+            target.join("firmware/thumbv7em-none-eabihf/release/qemu-rig")
+        });
+        let rig = Simulated::new(&self.rig_effect, self.rig_seed, self.noise_seed)
+            .context("no simulated rig")?;
+        let mut emulator = Emulator::start(&elf, Box::new(rig))?;
+        let port = emulator.port().context("QEMU has no serial line")?;
+        Ok(Connected {
+            host: Host::new(port, session(), Some(emulator.pace.clone())),
+            port: self.port.clone(),
+            _emulator: Some(emulator),
+        })
+    }
+}
+
+impl Connected {
+    /// The host, and how to find the board again after the line broke.
+    pub(crate) fn ends(&mut self) -> (&mut Host, impl FnMut() -> Result<Host, LineError> + use<>) {
+        let port = self.port.clone();
+        (&mut self.host, move || open(&port, None))
+    }
+}
+
+fn open(device: &Path, pace: Option<Pace>) -> Result<Host, LineError> {
+    Ok(Host::new(Port::serial(device)?, session(), pace))
+}
+
+/// A number that no other host has; 0 is nobody's.
+fn session() -> u32 {
+    // The standard library draws its keys at random.
+    (RandomState::new().build_hasher().finish() as u32).max(1)
+}
+
+/// A simulated rig as the board's converter sees it: y from −1 to 3 over the
+/// range of the sensor's input, the free stream from 0 to 20 m/s over the channel's.
+struct Simulated {
+    rig: Rig,
+    noise: NoiseSignal,
+    stream: FreeStream,
+    converter: Converter,
+    channel: Converter,
+}
+
+impl Simulated {
+    fn new(effects: &[String], seed: u64, noise_seed: u64) -> anyhow::Result<Self> {
+        let names: Vec<&str> = effects.iter().map(String::as_str).collect();
+        let plan = HiddenSetPlan::draw(&names, &[], seed)?;
+        // As long as a day: its mean does not depend on how long it is watched.
+        let stream = FreeStream::draw(&mut ChaCha8Rng::seed_from_u64(seed), 1_000_000);
+        let wanders = plan.plant.effects.iter().any(|e| e.channel().is_some());
+        let mut rng = ChaCha8Rng::seed_from_u64(noise_seed);
+        rng.set_stream(seed);
+        Ok(Self {
+            rig: Rig::new(&plan.plant, wanders.then(|| stream.clone()))?,
+            noise: NoiseSignal::new(Noise::HOT_FILM, rng),
+            stream,
+            converter: Converter::TWELVE_BIT,
+            channel: Converter {
+                bits: 12,
+                low: 0.0,
+                high: 20.0,
+            },
+        })
+    }
+}
+
+impl emulator::Rig for Simulated {
+    fn sample(&mut self, open: bool) -> [u16; 2] {
+        self.rig.command(f64::from(u8::from(open)));
+        self.rig.advance_sample();
+        let y = self.rig.read() + self.noise.sample();
+        let u_inf = self.stream.velocity(self.rig.time());
+        [self.converter.code(y), self.channel.code(u_inf)].map(|code| code as u16)
+    }
+}

@@ -1,0 +1,330 @@
+//! The closed loop, live: shown, logged and judged.
+//!
+//! The log is a data set of one record, so that `compare` and `diagnose` read it:
+//! it begins at rest, before the loop is armed, and ends at the first sample that
+//! is missing, because a record needs its whole history. The judgement goes on.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use recordings::output::{OutputError, Staging};
+use serde::Serialize;
+use wire::reply::{Phase, Scale};
+use wire::samples::Sample;
+
+use crate::alarm::{Alarm, Test, Verdict};
+use crate::error::LineError;
+use crate::host::{Event, Host, Streamed, word};
+use crate::log::{Columns, value};
+
+/// What is watched and how long.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Let the law have the valve after `rest_s`, and shut it in the end.
+    pub arm: bool,
+    /// Rest that is logged before the loop is armed, s.
+    pub rest_s: f64,
+    /// How long, s; for ever if infinite.
+    pub duration_s: f64,
+    /// Longest log, s.
+    pub log_s: f64,
+    /// How the model is judged.
+    pub test: Test,
+}
+
+/// A moment of the loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Now {
+    /// Time, s.
+    pub t: f64,
+    /// What the board does.
+    pub phase: Phase,
+    /// The reading, y.
+    pub y: f64,
+    /// y*, where the law has one.
+    pub reference: Option<f64>,
+    /// What the model said.
+    pub model: Option<f64>,
+    /// The valve.
+    pub open: bool,
+    /// Samples that did not come so far.
+    pub lost: u64,
+    /// What is known of the model.
+    pub verdict: Verdict,
+}
+
+/// What came of it. Serialises to the keys of `watch --json`.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Watched {
+    /// How long, s.
+    pub seconds: f64,
+    /// Samples that came.
+    pub samples: u64,
+    /// Samples that did not.
+    pub lost_samples: u64,
+    /// Of the samples at which the law had the valve: root mean square of y* − y,
+    /// where the law has a reference.
+    pub rms_error: Option<f64>,
+    /// Root mean square of reading minus model.
+    pub rms_residual: Option<f64>,
+    /// Mean y.
+    pub mean: Option<f64>,
+    /// Share of the time with an open valve.
+    pub air: Option<f64>,
+    /// Switches of the valve in a second.
+    pub switches_per_s: Option<f64>,
+    /// What is known of the model.
+    #[serde(flatten)]
+    pub verdict: Option<Verdict>,
+    /// The data set, if one was asked for.
+    pub log: Option<PathBuf>,
+    /// Samples in it.
+    pub logged: u64,
+    /// Why it ended, if not by time or by hand.
+    pub ended: Option<String>,
+}
+
+/// How long nothing may come.
+const SILENCE: Duration = Duration::from_secs(2);
+/// At the beginning of an armed loop the flow is far from y*; figures begin later, s.
+const SETTLING_S: f64 = 1.0;
+
+/// Watches the loop behind `host` until `go_on` says no, and writes the log's
+/// folder, if any.
+///
+/// # Errors
+/// [`LineError`] when the board cannot be watched.
+pub fn watch(
+    host: &mut Host,
+    plan: &Plan,
+    columns: &Columns,
+    log: Option<&Path>,
+    go_on: &mut dyn FnMut(&Now) -> bool,
+) -> Result<Watched, LineError> {
+    let board = host.hello()?;
+    if plan.arm && board.phase != Phase::Disarmed {
+        return Err(LineError::Refused {
+            asked: "arm",
+            reason: format!("it is {}; disarm it first (`--disarm`)", word(board.phase)),
+        });
+    }
+    let period_s = f64::from(board.period_us) * 1e-6;
+    let mut watcher = Watcher {
+        period_s,
+        sensor: columns.sensor.unwrap_or(board.sensor),
+        board: board.sensor,
+        alarm: Alarm::new(plan.test, period_s),
+        next: 0,
+        phase: Phase::Disarmed,
+        rows: Vec::new(),
+        // Only what begins at rest is a record.
+        logs: log.is_some() && board.phase == Phase::Disarmed,
+        most_rows: (plan.log_s / period_s) as usize,
+        armed: Sums::default(),
+        watched: Watched::default(),
+        armed_since: 0,
+        last: None,
+    };
+    host.stream()?;
+    let mut armed = false;
+    let ended = loop {
+        let streamed = match host.next(SILENCE)? {
+            Event::Samples(streamed) => streamed,
+            Event::Silence => {
+                let info = host.hello()?;
+                if info.session == host.session() {
+                    continue;
+                }
+                break Some(format!(
+                    "the board has lost its host and is {}",
+                    word(info.phase)
+                ));
+            }
+        };
+        let Some(now) = watcher.take(&streamed) else {
+            continue;
+        };
+        if let Phase::Faulted(_) = streamed.phase {
+            break Some(format!(
+                "the board shut the valve: {}",
+                word(streamed.phase)
+            ));
+        }
+        if plan.arm && !armed && now.t >= plan.rest_s {
+            armed = true;
+            host.arm()?;
+        }
+        if !go_on(&now) || now.t >= plan.duration_s {
+            break None;
+        }
+    };
+    if plan.arm {
+        host.disarm()?;
+    }
+    let mut watched = watcher.figures();
+    watched.ended = ended;
+    if let Some(folder) = log {
+        watched.logged = watcher.rows.len() as u64;
+        if watched.logged > 1 {
+            write(folder, &watcher, columns)?;
+            watched.log = Some(folder.to_path_buf());
+        }
+    }
+    Ok(watched)
+}
+
+/// Sums over the samples at which the law had the valve.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    samples: u64,
+    y: f64,
+    error: f64,
+    referred: u64,
+    residual: f64,
+    open: u64,
+    switches: u64,
+}
+
+struct Watcher {
+    period_s: f64,
+    sensor: Scale,
+    /// What the board reckons with: the law's numbers come in its counts.
+    board: Scale,
+    alarm: Alarm,
+    next: u32,
+    phase: Phase,
+    rows: Vec<Row>,
+    logs: bool,
+    most_rows: usize,
+    armed: Sums,
+    watched: Watched,
+    /// Samples for which the law has had the valve.
+    armed_since: u64,
+    last: Option<bool>,
+}
+
+struct Row {
+    sample: Sample,
+    reference: Option<f32>,
+}
+
+impl Watcher {
+    /// Takes samples; the newest as it is shown.
+    fn take(&mut self, streamed: &Streamed) -> Option<Now> {
+        let first = streamed.samples.first()?.0;
+        if first < self.next {
+            return None;
+        }
+        let missing = first - self.next;
+        if missing > 0 {
+            self.watched.lost_samples += u64::from(missing);
+            self.alarm.gap(missing);
+            self.logs = false;
+            self.last = None;
+        }
+        self.phase = streamed.phase;
+        let mut newest = None;
+        for (number, sample) in &streamed.samples {
+            self.next = number + 1;
+            self.watched.samples += 1;
+            if self.logs && self.rows.len() < self.most_rows {
+                self.rows.push(Row {
+                    sample: *sample,
+                    reference: streamed.reference,
+                });
+            }
+            let y = f64::from(value(self.sensor, sample.counts));
+            let reference = streamed.reference.map(f64::from);
+            let model = sample
+                .law
+                .map(|law| f64::from((law.model - self.board.zero) * self.board.per_count));
+            if let Some(law) = sample.law {
+                self.armed_since += 1;
+                let residual = f64::from(law.residual * self.board.per_count);
+                self.alarm.push(residual);
+                if self.armed_since as f64 * self.period_s > SETTLING_S {
+                    let sums = &mut self.armed;
+                    sums.samples += 1;
+                    sums.y += y;
+                    sums.residual += residual * residual;
+                    sums.open += u64::from(sample.open);
+                    sums.switches += u64::from(self.last.is_some_and(|last| last != sample.open));
+                    if let Some(reference) = reference {
+                        sums.referred += 1;
+                        sums.error += (reference - y).powi(2);
+                    }
+                }
+            }
+            self.last = Some(sample.open);
+            newest = Some(Now {
+                t: f64::from(*number) * self.period_s,
+                phase: streamed.phase,
+                y,
+                reference,
+                model,
+                open: sample.open,
+                lost: self.watched.lost_samples,
+                verdict: self.alarm.verdict(),
+            });
+        }
+        newest
+    }
+
+    fn figures(&self) -> Watched {
+        let sums = &self.armed;
+        let n = sums.samples as f64;
+        let of = |value: f64| (sums.samples > 0).then_some(value);
+        Watched {
+            seconds: f64::from(self.next) * self.period_s,
+            rms_error: (sums.referred > 0).then(|| (sums.error / sums.referred as f64).sqrt()),
+            rms_residual: of((sums.residual / n).sqrt()),
+            mean: of(sums.y / n),
+            air: of(sums.open as f64 / n),
+            switches_per_s: of(sums.switches as f64 / (n * self.period_s)),
+            verdict: Some(self.alarm.verdict()),
+            ..self.watched.clone()
+        }
+    }
+}
+
+/// The data set, and beside the record what the law had to say.
+fn write(folder: &Path, watcher: &Watcher, columns: &Columns) -> Result<(), OutputError> {
+    let mut files = Staging::new(folder)?;
+    let time = |k: usize| (k as f64 * watcher.period_s * 1e9).round() / 1e9;
+    files.write("dataset.toml", |out| {
+        writeln!(
+            out,
+            "title = \"The loop in service\"\nsample_period_s = {}\n\n[[record]]\nname = \"service\"\nfile = \
+             \"service.csv\"\nuse = \"validate\"",
+            watcher.period_s
+        )
+    })?;
+    files.write("service.csv", |out| {
+        match &columns.channel {
+            Some((name, _)) => writeln!(out, "t,u,y,{name}")?,
+            None => writeln!(out, "t,u,y")?,
+        }
+        for (k, row) in watcher.rows.iter().enumerate() {
+            let y = value(watcher.sensor, row.sample.counts);
+            write!(out, "{},{},{y}", time(k), u8::from(row.sample.open))?;
+            if let Some((_, scale)) = &columns.channel {
+                write!(out, ",{}", value(*scale, row.sample.channel))?;
+            }
+            writeln!(out)?;
+        }
+        Ok(())
+    })?;
+    files.write("law.csv", |out| {
+        writeln!(out, "t,reference,model,residual")?;
+        for (k, row) in watcher.rows.iter().enumerate() {
+            if let Some(law) = row.sample.law {
+                let model = (law.model - watcher.board.zero) * watcher.board.per_count;
+                let residual = law.residual * watcher.board.per_count;
+                let reference = row.reference.map_or_else(String::new, |y| y.to_string());
+                writeln!(out, "{},{reference},{model},{residual}", time(k))?;
+            }
+        }
+        Ok(())
+    })?;
+    files.commit()
+}

@@ -50,8 +50,7 @@ fn fill(
     let beyond = plan.truths();
     row.expect(&plan);
     let inside = |name: &str| folder.join(name).to_string_lossy().into_owned();
-    let [data, given, found, own] =
-        ["set", "given.toml", "found.toml", "own.toml"].map(&inside);
+    let [data, given, found, own] = ["set", "given.toml", "found.toml", "own.toml"].map(&inside);
     // Of an earlier run.
     let _ = fs::remove_dir_all(folder.join("set"));
     let _ = fs::remove_file(&found);

@@ -95,7 +95,7 @@ pub struct Diagnosis {
     /// How the errors were held out.
     pub held_out_by: HeldOutBy,
     /// After how many seconds free runs started anew from the measurement, for rigs
-    /// that drift: see [`restart_after`].
+    /// that drift: see [`restart_after`](crate::fit::restart_after).
     pub restarted_s: Option<f64>,
     /// Where the noise floor comes from.
     pub noise_source: NoiseSource,

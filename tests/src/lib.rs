@@ -1,6 +1,7 @@
 //! Scenarios that cross the crates, and the campaign that asks the diagnosis
 //! for effects hidden in simulated rigs.
 
+pub mod browser;
 pub mod campaign;
 pub mod lockstep;
 

@@ -50,6 +50,9 @@ const STEPS: &[Step] = &[
     // An effect and a delay law are one file and one line each.
     ("new effect", crate::new_effect::proof),
     ("set-up", || crate::setup::setup(&[])),
+    // What a report carries is what the sources give.
+    ("pages", || crate::pages::pages(&["--check".to_owned()])),
+    ("browser", || crate::browser::browser(&[])),
     ("no_std", || {
         TARGETS
             .iter()

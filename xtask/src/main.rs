@@ -3,6 +3,7 @@
 mod bench_law;
 mod bench_search;
 mod bench_step;
+mod browser;
 mod budgets;
 mod campaigns;
 mod ci;
@@ -12,6 +13,7 @@ mod firmware;
 mod identified;
 mod line_faults;
 mod new_effect;
+mod pages;
 mod pil;
 mod setup;
 mod shell;
@@ -30,6 +32,7 @@ const TASKS: &[Task] = &[
     bench_law::TASK,
     bench_step::TASK,
     bench_search::TASK,
+    browser::TASK,
     ci::TASK,
     faults::TASK,
     firmware::TASK,
@@ -37,6 +40,7 @@ const TASKS: &[Task] = &[
     campaigns::TERMS,
     identified::TASK,
     new_effect::TASK,
+    pages::TASK,
     pil::TASK,
     setup::TASK,
     size::TASK,

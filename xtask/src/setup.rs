@@ -1,4 +1,4 @@
-//! Installs what cross builds and board runs need.
+//! Installs what cross builds, board runs and pages need.
 //!
 //! Where rustup manages the toolchain it fetches the targets' `core`. Where the
 //! compiler is a distribution's own, Debian's `rustc-web` with `rust-web-src`
@@ -12,7 +12,7 @@ use std::process::Command;
 
 pub(crate) const TASK: Task = Task {
     name: "setup",
-    does: "installs the cross targets, QEMU and the C peer's compiler",
+    does: "installs the cross targets, QEMU, the C peer's compiler, node and chromium",
     run: setup,
 };
 
@@ -42,6 +42,9 @@ pub(crate) fn setup(_arguments: &[String]) -> Result<()> {
         ("qemu-system-arm", "qemu-system-arm"),
         ("arm-none-eabi-gcc", "gcc-arm-none-eabi"),
         ("arm-none-eabi-gcc", "libnewlib-arm-none-eabi"),
+        ("node", "nodejs"),
+        ("npm", "npm"),
+        ("chromium", "chromium"),
     ]
     .into_iter()
     .filter(|(program, _)| !exists(program))

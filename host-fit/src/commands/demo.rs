@@ -158,8 +158,8 @@ fn real_input(
         runs.push((name, steps::compare(&found.model, &set)?.runs));
     }
     let runs: Vec<(&str, &[Vec<f64>])> = runs.iter().map(|(n, r)| (*n, r.as_slice())).collect();
-    report_runs(report, &set.records, &runs);
-    provenance(report, &set);
+    report_runs(report, &set.records, &runs, None);
+    provenance(report, &set, 0);
     console.say("flow over a ramp (2-D Navier–Stokes), free run")?;
     console.say(&aligned(
         &["model", "FIT % identified", "held out"],
@@ -197,9 +197,9 @@ fn hidden_effect(
     let shown = runs
         .iter()
         .filter_map(|(name, runs)| Some((*name, runs.as_deref()?)));
-    report_runs(report, &set.records, &shown.collect::<Vec<_>>());
+    report_runs(report, &set.records, &shown.collect::<Vec<_>>(), None);
     finding.model.save(&out.join("hidden-after.toml"))?;
-    provenance(report, &set);
+    provenance(report, &set, 0);
     let words = format!("{headline}. {meaning}");
     Ok((finding.model, words))
 }

@@ -48,7 +48,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let finding = steps::diagnose(&model, &set, &options, &console.watch())?;
     let mut written: Vec<&Path> = Vec::new();
     if let Some(path) = &args.report {
-        let page = page::finding(&model, &set, &finding);
+        let page = page::finding(&model, &set, &finding, args.seed);
         write_atomic(path, |out| out.write_all(page.as_bytes()))?;
         written.push(path);
     }

@@ -1,12 +1,13 @@
 //! `host-fit extend`: adds effects, refits everything, shows what it gained.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use host_fit::output::write_atomic;
 use host_fit::steps;
 
-use super::Console;
 use super::effect_files::EffectFiles;
 use super::load::ModelAndData;
+use super::{Console, page};
 
 /// Add physical effects to a model, refit everything, and show the held-out error before and after.
 #[derive(Debug, clap::Args)]
@@ -19,6 +20,9 @@ pub(crate) struct Args {
     /// File for the new model.
     #[arg(short, long, value_name = "new.toml")]
     output: PathBuf,
+    /// Write a report page: the model before and after on every record.
+    #[arg(long, value_name = "out.html")]
+    report: Option<PathBuf>,
     #[command(flatten)]
     effect_files: EffectFiles,
 }
@@ -29,5 +33,14 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     args.effect_files.define(&mut model)?;
     let extension = steps::extend(&model, &set, &args.effect, &console.watch())?;
     extension.model.save(&args.output)?;
-    console.show(&extension, &[("model", &args.output)], &[&args.output])
+    let mut written: Vec<&Path> = vec![&args.output];
+    if let Some(path) = &args.report {
+        // A model that diverges is no reason to show nothing of the one that does not.
+        let before = steps::compare(&model, &set).ok();
+        let after = steps::compare(&extension.model, &set)?;
+        let page = page::extension(&set, &extension, before.as_ref(), &after);
+        write_atomic(path, |out| out.write_all(page.as_bytes()))?;
+        written.push(path);
+    }
+    console.show(&extension, &[("model", &args.output)], &written)
 }

@@ -1,15 +1,16 @@
 //! `host-fit identify`: recordings to a model.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use host_fit::data::DataSet;
 use host_fit::identify::{ExponentialDelay, Objective};
+use host_fit::output::write_atomic;
 use host_fit::steps::{self, DelayKind, IdentifyRequest};
 use model_core::recursion::LagConvention;
 
-use super::Console;
 use super::effect_files::EffectFiles;
+use super::{Console, page};
 
 /// Identify a model: as many lags as earn their place on held-out records, or as many as are asked for.
 ///
@@ -25,6 +26,9 @@ pub(crate) struct Args {
     /// File for the model.
     #[arg(short, long, value_name = "model.toml")]
     output: PathBuf,
+    /// Write a report page: the model on every record, where it fails.
+    #[arg(long, value_name = "out.html")]
+    report: Option<PathBuf>,
     #[command(flatten)]
     request: Request,
 }
@@ -189,7 +193,14 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let set = DataSet::load(&args.dataset)?;
     let found = steps::identify(&set, &args.request.library()?, &console.watch())?;
     found.model.save(&args.output)?;
-    console.show(&found, &[("model", &args.output)], &[&args.output])
+    let mut written: Vec<&Path> = vec![&args.output];
+    if let Some(path) = &args.report {
+        let run = steps::compare(&found.model, &set)?;
+        let page = page::identification(&set, &found, &run);
+        write_atomic(path, |out| out.write_all(page.as_bytes()))?;
+        written.push(path);
+    }
+    console.show(&found, &[("model", &args.output)], &written)
 }
 
 #[cfg(test)]

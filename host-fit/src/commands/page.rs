@@ -1,18 +1,18 @@
 //! Results as pages.
 
 use host_fit::data::{DataSet, Record};
-use host_fit::diagnose::Verdict;
+use host_fit::diagnose::{Diagnosis, Verdict};
 use host_fit::indicators::Scores;
 use host_fit::model::Model;
 use host_fit::picture::{
-    BandPoint, Candidate, Column, CurvePlot, KeyNumber, Ranking, Report, Tone, WhereItFails, curve,
-    ranking,
+    BandPoint, Candidate, Column, CurvePlot, KeyNumber, Living, Ranking, Report, Stretches, Tone,
+    WhereItFails, curve, ranking,
 };
 use host_fit::residual::Failures;
-use host_fit::steps::{Comparison, Finding, Terms};
+use host_fit::steps::{Comparison, Extension, Finding, Identification, Terms};
 
-use super::drawings::{ladder_picture, overlays};
-use super::words::{describe, ladder_rows, ranking_rows, score_rows, short};
+use super::drawings::ladder_picture;
+use super::words::{describe, ladder_rows, ranking_rows, role_name, score_rows, short};
 
 /// The page of a comparison.
 pub(crate) fn comparison(model: &Model, set: &DataSet, found: &Comparison) -> String {
@@ -28,24 +28,99 @@ pub(crate) fn comparison(model: &Model, set: &DataSet, found: &Comparison) -> St
         ]);
     }
     report_scores(&mut report, &found.scores);
+    let records = model.targets(&set.records);
     report_failures(&mut report, &found.failures);
     report.section("Record by record");
-    report_runs(
-        &mut report,
-        &model.targets(&set.records),
-        &[("model", &found.runs)],
-    );
-    provenance(&mut report, set);
+    let samples = found
+        .failures
+        .samples(&records, &found.runs, model.longest_delay());
+    let lit = Some((&found.failures, samples.as_slice()));
+    report_runs(&mut report, &records, &[("model", &found.runs)], lit);
+    provenance(&mut report, set, model.training.seed);
+    report.html()
+}
+
+/// The page of an identification.
+pub(crate) fn identification(set: &DataSet, found: &Identification, run: &Comparison) -> String {
+    let model = &found.model;
+    let mut report = Report::new("Identification", title(set));
+    report.section("The model");
+    report.paragraph(&describe(model));
+    if !found.remarks.is_empty() {
+        report.list(&found.remarks);
+    }
+    if !found.excitation.is_empty() {
+        report.section("What the commands can tell");
+        report.list(&found.excitation);
+    }
+    report.section("How well it matches");
+    report_scores(&mut report, &found.scores);
+    report_failures(&mut report, &run.failures);
+    report.section("Record by record");
+    let records = model.targets(&set.records);
+    let samples = run
+        .failures
+        .samples(&records, &run.runs, model.longest_delay());
+    let lit = Some((&run.failures, samples.as_slice()));
+    report_runs(&mut report, &records, &[("model", &run.runs)], lit);
+    provenance(&mut report, set, model.training.seed);
+    report.html()
+}
+
+/// The page of a model before and after effects were added; `before` is missing where its free run diverges.
+pub(crate) fn extension(
+    set: &DataSet,
+    found: &Extension,
+    before: Option<&Comparison>,
+    after: &Comparison,
+) -> String {
+    let model = &found.model;
+    let mut report = Report::new("Extension", title(set));
+    report.section(&format!("With {}", found.effects.join(", ")));
+    report.paragraph(&describe(model));
+    let tile = |label: &str, run: &Scores| {
+        run.held_out().map(|all| {
+            KeyNumber::new(
+                label,
+                short(all.rmse),
+                format!("FIT {:.1} %", all.fit_percent),
+            )
+        })
+    };
+    let noise = after.scores.held_out().and_then(|all| all.noise_rmse);
+    let tiles = [
+        before.and_then(|run| tile("RMSE before", &run.scores)),
+        tile("RMSE after", &after.scores),
+        noise.map(|n| KeyNumber::new("noise floor", short(n), "a perfect model's RMSE")),
+    ];
+    report.key_numbers(&tiles.into_iter().flatten().collect::<Vec<_>>());
+    report_scores(&mut report, &after.scores);
+    report_failures(&mut report, &after.failures);
+    report.section("Record by record");
+    let records = model.targets(&set.records);
+    let samples = after
+        .failures
+        .samples(&records, &after.runs, model.longest_delay());
+    let mut runs: Vec<(&str, &[Vec<f64>])> = Vec::new();
+    runs.extend(before.map(|run| ("before", run.runs.as_slice())));
+    runs.push(("after", &after.runs));
+    let lit = Some((&after.failures, samples.as_slice()));
+    report_runs(&mut report, &records, &runs, lit);
+    provenance(&mut report, set, model.training.seed);
     report.html()
 }
 
 /// The page of a diagnosis of `given`.
-pub(crate) fn finding(given: &Model, set: &DataSet, found: &Finding) -> String {
+pub(crate) fn finding(given: &Model, set: &DataSet, found: &Finding, seed: u64) -> String {
     let mut report = Report::new("Diagnosis", title(set));
     report_finding(&mut report, set, found);
     // A model whose free run diverges has neither scores nor pictures.
     if let (Some(failures), Some(runs)) = (&found.failures, &found.runs) {
         report_failures(&mut report, failures);
+        // The bars are of the model as given.
+        let records = given.targets(&set.records);
+        let before = found.runs_before.as_deref().unwrap_or(runs);
+        let samples = failures.samples(&records, before, given.longest_delay());
         report.section("The model with what was missing");
         report.paragraph(&describe(&found.model));
         report_scores(&mut report, &found.scores);
@@ -54,9 +129,10 @@ pub(crate) fn finding(given: &Model, set: &DataSet, found: &Finding) -> String {
             all.push(("as given", before));
         }
         all.push(("with what was missing", runs));
-        report_runs(&mut report, &given.targets(&set.records), &all);
+        let lit = Some((failures, samples.as_slice()));
+        report_runs(&mut report, &records, &all, lit);
     }
-    provenance(&mut report, set);
+    provenance(&mut report, set, seed);
     report.html()
 }
 
@@ -106,8 +182,8 @@ pub(crate) fn discovery(given: &Model, set: &DataSet, found: &Terms) -> String {
         all.push(("as given", before));
     }
     all.push(("with the terms", &found.runs));
-    report_runs(&mut report, &given.targets(&set.records), &all);
-    provenance(&mut report, set);
+    report_runs(&mut report, &given.targets(&set.records), &all, None);
+    provenance(&mut report, set, 0);
     report.html()
 }
 
@@ -123,11 +199,31 @@ fn title(set: &DataSet) -> &str {
     set.title.as_deref().unwrap_or("data set")
 }
 
-/// Measurement and free runs, record by record.
-pub(crate) fn report_runs(report: &mut Report, records: &[Record], runs: &[(&str, &[Vec<f64>])]) {
-    for (_, svg) in overlays(records, runs) {
-        report.figure(&svg, "");
+/// Measurement and free runs, record by record; with `lit`, the bars of [`report_failures`] light up their samples in them.
+pub(crate) fn report_runs(
+    report: &mut Report,
+    records: &[Record],
+    runs: &[(&str, &[Vec<f64>])],
+    lit: Option<(&Failures, &[Vec<Stretches>])>,
+) {
+    report.living(&living(records, runs, lit));
+}
+
+/// The numbers of [`report_runs`].
+pub(super) fn living(
+    records: &[Record],
+    runs: &[(&str, &[Vec<f64>])],
+    lit: Option<(&Failures, &[Vec<Stretches>])>,
+) -> Living {
+    let role = |record: &Record| role_name(record.role).to_owned();
+    let mut living = Living::new("friction gain y", records, runs, role);
+    if let Some((failures, samples)) = lit {
+        for (found, places) in failures.by.iter().zip(samples) {
+            let name = found.coordinate.to_string();
+            living.coordinate(&name, found.coordinate.unit(), places);
+        }
     }
+    living
 }
 
 /// The indicators as a table of a report.
@@ -155,15 +251,19 @@ fn report_failures(report: &mut Report, failures: &Failures) {
     for sentence in failures.describe() {
         report.paragraph(&sentence);
     }
-    let plot = WhereItFails {
+    report.bars(
+        &failures_picture(failures),
+        "Each panel splits the same error by one coordinate. A bar lights up its samples in the records below; the sample that \
+         is read there marks its bars.",
+    );
+}
+
+pub(super) fn failures_picture(failures: &Failures) -> String {
+    host_fit::picture::where_it_fails(&WhereItFails {
         title: "Error of the free run on the held-out records",
         y_label: "rms error, y",
         views: &failures.views(),
-    };
-    report.figure(
-        &host_fit::picture::where_it_fails(&plot),
-        "Each panel splits the same error by one coordinate.",
-    );
+    })
 }
 
 /// The sections of a report that tell a diagnosis.
@@ -183,33 +283,7 @@ pub(crate) fn report_finding(report: &mut Report, set: &DataSet, found: &Finding
     report.table("", &LADDER, &ladder_rows(&diagnosis.ladder));
     if !diagnosis.ranking.is_empty() {
         report.section("Every effect, refitted alone");
-        let base = diagnosis
-            .ladder
-            .get(1)
-            .or(diagnosis.ladder.first())
-            .map(|rung| rung.validate_rmse);
-        let candidates: Vec<Candidate<'_>> = diagnosis
-            .ranking
-            .iter()
-            .map(|r| Candidate {
-                name: &r.effect,
-                rmse: r.validate_rmse,
-                low: f64::NAN,
-                high: f64::NAN,
-                accepted: diagnosis.missing.contains(&r.effect),
-                note: if r.significant { "" } else { "not significant" },
-            })
-            .collect();
-        report.figure(
-            &ranking(&Ranking {
-                title: "Held-out error with each effect",
-                y_unit: "y",
-                candidates: &candidates,
-                base_rmse: base,
-                noise_rmse: diagnosis.ladder.last().and_then(|rung| rung.noise_rmse),
-            }),
-            "",
-        );
+        report.figure(&ranking_picture(diagnosis), "");
         report.table(
             "By chance: the best that time-shifted and swapped copies of the effect's contribution achieved. \
              p is corrected for the number of effects tried (Holm).",
@@ -235,9 +309,56 @@ pub(crate) fn report_finding(report: &mut Report, set: &DataSet, found: &Finding
     }
 }
 
+/// Every candidate's held-out error.
+pub(super) fn ranking_picture(diagnosis: &Diagnosis) -> String {
+    let base = diagnosis
+        .ladder
+        .get(1)
+        .or(diagnosis.ladder.first())
+        .map(|rung| rung.validate_rmse);
+    let candidate = |r| {
+        let r: &host_fit::diagnose::Ranked = r;
+        Candidate {
+            name: &r.effect,
+            rmse: r.validate_rmse,
+            low: f64::NAN,
+            high: f64::NAN,
+            accepted: diagnosis.missing.contains(&r.effect),
+            note: if r.significant { "" } else { "not significant" },
+        }
+    };
+    let candidates: Vec<Candidate<'_>> = diagnosis.ranking.iter().map(candidate).collect();
+    ranking(&Ranking {
+        title: "Held-out error with each effect",
+        y_unit: "y",
+        candidates: &candidates,
+        base_rmse: base,
+        noise_rmse: diagnosis.ladder.last().and_then(|rung| rung.noise_rmse),
+    })
+}
+
 /// What a page was made from.
-pub(crate) fn provenance(report: &mut Report, set: &DataSet) {
+pub(crate) fn provenance(report: &mut Report, set: &DataSet, seed: u64) {
     report.provenance("tool", concat!("host-fit ", env!("CARGO_PKG_VERSION")));
+    report.provenance("command", &command_line());
+    report.provenance("seed", &seed.to_string());
     report.provenance("data", &set.hash);
     report.provenance("records", &set.records.len().to_string());
+}
+
+/// What the user wrote, as it could be written again.
+fn command_line() -> String {
+    let quoted = |word: String| {
+        let plain = |c: char| c.is_alphanumeric() || "-_=./,:+".contains(c);
+        match !word.is_empty() && word.chars().all(plain) {
+            true => word,
+            false => format!("'{}'", word.replace('\'', "'\\''")),
+        }
+    };
+    let words = std::env::args_os().skip(1);
+    let words = words.map(|word| quoted(word.to_string_lossy().into_owned()));
+    let all: Vec<String> = std::iter::once("host-fit".to_owned())
+        .chain(words)
+        .collect();
+    all.join(" ")
 }

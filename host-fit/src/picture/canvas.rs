@@ -191,12 +191,28 @@ impl Canvas {
 
     /// A filled rectangle between two opposite corners.
     pub(super) fn rectangle(&mut self, (x0, y0): (f64, f64), (x1, y1): (f64, f64), ink: Ink) {
-        let (left, top) = (pixel(x0.min(x1)), pixel(y0.min(y1)));
-        let (right, bottom) = (pixel(x0.max(x1)), pixel(y0.max(y1)));
-        let (width, height) = (pixel(right - left), pixel(bottom - top));
         self.write(format_args!(
-            "<rect x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{height}\" {}/>",
+            "<rect {} {}/>",
+            between((x0, y0), (x1, y1)),
             ink.fill()
+        ));
+    }
+
+    /// A rectangle that a page may make something of: `name` is what the page knows it by, `label` what it says of itself.
+    pub(super) fn bar(
+        &mut self,
+        corner: (f64, f64),
+        opposite: (f64, f64),
+        ink: Ink,
+        name: &str,
+        label: &str,
+    ) {
+        self.write(format_args!(
+            "<rect {} {} data-bar=\"{}\" aria-label=\"{}\"/>",
+            between(corner, opposite),
+            ink.fill(),
+            super::report::escape(name),
+            super::report::escape(label),
         ));
     }
 
@@ -253,6 +269,13 @@ impl Canvas {
             super::report::escape(text)
         ));
     }
+}
+
+fn between((x0, y0): (f64, f64), (x1, y1): (f64, f64)) -> String {
+    let (left, top) = (pixel(x0.min(x1)), pixel(y0.min(y1)));
+    let (right, bottom) = (pixel(x0.max(x1)), pixel(y0.max(y1)));
+    let (width, height) = (pixel(right - left), pixel(bottom - top));
+    format!("x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{height}\"")
 }
 
 fn distance(pair: &[(f64, f64)]) -> f64 {

@@ -16,8 +16,9 @@ pub fn significant(value: f64, digits: usize) -> String {
         return "–".to_owned();
     }
     let digits = digits.clamp(1, 17);
-    // Rounding first: 0.99996 to three digits is 1, one decade up.
+    // Rounding first: 0.99996 to three digits is 1, one decade up. The largest numbers would round to infinity.
     let rounded: f64 = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
+    let rounded = if rounded.is_finite() { rounded } else { value };
     if rounded == 0.0 {
         return "0".to_owned();
     }

@@ -1,13 +1,13 @@
 //! Pictures (SVG) and the report page (HTML).
 //!
 //! Every function takes plain data and returns the text of one self-contained
-//! document: no scripts, no fonts to fetch, no network. Writing the file is the
+//! document: no fonts to fetch, no network. Writing the file is the
 //! caller's business. Nothing here fails: missing, non-finite or absurd numbers
 //! leave gaps in a picture, they never stop it.
 //!
 //! The layout is ours, because panels that share a time axis and legends that never
 //! cover data are what chart libraries do not offer; what is left is to write a few
-//! SVG elements ([`canvas`](self)).
+//! SVG elements ([`canvas`](self)). Pages draw records with a script of their own ([`Living`]).
 
 mod axis;
 mod canvas;
@@ -18,6 +18,7 @@ mod delay_law;
 mod format;
 mod ladder;
 mod legend;
+mod living;
 mod overlay;
 mod palette;
 mod panel;
@@ -31,6 +32,7 @@ pub use curve::{BandPoint, CurvePlot, curve};
 pub use delay_law::{DelayEdge, DelayLawPlot, LawPoint, MeasuredDelay, delay_law};
 pub use format::significant;
 pub use ladder::{Ladder, LadderRecord, LadderStep, ladder};
+pub use living::{Living, Stretches};
 pub use overlay::{LabelledRun, Overlay, overlay};
 pub use ranking::{Candidate, Ranking, ranking};
 pub use report::{Column, KeyNumber, Report, Tone};

@@ -70,6 +70,25 @@ pub(super) fn dark_rules(scope: &str) -> String {
     css
 }
 
+/// The colours as variables of a style sheet, for what scripts draw: `--s0` … the series, `--floor`, `--grid`, `--axis`, `--band`
+/// (scatter) and `--lit` (samples that are pointed at).
+pub(super) fn variables(dark: bool) -> String {
+    let shade = |colour: Colour| {
+        let counterpart = DARK.iter().find(|(light, _)| dark && *light == colour);
+        counterpart.map_or(colour, |(_, dark)| *dark)
+    };
+    let mut css = String::new();
+    for (name, colour) in [("floor", FLOOR), ("grid", GRID), ("axis", RULE)] {
+        let _ = write!(css, "--{name}:{};", shade(colour));
+    }
+    // See-through: `#RRGGBBAA`.
+    let _ = write!(css, "--band:{}59;--lit:{}40;", shade(FLOOR), shade(ORANGE));
+    for index in 0..SERIES.len() {
+        let _ = write!(css, "--s{index}:{};", shade(series(index)));
+    }
+    css
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

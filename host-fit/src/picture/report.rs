@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::living::{self, Bundle, Living};
 use super::palette;
 
 /// What a verdict box announces.
@@ -70,6 +71,7 @@ pub struct Report {
     body: String,
     sections: Vec<String>,
     open: bool,
+    groups: usize,
     provenance: Vec<(String, String)>,
 }
 
@@ -198,6 +200,32 @@ impl Report {
         self.push(format_args!("</figure>\n"))
     }
 
+    /// Records to be looked along: zoom, values, models on and off. Returns the group's name, for [`Report::bars`].
+    pub fn living(&mut self, living: &Living) -> String {
+        self.groups += 1;
+        let name = format!("g{}", self.groups);
+        self.push(format_args!(
+            "<div class=\"living\" id=\"{name}\"></div><noscript><p>Curves are drawn by this page's script, which is \
+             switched off.</p></noscript><script type=\"application/json\" id=\"{name}-data\">{}</script>\n",
+            living.json()
+        ));
+        name
+    }
+
+    /// As [`Report::figure`], for a picture whose bars light up their samples in the records of the group that comes next.
+    pub fn bars(&mut self, svg: &str, caption: &str) -> &mut Self {
+        let group = self.groups + 1;
+        let at = self.body.len();
+        self.figure(svg, caption);
+        if let Some(figure) = self.body.get(at..).filter(|f| f.starts_with("<figure>")) {
+            let marked =
+                figure.replacen("<figure>", &format!("<figure data-group=\"g{group}\">"), 1);
+            self.body.truncate(at);
+            self.body.push_str(&marked);
+        }
+        self
+    }
+
     /// Commands, generated code or a model, letter by letter.
     pub fn code(&mut self, text: &str) -> &mut Self {
         self.push(format_args!("<pre>{}</pre>\n", escape(text)))
@@ -212,49 +240,36 @@ impl Report {
     /// The whole page.
     #[must_use]
     pub fn html(&self) -> String {
-        let mut page = String::with_capacity(self.body.len() + 8192);
-        let title = escape(&self.title);
-        let _ = write!(
-            page,
-            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <meta name=\"color-scheme\" content=\"light dark\">\n\
-             <meta http-equiv=\"Content-Security-Policy\" \
-             content=\"default-src 'none'; style-src 'unsafe-inline'\">\n\
-             <title>{title}</title>\n<style>{STYLE}\
-             @media screen and (prefers-color-scheme:dark){{{DARK}{}}}</style></head>\n\
-             <body><main>\n<header><h1>{title}</h1>",
-            palette::dark_rules("figure svg"),
-        );
+        let mut body = String::with_capacity(self.body.len() + 2048);
+        let _ = write!(body, "<header><h1>{}</h1>", escape(&self.title));
         if !self.subtitle.is_empty() {
-            let _ = write!(page, "<p class=\"subtitle\">{}</p>", inline(&self.subtitle));
+            let _ = write!(body, "<p class=\"subtitle\">{}</p>", inline(&self.subtitle));
         }
-        page.push_str("</header>\n");
+        body.push_str("</header>\n");
         if self.sections.len() > 3 {
-            page.push_str("<nav><ul>");
+            body.push_str("<nav><ul>");
             for (index, heading) in self.sections.iter().enumerate() {
                 let _ = write!(
-                    page,
+                    body,
                     "<li><a href=\"#s{}\">{}</a></li>",
                     index + 1,
                     inline(heading)
                 );
             }
-            page.push_str("</ul></nav>\n");
+            body.push_str("</ul></nav>\n");
         }
-        page.push_str(&self.body);
+        body.push_str(&self.body);
         if self.open {
-            page.push_str("</section>\n");
+            body.push_str("</section>\n");
         }
         if !self.provenance.is_empty() {
-            page.push_str("<footer><dl>");
+            body.push_str("<footer><dl>");
             for (name, value) in &self.provenance {
-                let _ = write!(page, "<dt>{}</dt><dd>{}</dd>", inline(name), inline(value));
+                let _ = write!(body, "<dt>{}</dt><dd>{}</dd>", inline(name), inline(value));
             }
-            page.push_str("</dl></footer>\n");
+            body.push_str("</dl></footer>\n");
         }
-        page.push_str("</main></body></html>\n");
-        page
+        page(&self.title, &living::REPORT, "", &body)
     }
 
     fn push(&mut self, text: std::fmt::Arguments<'_>) -> &mut Self {
@@ -262,6 +277,27 @@ impl Report {
         let _ = self.body.write_fmt(text);
         self
     }
+}
+
+fn page(title: &str, bundle: &Bundle, policy: &str, body: &str) -> String {
+    let title = escape(title);
+    format!(
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" \
+         content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src '{hash}'{policy}\">\n\
+         <title>{title}</title>\n<style>{style}{STYLE}:root,:root.on-paper{{{LIGHT}{light}}}\
+         @media screen and (prefers-color-scheme:dark){{:root{{{DARK}{dark}}}{rules}}}</style>\n\
+         <script type=\"module\">{script}</script></head>\n\
+         <body><main>\n{body}</main></body></html>\n",
+        hash = bundle.hash.trim(),
+        style = bundle.style,
+        light = palette::variables(false),
+        dark = palette::variables(true),
+        rules = palette::dark_rules("figure svg"),
+        script = bundle.script,
+    )
 }
 
 /// `text` for HTML and XML; characters those forbid become U+FFFD.
@@ -302,8 +338,6 @@ fn inline(text: &str) -> String {
 }
 
 const STYLE: &str = "\
-:root{--paper:#fff;--ink:#1f2328;--muted:#656d76;--rule:#d8dee4;--soft:#f6f8fa;--link:#0072b2;\
---good:#007a59;--finding:#0072b2;--warning:#b34e00}\
 *{box-sizing:border-box}\
 body{margin:0;background:var(--paper);color:var(--ink);\
 font:16px/1.55 system-ui,-apple-system,'Segoe UI',Helvetica,Arial,sans-serif}\
@@ -342,10 +376,13 @@ footer dd{margin:0;overflow-wrap:anywhere}\
 figure,.verdict,.numbers,tr{break-inside:avoid}h2,h3{break-after:avoid}.table,pre{overflow:visible}pre{white-space:pre-wrap}}\
 ";
 
+const LIGHT: &str = "\
+--paper:#fff;--ink:#1f2328;--muted:#656d76;--rule:#d8dee4;--control:#818b98;--soft:#f6f8fa;--link:#0072b2;\
+--good:#007a59;--finding:#0072b2;--warning:#b34e00;";
+
 const DARK: &str = "\
-:root{--paper:#161b22;--ink:#e6edf3;--muted:#9aa3ad;--rule:#30363d;--soft:#1c2330;--link:#4daae8;\
---good:#3ccf9e;--finding:#4daae8;--warning:#ff8a4c}\
-";
+--paper:#161b22;--ink:#e6edf3;--muted:#9aa3ad;--rule:#30363d;--control:#7d8590;--soft:#1c2330;--link:#4daae8;\
+--good:#3ccf9e;--finding:#4daae8;--warning:#ff8a4c;";
 
 #[cfg(test)]
 mod tests {
@@ -377,7 +414,7 @@ mod tests {
     #[test]
     fn everything_is_escaped() {
         let html = sample();
-        for raw in ["<b>", "<i>", "<script", "<q>", "<97", "<1>", "\u{0}"] {
+        for raw in ["<b>", "<i>", "<script>", "<q>", "<97", "<1>", "\u{0}"] {
             assert!(!html.contains(raw), "{raw}");
         }
         assert!(html.contains("<code>host-fit &lt;x&gt;</code> and a lone ` tick \u{fffd}"));
@@ -402,7 +439,21 @@ mod tests {
                     .any(|n| n.attribute("id") == Some(target))
             );
         }
-        assert!(!html.contains("src=") && !html.contains("url(") && !html.contains("@import"));
+        for word in [
+            "@import",
+            "fetch(",
+            "XMLHttpRequest",
+            "import(",
+            "WebSocket",
+            "sendBeacon",
+        ] {
+            assert!(!html.contains(word), "{word}");
+        }
+        let (head, rest) = html.split_once("<script type=\"module\">").unwrap();
+        let (_, rest) = rest.split_once("</script>").unwrap();
+        for text in [head, rest] {
+            assert!(!text.contains("src=") && !text.contains("url("));
+        }
         assert!(html.contains("default-src 'none'"));
     }
 }

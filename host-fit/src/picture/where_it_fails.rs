@@ -91,6 +91,7 @@ pub fn where_it_fails(plot: &WhereItFails<'_>) -> String {
             small(
                 canvas,
                 &panel,
+                index,
                 view,
                 if index % COLUMNS == 0 {
                     named(plot.y_label, "RMS residual")
@@ -104,7 +105,7 @@ pub fn where_it_fails(plot: &WhereItFails<'_>) -> String {
     })
 }
 
-fn small(canvas: &mut Canvas, panel: &Panel, view: &FailureView<'_>, y_label: &str) {
+fn small(canvas: &mut Canvas, panel: &Panel, index: usize, view: &FailureView<'_>, y_label: &str) {
     panel.frame(canvas, y_label);
     title(canvas, panel, view);
     // The largest bin of a coordinate that explains nothing is chance, not a place.
@@ -125,10 +126,16 @@ fn small(canvas: &mut Canvas, panel: &Panel, view: &FailureView<'_>, y_label: &s
             continue;
         };
         let colour = if worst == Some(i) { VERMILLION } else { BLUE };
-        canvas.rectangle(
+        let [from, to, rmse] = [bin.from, bin.to, bin.rmse].map(|v| super::significant(v, 3));
+        canvas.bar(
             (place(i) + inset, panel.bottom()),
             (place(i + 1) - inset, top),
             Ink::new(colour, 1.0).faint(0.8),
+            &format!("{index}:{i}"),
+            &format!(
+                "{} {from} to {to} {}: rms {rmse}",
+                view.coordinate, view.unit
+            ),
         );
     }
     let floor = view

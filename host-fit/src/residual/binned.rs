@@ -40,8 +40,11 @@ pub(super) struct Source<'a> {
 /// Every coordinate that the records have.
 pub(super) fn coordinates(source: &Source<'_>) -> Vec<Binned> {
     let period = source.records.first().map_or(1.0, |r| r.sample_period_s);
-    let each = |values: &dyn Fn(&Record) -> Vec<f64>| -> Vec<Vec<f64>> {
-        source.records.iter().map(|r| values(r)).collect()
+    let each = |coordinate: &FailureCoordinate| -> Vec<Vec<f64>> {
+        let pairs = source.records.iter().zip(source.simulated);
+        pairs
+            .map(|(record, simulated)| values(coordinate, record, simulated, source.delay))
+            .collect()
     };
     let time_folds = if source.records.len() > 1 {
         Folds::Records
@@ -51,49 +54,41 @@ pub(super) fn coordinates(source: &Source<'_>) -> Vec<Binned> {
     let mut all = Vec::new();
     let switches = source.records.iter().all(|r| has_edges(&r.u));
     if switches {
-        let since = |rising| each(&|r| since_edge(&r.u, rising, period));
         for (coordinate, rising) in [
             (FailureCoordinate::SinceRisingEdge, true),
             (FailureCoordinate::SinceFallingEdge, false),
         ] {
-            let found = binned(source, coordinate, Folds::Blocks, &since(rising));
+            let since = each(&coordinate);
+            let dwell = |r: &&Record| dwell_before_edge(&r.u, rising);
+            let found = binned(source, coordinate, Folds::Blocks, &since);
             all.extend(found.map(|found| Binned {
-                dwell: Some(each(&|r| dwell_before_edge(&r.u, rising))),
+                dwell: Some(source.records.iter().map(dwell).collect()),
                 ..found
             }));
         }
     }
-    let mut add = |coordinate, folds, values: Vec<Vec<f64>>| {
+    let mut add = |coordinate: FailureCoordinate, folds| {
+        let values = each(&coordinate);
         all.extend(binned(source, coordinate, folds, &values));
     };
-    let level = source.simulated.to_vec();
-    add(FailureCoordinate::LevelOfY, Folds::Blocks, level);
+    add(FailureCoordinate::LevelOfY, Folds::Blocks);
     let on_off = source.records.iter().all(|r| r.is_on_off());
     if !on_off {
-        let level = each(&|r| r.u.clone());
-        add(FailureCoordinate::LevelOfU, Folds::Blocks, level);
-        let slope = |sim: &Vec<f64>| {
-            let mut slope = vec![0.0];
-            slope.extend(sim.windows(2).map(|pair| (pair[1] - pair[0]) / period));
-            slope
-        };
-        let slopes = source.simulated.iter().map(slope).collect();
-        add(FailureCoordinate::RateOfY, Folds::Blocks, slopes);
+        add(FailureCoordinate::LevelOfU, Folds::Blocks);
+        add(FailureCoordinate::RateOfY, Folds::Blocks);
     }
-    for window in RULES.windows_s {
-        let samples = (window / period).round().max(1.0) as usize;
+    for window_s in RULES.windows_s {
+        let samples = window_samples(window_s, period);
         if source.records.iter().any(|r| r.len() > 2 * samples) {
             let coordinate = if on_off {
-                FailureCoordinate::Blowing { window_s: window }
+                FailureCoordinate::Blowing { window_s }
             } else {
-                FailureCoordinate::MeanInput { window_s: window }
+                FailureCoordinate::MeanInput { window_s }
             };
-            let mean = each(&|r| moving_mean(&r.u, samples));
-            add(coordinate, Folds::Blocks, mean);
+            add(coordinate, Folds::Blocks);
         }
     }
-    let time = each(&|r| (0..r.len()).map(|k| k as f64 * period).collect());
-    add(FailureCoordinate::TimeInRecord, time_folds, time);
+    add(FailureCoordinate::TimeInRecord, time_folds);
     let channels = source.records.first().map(|r| r.channels.keys());
     for channel in channels.into_iter().flatten() {
         if source
@@ -101,19 +96,55 @@ pub(super) fn coordinates(source: &Source<'_>) -> Vec<Binned> {
             .iter()
             .all(|r| r.channels.contains_key(channel))
         {
-            let values = each(&|r| r.channels.get(channel).cloned().unwrap_or_default());
-            let coordinate = FailureCoordinate::Channel(channel.clone());
-            add(coordinate, Folds::Blocks, values);
+            add(FailureCoordinate::Channel(channel.clone()), Folds::Blocks);
         }
     }
     if switches {
-        let numbers = each(&|r| pulse_number(&r.u, source.delay));
-        add(FailureCoordinate::PulseNumber, time_folds, numbers.clone());
+        add(FailureCoordinate::PulseNumber, time_folds);
+        let numbers = each(&FailureCoordinate::PulseNumber);
         for cycle in 2..=RULES.longest_cycle {
             all.push(modulo(source, &numbers, cycle));
         }
     }
     all
+}
+
+/// The coordinate at every sample of a record; NaN where it has no value. `simulated` is the free run, `delay` the samples from
+/// the command to the flow. Empty for the error's own frequency.
+pub(super) fn values(
+    coordinate: &FailureCoordinate,
+    record: &Record,
+    simulated: &[f64],
+    delay: usize,
+) -> Vec<f64> {
+    let period = record.sample_period_s;
+    match coordinate {
+        FailureCoordinate::SinceRisingEdge => since_edge(&record.u, true, period),
+        FailureCoordinate::SinceFallingEdge => since_edge(&record.u, false, period),
+        FailureCoordinate::LevelOfY => simulated.to_vec(),
+        FailureCoordinate::LevelOfU => record.u.clone(),
+        FailureCoordinate::RateOfY => {
+            let slopes = simulated
+                .windows(2)
+                .map(|pair| (pair[1] - pair[0]) / period);
+            std::iter::once(0.0).chain(slopes).collect()
+        }
+        FailureCoordinate::Blowing { window_s } | FailureCoordinate::MeanInput { window_s } => {
+            moving_mean(&record.u, window_samples(*window_s, period))
+        }
+        FailureCoordinate::TimeInRecord => (0..record.len()).map(|k| k as f64 * period).collect(),
+        FailureCoordinate::Channel(name) => record.channels.get(name).cloned().unwrap_or_default(),
+        FailureCoordinate::PulseNumber => pulse_number(&record.u, delay),
+        FailureCoordinate::PulseInCycle { cycle } => {
+            let numbers = pulse_number(&record.u, delay).into_iter();
+            numbers.map(|number| number % *cycle as f64).collect()
+        }
+        FailureCoordinate::FrequencyBand => Vec::new(),
+    }
+}
+
+fn window_samples(window_s: f64, period: f64) -> usize {
+    (window_s / period).round().max(1.0) as usize
 }
 
 /// Whether the input is piecewise constant.

@@ -8,6 +8,7 @@ mod noise;
 #[cfg(test)]
 pub(crate) mod plants;
 mod rules;
+mod samples;
 mod spectrum;
 mod trend;
 mod words;

@@ -1,0 +1,235 @@
+//! Records with models on them, to be looked along on a page: the numbers that a page's script draws.
+//!
+//! The script and its styles are bundled from `host-fit/web` and checked in, so that nothing but cargo is needed to build.
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use serde::Serialize;
+
+use crate::data::Record;
+
+/// A page's script, its styles, and what the page's policy has to say to let the script run.
+pub(super) struct Bundle {
+    pub(super) script: &'static str,
+    pub(super) style: &'static str,
+    pub(super) hash: &'static str,
+}
+
+macro_rules! bundle {
+    ($name:literal) => {
+        Bundle {
+            script: include_str!(concat!("../../web/bundle/", $name, ".js")),
+            style: include_str!(concat!("../../web/bundle/", $name, ".css")),
+            hash: include_str!(concat!("../../web/bundle/", $name, ".sha256")),
+        }
+    };
+}
+
+pub(super) const REPORT: Bundle = bundle!("report");
+
+/// Samples of one record by bin of a coordinate, in order: the bin and how many samples it holds; no bin where the coordinate has
+/// no value or lies outside the table.
+pub type Stretches = Vec<(Option<u16>, usize)>;
+
+/// What a page draws of a data set. Serialises to the numbers for the page's script; samples are single-precision, as many
+/// digits as any converter gives.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Living {
+    /// Label of the axis of y.
+    label: String,
+    records: Vec<LivingRecord>,
+    /// Names of the models.
+    runs: Vec<String>,
+    coordinates: Vec<Coordinate>,
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct LivingRecord {
+    name: String,
+    #[serde(rename = "use")]
+    role: String,
+    t0: f64,
+    period: f64,
+    n: usize,
+    u: Command,
+    y: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sd: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    low: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    high: Option<String>,
+    runs: Vec<Option<String>>,
+}
+
+/// A command: where it switches, or its values.
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Command {
+    Edges(Vec<usize>),
+    Values(String),
+}
+
+#[derive(Clone, Debug, Serialize)]
+struct Coordinate {
+    name: String,
+    unit: String,
+    /// Per record: bin, samples, bin, samples … (bin −1: none).
+    places: Vec<Vec<i64>>,
+}
+
+impl Living {
+    /// Records with free runs on them, labelled; `role` says in words what a record is used for.
+    #[must_use]
+    pub fn new(
+        label: &str,
+        records: &[Record],
+        runs: &[(&str, &[Vec<f64>])],
+        role: impl Fn(&Record) -> String,
+    ) -> Self {
+        let record = |(index, record): (usize, &Record)| LivingRecord {
+            name: record.name.clone(),
+            role: role(record),
+            t0: record.t0,
+            period: record.sample_period_s,
+            n: record.len(),
+            u: command(record),
+            y: packed(&record.y),
+            sd: record.y_sd.as_deref().map(packed),
+            low: record.y_min.as_deref().map(packed),
+            high: record.y_max.as_deref().map(packed),
+            runs: runs
+                .iter()
+                .map(|(_, runs)| {
+                    let run = runs.get(index)?;
+                    (run.len() == record.len()).then(|| packed(run))
+                })
+                .collect(),
+        };
+        Self {
+            label: label.to_owned(),
+            records: records.iter().enumerate().map(record).collect(),
+            runs: runs.iter().map(|(name, _)| (*name).to_owned()).collect(),
+            coordinates: Vec::new(),
+        }
+    }
+
+    /// Adds a coordinate of "where it fails": which bin each sample is in, per record. In the order of the picture's panels.
+    pub fn coordinate(&mut self, name: &str, unit: &str, places: &[Stretches]) -> &mut Self {
+        let flat = |stretches: &Stretches| {
+            let pairs = stretches.iter();
+            pairs
+                .flat_map(|(bin, count)| [bin.map_or(-1, i64::from), *count as i64])
+                .collect()
+        };
+        self.coordinates.push(Coordinate {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            places: places.iter().map(flat).collect(),
+        });
+        self
+    }
+
+    /// As a JSON document that ends no element of a page.
+    #[must_use]
+    pub fn json(&self) -> String {
+        let json = serde_json::to_string(self).unwrap_or_else(|_| "{}".to_owned());
+        json.replace('<', "\\u003c")
+            .replace('>', "\\u003e")
+            .replace('&', "\\u0026")
+    }
+}
+
+fn packed(values: &[f64]) -> String {
+    let bytes: Vec<u8> = values
+        .iter()
+        .flat_map(|v| (*v as f32).to_le_bytes())
+        .collect();
+    STANDARD.encode(bytes)
+}
+
+fn command(record: &Record) -> Command {
+    if !record.is_on_off() {
+        return Command::Values(packed(&record.u));
+    }
+    let mut before = 0.0;
+    let edges = record.u.iter().enumerate().filter_map(|(k, u)| {
+        let edge = *u != before;
+        before = *u;
+        edge.then_some(k)
+    });
+    Command::Edges(edges.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Use;
+
+    #[test]
+    fn a_payload_says_what_the_record_does() {
+        let u = vec![0.0, 1.0, 1.0, 0.0, 1.0];
+        let record = Record::new(
+            "</script>&",
+            Use::Validate,
+            0.5,
+            u,
+            vec![0.0, 1.0, -2.5, 0.25, 1e-3],
+        );
+        let run = vec![vec![1.0; 5]];
+        let mut living = Living::new("y", &[record], &[("m", &run), ("none", &[])], |_| {
+            "held out".to_owned()
+        });
+        living.coordinate("level", "y", &[vec![(None, 2), (Some(3), 3)]]);
+        let json = living.json();
+        assert!(!json.contains('<') && !json.contains('&'));
+        let value: serde_json::Value = serde_json::from_str(&json).unwrap();
+        let first = &value["records"][0];
+        assert_eq!(first["name"], "</script>&");
+        assert_eq!(first["u"]["edges"], serde_json::json!([1, 3, 4]));
+        assert!(first["runs"][1].is_null());
+        assert_eq!(
+            value["coordinates"][0]["places"][0],
+            serde_json::json!([-1, 2, 3, 3])
+        );
+        let y = STANDARD.decode(first["y"].as_str().unwrap()).unwrap();
+        assert_eq!(y[8..12], (-2.5f32).to_le_bytes());
+    }
+
+    /// Eight records of 10 000 samples with three models and their scatter: what a page may weigh.
+    #[test]
+    fn eighty_thousand_samples_of_three_models_stay_under_five_megabytes() {
+        let n = 10_000;
+        let wave = |k: usize| (k as f64 * 0.37).sin();
+        let records: Vec<Record> = (0..8)
+            .map(|i| {
+                let u = (0..n).map(|k| f64::from(u8::from(k % 250 < 100))).collect();
+                let mut record = Record::new(
+                    &format!("r{i}"),
+                    Use::Validate,
+                    0.001,
+                    u,
+                    (0..n).map(wave).collect(),
+                );
+                record.y_sd = Some((0..n).map(|k| 0.01 + 0.001 * wave(k)).collect());
+                record
+            })
+            .collect();
+        let runs: Vec<Vec<f64>> = vec![(0..n).map(wave).collect(); 8];
+        let mut living = Living::new(
+            "y",
+            &records,
+            &[("a", &runs), ("b", &runs), ("c", &runs)],
+            |_| String::new(),
+        );
+        // A dozen coordinates that change every few samples, as a noisy channel would.
+        for _ in 0..12 {
+            let places = vec![(0..n / 5).map(|i| (Some((i % 30) as u16), 5)).collect(); 8];
+            living.coordinate("c", "", &places);
+        }
+        let mut report = crate::picture::Report::new("a", "b");
+        report.living(&living);
+        let size = report.html().len();
+        assert!(size < 5_000_000, "{size} bytes");
+    }
+}

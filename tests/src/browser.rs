@@ -1,0 +1,239 @@
+//! A real browser: Debian's chromium, headless, driven over its debugging protocol.
+
+use std::fs;
+use std::net::TcpStream;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use serde_json::{Value, json};
+use tungstenite::{Message, WebSocket};
+
+/// A browser; ends with this value.
+pub struct Browser {
+    child: Child,
+    socket: WebSocket<TcpStream>,
+    next: u64,
+    /// Errors that pages reported: exceptions, refused scripts, failed requests.
+    faults: Vec<String>,
+    _profile: tempfile::TempDir,
+}
+
+/// A page of it.
+#[derive(Debug, Clone)]
+pub struct Page {
+    session: String,
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Browser {
+    /// Starts chromium.
+    ///
+    /// # Errors
+    /// When it is not installed (`cargo xtask setup` does) or does not answer.
+    pub fn start() -> Result<Self> {
+        let profile = tempfile::tempdir()?;
+        let child = Command::new("chromium")
+            .args([
+                "--headless=new",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--no-first-run",
+            ])
+            .args([
+                "--remote-debugging-port=0",
+                "--hide-scrollbars",
+                "about:blank",
+            ])
+            .arg(format!("--user-data-dir={}", profile.path().display()))
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .context("chromium is missing; run `cargo xtask setup`")?;
+        let told = profile.path().join("DevToolsActivePort");
+        let started = Instant::now();
+        let (port, path) = loop {
+            let text = fs::read_to_string(&told).unwrap_or_default();
+            let mut lines = text.lines();
+            if let (Some(port), Some(path)) = (lines.next(), lines.next()) {
+                break (port.to_owned(), path.to_owned());
+            }
+            if started.elapsed() > Duration::from_secs(60) {
+                bail!("chromium does not start");
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        };
+        let stream = TcpStream::connect(format!("127.0.0.1:{port}"))?;
+        stream.set_read_timeout(Some(Duration::from_secs(120)))?;
+        let address = format!("ws://127.0.0.1:{port}{path}");
+        let (socket, _) = tungstenite::client(address, stream)
+            .map_err(|e| anyhow::anyhow!("chromium refuses: {e}"))?;
+        Ok(Self {
+            child,
+            socket,
+            next: 0,
+            faults: Vec::new(),
+            _profile: profile,
+        })
+    }
+
+    fn call(&mut self, session: Option<&str>, method: &str, params: &Value) -> Result<Value> {
+        self.next += 1;
+        let id = self.next;
+        let mut request = json!({"id": id, "method": method, "params": params});
+        if let Some(session) = session {
+            request["sessionId"] = session.into();
+        }
+        self.socket.send(Message::text(request.to_string()))?;
+        loop {
+            let message = self.socket.read()?;
+            let Ok(text) = message.to_text() else {
+                continue;
+            };
+            let Ok(answer) = serde_json::from_str::<Value>(text) else {
+                continue;
+            };
+            if answer["id"] == id {
+                if let Some(error) = answer.get("error") {
+                    bail!("{method}: {error}");
+                }
+                return Ok(answer["result"].clone());
+            }
+            let params = &answer["params"];
+            match answer["method"].as_str() {
+                Some("Runtime.exceptionThrown") => {
+                    let details = &params["exceptionDetails"];
+                    self.faults.push(format!(
+                        "{} {}",
+                        details["text"], details["exception"]["description"]
+                    ));
+                }
+                Some("Log.entryAdded") if params["entry"]["level"] == "error" => {
+                    self.faults.push(params["entry"]["text"].to_string());
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// What pages reported as errors since the last call.
+    pub fn faults(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.faults)
+    }
+
+    /// Opens a page of this size, px.
+    ///
+    /// # Errors
+    /// When the browser does not.
+    pub fn open(&mut self, address: &str, (width, height): (u32, u32), dark: bool) -> Result<Page> {
+        let target = self.call(None, "Target.createTarget", &json!({"url": "about:blank"}))?;
+        let attach = json!({"targetId": target["targetId"], "flatten": true});
+        let attached = self.call(None, "Target.attachToTarget", &attach)?;
+        let session = attached["sessionId"]
+            .as_str()
+            .context("a session")?
+            .to_owned();
+        let page = Page { session };
+        for domain in ["Runtime.enable", "Log.enable", "Page.enable"] {
+            self.on(&page, domain, &json!({}))?;
+        }
+        let size =
+            json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false});
+        self.on(&page, "Emulation.setDeviceMetricsOverride", &size)?;
+        let scheme = if dark { "dark" } else { "light" };
+        let media = json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
+        self.on(&page, "Emulation.setEmulatedMedia", &media)?;
+        self.on(&page, "Page.navigate", &json!({"url": address}))?;
+        self.wait(&page, "document.readyState === 'complete'", 30)?;
+        Ok(page)
+    }
+
+    fn on(&mut self, page: &Page, method: &str, params: &Value) -> Result<Value> {
+        self.call(Some(&page.session), method, params)
+    }
+
+    /// The value of an expression, which may be a promise.
+    ///
+    /// # Errors
+    /// When it throws.
+    pub fn eval(&mut self, page: &Page, expression: &str) -> Result<Value> {
+        let params = json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
+        let found = self.on(page, "Runtime.evaluate", &params)?;
+        if let Some(thrown) = found.get("exceptionDetails") {
+            bail!("{expression}: {}", thrown["exception"]["description"]);
+        }
+        Ok(found["result"]["value"].clone())
+    }
+
+    /// Waits until an expression is true.
+    ///
+    /// # Errors
+    /// When it is not within so many seconds.
+    pub fn wait(&mut self, page: &Page, expression: &str, seconds: u64) -> Result<()> {
+        let started = Instant::now();
+        while started.elapsed() < Duration::from_secs(seconds) {
+            if self.eval(page, expression).is_ok_and(|v| v == true) {
+                return Ok(());
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        bail!(
+            "after {seconds} s it is not so: {expression}; errors: {:?}",
+            self.faults
+        )
+    }
+
+    /// Moves the mouse, and presses where `press`.
+    ///
+    /// # Errors
+    /// When the browser does not.
+    pub fn mouse(&mut self, page: &Page, x: f64, y: f64, press: bool) -> Result<()> {
+        let mut kinds = vec!["mouseMoved"];
+        if press {
+            kinds.extend(["mousePressed", "mouseReleased"]);
+        }
+        for kind in kinds {
+            let event = json!({"type": kind, "x": x, "y": y, "button": if kind == "mouseMoved" { "none" } else { "left" }, "clickCount": 1});
+            self.on(page, "Input.dispatchMouseEvent", &event)?;
+        }
+        Ok(())
+    }
+
+    /// Presses a key, as in `ArrowRight`, `Tab`.
+    ///
+    /// # Errors
+    /// When the browser does not.
+    pub fn key(&mut self, page: &Page, key: &str) -> Result<()> {
+        for kind in ["keyDown", "keyUp"] {
+            self.on(
+                page,
+                "Input.dispatchKeyEvent",
+                &json!({"type": kind, "key": key, "code": key}),
+            )?;
+        }
+        Ok(())
+    }
+
+    /// A picture of what is in view, PNG.
+    ///
+    /// # Errors
+    /// When it cannot be taken or written.
+    pub fn screenshot(&mut self, page: &Page, path: &Path) -> Result<()> {
+        use base64::Engine as _;
+        let taken = self.on(page, "Page.captureScreenshot", &json!({"format": "png"}))?;
+        let text = taken["data"].as_str().context("a picture")?;
+        let bytes = base64::engine::general_purpose::STANDARD.decode(text)?;
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder)?;
+        }
+        Ok(fs::write(path, bytes)?)
+    }
+}

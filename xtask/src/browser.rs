@@ -1,0 +1,39 @@
+//! Reports in a real browser.
+
+use crate::Task;
+use crate::shell::{cargo, command, exists, root, run};
+use anyhow::{Result, bail};
+
+pub(crate) const TASK: Task = Task {
+    name: "browser",
+    does: "tests reports in chromium; leaves pictures in target/browser",
+    run: browser,
+};
+
+pub(crate) fn browser(_arguments: &[String]) -> Result<()> {
+    if !exists("chromium") {
+        bail!("chromium is missing; run `cargo xtask setup`");
+    }
+    // The checker of accessibility.
+    let web = root().join("host-fit/web");
+    if !web.join("node_modules/axe-core").is_dir() {
+        let mut npm = command(
+            "npm",
+            &["ci", "--ignore-scripts", "--no-audit", "--no-fund"],
+        );
+        npm.current_dir(web);
+        run(&mut npm)?;
+    }
+    // The tests run the program as it is now.
+    run(&mut cargo(&["build", "--release", "--package=host-fit"]))?;
+    run(&mut cargo(&[
+        "test",
+        "--release",
+        "--package=scenarios",
+        "--test=browser",
+        "--",
+        "--ignored",
+        "--nocapture",
+        "--test-threads=1",
+    ]))
+}

@@ -425,6 +425,6 @@ fn files_of_other_programs_become_a_data_set() {
     // The next run of the rig is read as the first was.
     let (next, other) = (made("german.csv"), folder.path().join("other"));
     let like = [p("import"), &next, p("-o"), &other, p("--like"), &out];
-    refused(&like, &["german.csv", "no variable `t`", "`Zeit` (40)"]);
+    refused(&like, &["german.csv", "no variable `valve`", "`Zeit` (40)"]);
     assert!(!other.exists(), "nothing half-written");
 }

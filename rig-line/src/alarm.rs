@@ -144,7 +144,7 @@ impl Alarm {
         let distance = (mean - usual) / spread;
         self.largest = self.largest.max(distance.abs());
         // Also for no number.
-        if self.stopped.is_none() && !(distance.abs() <= self.threshold) {
+        if self.stopped.is_none() && (distance.is_nan() || distance.abs() > self.threshold) {
             self.stopped = Some(Verdict::Stopped {
                 at_s: self.samples as f64 * self.period_s,
                 residual: mean,

@@ -20,9 +20,14 @@ pub struct Sizes {
     pub nulls: u64,
 }
 
+/// A place, and the coordinates that are right there.
+type Curve = (&'static str, &'static [&'static str]);
+/// An effect, and the curves that it is.
+type Known = (&'static str, &'static [Curve]);
+
 /// Effects of the catalogue that are a curve over one coordinate, and what a search that has never heard of
 /// them should say. Lags, echoes, friction and hysteresis are none.
-const CURVES: &[(&str, &[(&str, &[&str])])] = &[
+const CURVES: &[Known] = &[
     ("state-dependent-delay", &[("delay", &["mean y (0.25 s)"])]),
     (
         "plenum-droop",

@@ -41,6 +41,7 @@ enum Command {
     Record(Box<commands::record::Args>),
     Watch(commands::watch::Args),
     Codegen(commands::codegen::Args),
+    Workbench(commands::workbench::Args),
 }
 
 fn main() -> ExitCode {
@@ -63,6 +64,7 @@ fn main() -> ExitCode {
         Command::Record(args) => commands::record::run(args, console),
         Command::Watch(args) => commands::watch::run(args, console),
         Command::Codegen(args) => commands::codegen::run(args, console),
+        Command::Workbench(args) => commands::workbench::run(args, console),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

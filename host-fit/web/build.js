@@ -9,7 +9,7 @@ mkdirSync(out, { recursive: true });
 const licence = readFileSync("node_modules/uplot/LICENSE", "utf8");
 const notice = `/*! uPlot ${JSON.parse(readFileSync("node_modules/uplot/package.json", "utf8")).version}\n${licence.trim()}\n*/\n`;
 
-for (const page of ["report"]) {
+for (const page of ["report", "workbench"]) {
   const result = await build({
     entryPoints: [`src/${page}.js`, `src/${page}.css`],
     bundle: true,

@@ -21,22 +21,24 @@ fn dependencies(package: &str) -> BTreeSet<String> {
 }
 
 /// From bottom to top, with what each may know.
-const CRATES: [(&str, &[&str]); 7] = [
+const CRATES: [(&str, &[&str]); 8] = [
     ("model-core", &[]),
     ("wire", &["model-core"]),
     ("recordings", &[]),
     ("rig-line", &["recordings", "wire"]),
+    ("workbench", &["recordings"]),
     ("closed-loop", &["model-core"]),
     ("firmware-sim", &["closed-loop", "recordings"]),
     (
         "host-fit",
-        // The simulator is for the program alone: an optional dependency, see the CI step "library alone".
+        // Simulator, line and workbench are for the program alone: optional dependencies, see the CI step "library alone".
         &[
             "closed-loop",
             "firmware-sim",
             "model-core",
             "recordings",
             "rig-line",
+            "workbench",
         ],
     ),
 ];
@@ -48,8 +50,10 @@ fn crates_know_what_the_picture_says() {
         assert_eq!(dependencies(package), known, "{package}");
     }
     let manifest: toml::Table = read("host-fit/Cargo.toml").parse().expect("TOML");
-    let simulator = &manifest["dependencies"]["firmware-sim"];
-    assert_eq!(simulator.get("optional"), Some(&true.into()));
+    for package in ["firmware-sim", "rig-line", "workbench"] {
+        let dependency = &manifest["dependencies"][package];
+        assert_eq!(dependency.get("optional"), Some(&true.into()));
+    }
 }
 
 /// The rooms in the order of the page, from top to bottom.

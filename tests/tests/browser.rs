@@ -1,8 +1,9 @@
-//! Reports in a real browser. They need chromium and the packages of `host-fit/web`, so they run where those
+//! Report and workbench in a real browser. They need chromium and the packages of `host-fit/web`, so they run where those
 //! are: `cargo xtask browser`.
 
+use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
 
 use scenarios::browser::{Browser, Page};
 use scenarios::program;
@@ -167,4 +168,199 @@ fn a_report_is_looked_along() {
     b.screenshot(&phone, &shots("report-phone.png"))
         .expect("a picture");
     assert_eq!(b.faults(), Vec::<String>::new());
+}
+
+/// The program, serving; ends with this value, as abruptly as a power cut.
+struct Served {
+    child: Child,
+    address: String,
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn serve(project: &Path) -> Served {
+    let mut child = Command::new(program())
+        .args(["workbench", "--no-open", "--json"])
+        .arg(root().join("data/hidden-ramp"))
+        .arg("--project")
+        .arg(project)
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut out = BufReader::new(child.stdout.take().expect("its output"));
+    let mut text = String::new();
+    while !text.trim_end().ends_with('}') {
+        assert!(out.read_line(&mut text).expect("a line") > 0, "{text}");
+    }
+    let told: Value = serde_json::from_str(&text).expect("one JSON document");
+    let address = told["address"].as_str().expect("an address").to_owned();
+    assert!(address.starts_with("http://127.0.0.1:"));
+    Served { child, address }
+}
+
+const IDLE: &str = "document.getElementById('work').hidden";
+
+#[test]
+#[ignore = "needs chromium: cargo xtask browser"]
+fn the_workbench_finds_what_is_missing_and_loses_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let project = folder.path().join("project");
+    let served = serve(&project);
+    let mut b = Browser::start().expect("chromium");
+    let page = b
+        .open(&served.address, (1100, 1000), false)
+        .expect("a page");
+    b.wait(
+        &page,
+        "document.querySelectorAll('.record').length === 8",
+        20,
+    )
+    .expect("the records");
+    accessible(&mut b, &page);
+    b.screenshot(&page, &shots("workbench-start.png"))
+        .expect("a picture");
+
+    // Identify, and see it at work.
+    let identify = |evaluations: u32| {
+        format!(
+            "(() => {{ const f = document.getElementById('identify'); f.delay.value = 'fixed'; f.n1.value = 2; f.n2.value = 2; f.max_lag.value = 150; f.evaluations.value = {evaluations}; f.requestSubmit(); }})()"
+        )
+    };
+    b.eval(&page, &identify(300)).expect("identify");
+    b.wait(&page, "!document.getElementById('work').hidden", 20)
+        .expect("it runs");
+    b.wait(
+        &page,
+        &format!("{IDLE} && document.querySelectorAll('.model').length === 1"),
+        300,
+    )
+    .expect("a model");
+    b.wait(&page, "document.querySelectorAll('[data-bar]').length > 20 && document.querySelectorAll('.record').length === 8", 20).expect("where it fails");
+
+    // Cancelled: the best so far is a model, too.
+    b.eval(&page, &identify(1_000_000)).expect("identify");
+    b.wait(
+        &page,
+        "document.getElementById('work-now').textContent.includes('best')",
+        60,
+    )
+    .expect("progress");
+    b.screenshot(&page, &shots("workbench-progress.png"))
+        .expect("a picture");
+    b.eval(&page, "document.getElementById('cancel').click()")
+        .expect("cancel");
+    b.wait(
+        &page,
+        &format!("{IDLE} && document.querySelectorAll('.model').length === 2"),
+        300,
+    )
+    .expect("the best so far");
+    b.eval(&page, "document.querySelectorAll('.model')[0].click()")
+        .expect("back to the first");
+    b.wait(
+        &page,
+        "document.querySelector('.model.current').textContent.startsWith('1.')",
+        20,
+    )
+    .expect("chosen");
+
+    // Killed while it works; another start on the folder has everything.
+    b.eval(&page, &identify(1_000_000)).expect("identify");
+    b.wait(&page, "!document.getElementById('work').hidden", 20)
+        .expect("it runs");
+    drop(served);
+    b.wait(&page, "!document.getElementById('offline').hidden", 30)
+        .expect("the page says so");
+    b.screenshot(&page, &shots("workbench-offline.png"))
+        .expect("a picture");
+    b.faults();
+    let served = serve(&project);
+    let page = b
+        .open(&served.address, (1100, 1000), false)
+        .expect("a page");
+    b.wait(&page, "document.querySelectorAll('.model').length === 2 && document.querySelector('.model.current').textContent.startsWith('1.')", 20).expect("nothing lost");
+    // A second browser sees what the first does.
+    let second = b.open(&served.address, (1100, 1000), true).expect("a page");
+
+    b.eval(&page, "document.getElementById('diagnose').click()")
+        .expect("diagnose");
+    b.wait(
+        &page,
+        &format!("{IDLE} && document.querySelectorAll('#missing tbody tr').length > 2"),
+        900,
+    )
+    .expect("candidates");
+    b.wait(
+        &second,
+        "document.querySelectorAll('#missing tbody tr').length > 2",
+        20,
+    )
+    .expect("the other browser");
+    b.eval(
+        &page,
+        "document.getElementById('missing-section').scrollIntoView()",
+    )
+    .expect("scrolled");
+    b.screenshot(&page, &shots("workbench-candidates.png"))
+        .expect("a picture");
+    b.eval(
+        &page,
+        "document.querySelector('#missing tbody button').click()",
+    )
+    .expect("add");
+    b.wait(
+        &page,
+        &format!("{IDLE} && document.querySelectorAll('.model').length === 3"),
+        900,
+    )
+    .expect("a better model");
+    b.wait(
+        &second,
+        "document.querySelectorAll('.model').length === 3",
+        20,
+    )
+    .expect("the other browser");
+    let times_noise = b.eval(&page, "fetch('/api/state', {headers: {'x-token': new URLSearchParams(location.search).get('token')}}).then(r => r.json()).then(s => { const m = s.models.at(-1); return m.rmse / m.noise_rmse; })").expect("numbers");
+    assert!(
+        times_noise.as_f64() < Some(1.3),
+        "the error is {times_noise} times the noise"
+    );
+    b.eval(
+        &page,
+        "document.getElementById('match-section').scrollIntoView()",
+    )
+    .expect("scrolled");
+    b.screenshot(&page, &shots("workbench-ladder.png"))
+        .expect("a picture");
+    accessible(&mut b, &page);
+    accessible(&mut b, &second);
+    b.screenshot(&second, &shots("workbench-dark.png"))
+        .expect("a picture");
+
+    // Undo is the parent; what was made stays in the tree.
+    b.eval(&page, "[...document.querySelectorAll('#models button')].find(x => x.textContent === 'Undo').click()").expect("undo");
+    b.wait(&page, "document.querySelector('.model.current').textContent.startsWith('1.') && document.querySelectorAll('.model').length === 3", 20).expect("undone");
+    b.eval(&page, "document.querySelectorAll('.model')[1].click()")
+        .expect("redo");
+    let constants = b.eval(&page, "fetch([...document.querySelectorAll('#models a')].find(a => a.textContent.includes('identified.rs')).href).then(r => r.text())").expect("constants");
+    assert!(
+        constants
+            .as_str()
+            .is_some_and(|text| text.contains("pub const")),
+        "{constants}"
+    );
+    assert_eq!(b.faults(), Vec::<String>::new());
+
+    // The command line goes on with the same folder.
+    drop(served);
+    run(&[
+        Path::new("compare"),
+        &project.join("model-3.toml"),
+        &root().join("data/hidden-ramp"),
+    ]);
 }

@@ -1,4 +1,4 @@
-//! Reports in a real browser.
+//! Report and workbench in a real browser.
 
 use crate::Task;
 use crate::shell::{cargo, command, exists, root, run};
@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 
 pub(crate) const TASK: Task = Task {
     name: "browser",
-    does: "tests reports in chromium; leaves pictures in target/browser",
+    does: "tests report and workbench in chromium; leaves pictures in target/browser",
     run: browser,
 };
 

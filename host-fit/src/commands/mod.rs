@@ -36,6 +36,7 @@ pub(crate) mod rules;
 pub(crate) mod simulate;
 pub(crate) mod watch;
 mod words;
+pub(crate) mod workbench;
 
 /// How a command talks to the user.
 #[derive(Debug, Clone, Copy)]

@@ -26,6 +26,7 @@ macro_rules! bundle {
 }
 
 pub(super) const REPORT: Bundle = bundle!("report");
+pub(super) const WORKBENCH: Bundle = bundle!("workbench");
 
 /// Samples of one record by bin of a coordinate, in order: the bin and how many samples it holds; no bin where the coordinate has
 /// no value or lies outside the table.

@@ -35,7 +35,7 @@ pub use ladder::{Ladder, LadderRecord, LadderStep, ladder};
 pub use living::{Living, Stretches};
 pub use overlay::{LabelledRun, Overlay, overlay};
 pub use ranking::{Candidate, Ranking, ranking};
-pub use report::{Column, KeyNumber, Report, Tone};
+pub use report::{Column, KeyNumber, Report, Tone, workbench_page};
 pub use where_it_fails::{FailureBin, FailureView, WhereItFails, where_it_fails};
 
 #[cfg(test)]

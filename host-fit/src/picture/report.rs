@@ -279,6 +279,13 @@ impl Report {
     }
 }
 
+/// The workbench's page around `body`, which is HTML: the same looks, and a script that may ask the server it came from.
+#[must_use]
+pub fn workbench_page(title: &str, body: &str) -> String {
+    let policy = "; connect-src 'self'; base-uri 'none'; form-action 'none'";
+    page(title, &living::WORKBENCH, policy, body)
+}
+
 fn page(title: &str, bundle: &Bundle, policy: &str, body: &str) -> String {
     let title = escape(title);
     format!(

@@ -1,0 +1,344 @@
+//! The project folder: models as files, the tree of how they came about, and the log of commands.
+//!
+//! `tree.json` is written whole after every step, by a rename; a server that is killed leaves the last whole state. The models are the
+//! files that the command line reads and writes. A second workbench on the folder is refused by a lock.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use recordings::output::{OutputError, write_atomic};
+use serde::{Deserialize, Serialize};
+
+/// One model of the tree.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Node {
+    /// Number of the model, from 1.
+    pub id: u32,
+    /// The model that it was made from; none for one that was identified or brought along.
+    pub parent: Option<u32>,
+    /// What was done, in a few words: `identified`, `+ plenum-droop`.
+    pub step: String,
+    /// The same as a command.
+    pub command: String,
+    /// The model's file, within the folder.
+    pub file: String,
+    /// Root mean square error on the held-out records, y; none where its free run diverges.
+    pub rmse: Option<f64>,
+    /// The noise floor there, y.
+    pub noise_rmse: Option<f64>,
+    /// FIT on the held-out records, %.
+    pub fit_percent: Option<f64>,
+}
+
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+struct Tree {
+    format_version: u32,
+    /// Hash of the data set that the models were made from.
+    data: String,
+    current: Option<u32>,
+    nodes: Vec<Node>,
+}
+
+const FORMAT: u32 = 1;
+const TREE: &str = "tree.json";
+const LOG: &str = "log.txt";
+
+/// Why a project folder cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProjectError {
+    /// The operating system refused.
+    #[error("{path}: {cause}; check that the folder may be written to and has space", path = .path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the operating system said.
+        cause: io::Error,
+    },
+    /// Not written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// Another workbench is open on it.
+    #[error("{path} is open in another workbench; use that one, or close it", path = .0.display())]
+    Locked(PathBuf),
+    /// A tree that is none.
+    #[error("{path} is no tree of this version ({cause}); name another folder with --project", path = .path.display())]
+    Tree {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        cause: String,
+    },
+    /// Models of other data.
+    #[error("{path} holds models of another data set; name another folder with --project", path = .0.display())]
+    OtherData(PathBuf),
+    /// A model that is not in the tree.
+    #[error("there is no model {0}")]
+    NoNode(u32),
+}
+
+/// A project folder that is open.
+#[derive(Debug)]
+pub struct Project {
+    folder: PathBuf,
+    tree: Tree,
+    /// Held as long as the project is open; the system lets go of it when the process ends, however it ends.
+    _lock: File,
+}
+
+impl Project {
+    /// Opens the folder for the data set with this hash; makes it where there is none.
+    ///
+    /// # Errors
+    /// [`ProjectError`] naming the file, and what to do.
+    pub fn open(folder: &Path, data: &str) -> Result<Self, ProjectError> {
+        let io = |path: &Path| {
+            let path = path.to_path_buf();
+            move |cause| ProjectError::Io { path, cause }
+        };
+        fs::create_dir_all(folder).map_err(io(folder))?;
+        let path = folder.join("lock");
+        let lock = File::options()
+            .create(true)
+            .truncate(false)
+            .write(true)
+            .open(&path)
+            .map_err(io(&path))?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(fs::TryLockError::WouldBlock) => {
+                return Err(ProjectError::Locked(folder.to_path_buf()));
+            }
+            Err(fs::TryLockError::Error(cause)) => return Err(io(&path)(cause)),
+        }
+        let path = folder.join(TREE);
+        let wrong = |cause: String| ProjectError::Tree {
+            path: path.clone(),
+            cause,
+        };
+        let tree = match fs::read(&path) {
+            Ok(bytes) => {
+                let tree: Tree =
+                    serde_json::from_slice(&bytes).map_err(|e| wrong(e.to_string()))?;
+                check(&tree).map_err(wrong)?;
+                if tree.data != data {
+                    return Err(ProjectError::OtherData(folder.to_path_buf()));
+                }
+                tree
+            }
+            Err(e) if e.kind() == io::ErrorKind::NotFound => Tree {
+                format_version: FORMAT,
+                data: data.to_owned(),
+                ..Tree::default()
+            },
+            Err(cause) => return Err(io(&path)(cause)),
+        };
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            tree,
+            _lock: lock,
+        })
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Every model, in the order in which they were made.
+    #[must_use]
+    pub fn nodes(&self) -> &[Node] {
+        &self.tree.nodes
+    }
+
+    /// The model that is worked on.
+    #[must_use]
+    pub fn current(&self) -> Option<u32> {
+        self.tree.current
+    }
+
+    /// A model by its number.
+    ///
+    /// # Errors
+    /// [`ProjectError::NoNode`].
+    pub fn node(&self, id: u32) -> Result<&Node, ProjectError> {
+        let mut nodes = self.tree.nodes.iter();
+        nodes.find(|n| n.id == id).ok_or(ProjectError::NoNode(id))
+    }
+
+    /// Where a model's file lies.
+    #[must_use]
+    pub fn path(&self, node: &Node) -> PathBuf {
+        self.folder.join(&node.file)
+    }
+
+    /// The file name of the next model.
+    #[must_use]
+    pub fn next_file(&self) -> String {
+        format!("model-{}.toml", self.next_id())
+    }
+
+    fn next_id(&self) -> u32 {
+        let highest = self.tree.nodes.iter().map(|n| n.id).max();
+        highest.unwrap_or(0).saturating_add(1)
+    }
+
+    /// Adds a model whose file is in the folder already, makes it the current one and notes its command. Its number is given here.
+    ///
+    /// # Errors
+    /// [`ProjectError`] when the folder cannot be written; the tree is then as before.
+    pub fn add(&mut self, node: Node) -> Result<u32, ProjectError> {
+        let id = self.next_id();
+        self.note(&node.command)?;
+        let mut tree = self.tree.clone();
+        tree.current = Some(id);
+        tree.nodes.push(Node { id, ..node });
+        self.keep(tree)?;
+        Ok(id)
+    }
+
+    /// Makes another model the current one: undo, redo and branches are this.
+    ///
+    /// # Errors
+    /// [`ProjectError`] when there is no such model or the folder cannot be written.
+    pub fn select(&mut self, id: u32) -> Result<(), ProjectError> {
+        self.node(id)?;
+        let tree = Tree {
+            current: Some(id),
+            ..self.tree.clone()
+        };
+        self.keep(tree)
+    }
+
+    /// The commands so far, oldest first; the last hundred.
+    #[must_use]
+    pub fn log(&self) -> Vec<String> {
+        let text = fs::read_to_string(self.folder.join(LOG)).unwrap_or_default();
+        let lines: Vec<&str> = text.lines().collect();
+        let from = lines.len().saturating_sub(100);
+        let last = lines.iter().skip(from);
+        last.map(|line| (*line).to_owned()).collect()
+    }
+
+    /// Notes a command in the log.
+    ///
+    /// # Errors
+    /// [`ProjectError`] when the log cannot be written.
+    pub fn note(&self, command: &str) -> Result<(), ProjectError> {
+        let path = self.folder.join(LOG);
+        let line = format!("{}\n", command.replace(['\n', '\r'], " "));
+        File::options()
+            .create(true)
+            .append(true)
+            .open(&path)
+            .and_then(|mut file| file.write_all(line.as_bytes()))
+            .map_err(|cause| ProjectError::Io { path, cause })
+    }
+
+    fn keep(&mut self, tree: Tree) -> Result<(), ProjectError> {
+        let text = serde_json::to_vec_pretty(&tree).unwrap_or_default();
+        write_atomic(&self.folder.join(TREE), |out| out.write_all(&text))?;
+        self.tree = tree;
+        Ok(())
+    }
+}
+
+/// A tree that people may have edited: its numbers differ, parents come first, files stay in the folder.
+fn check(tree: &Tree) -> Result<(), String> {
+    if tree.format_version != FORMAT {
+        return Err(format!("format_version {}", tree.format_version));
+    }
+    for (i, node) in tree.nodes.iter().enumerate() {
+        let earlier = || tree.nodes.iter().take(i);
+        if earlier().any(|n| n.id == node.id) {
+            return Err(format!("model {} twice", node.id));
+        }
+        if node.parent.is_some_and(|p| earlier().all(|n| n.id != p)) {
+            return Err(format!("model {} before its parent", node.id));
+        }
+        let mut parts = Path::new(&node.file).components();
+        let plain = matches!(parts.next(), Some(std::path::Component::Normal(_)));
+        if !plain || parts.next().is_some() {
+            return Err(format!(
+                "the file of model {} is not in the folder",
+                node.id
+            ));
+        }
+    }
+    match tree.current {
+        Some(id) if tree.nodes.iter().all(|n| n.id != id) => Err(format!("no model {id}")),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn node(parent: Option<u32>, file: &str) -> Node {
+        Node {
+            id: 0,
+            parent,
+            step: "identified".to_owned(),
+            command: "host-fit identify".to_owned(),
+            file: file.to_owned(),
+            rmse: Some(0.1),
+            noise_rmse: None,
+            fit_percent: None,
+        }
+    }
+
+    #[test]
+    fn a_folder_opened_again_is_as_it_was_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p");
+        {
+            let mut project = Project::open(&path, "abc").unwrap();
+            let first = project.add(node(None, &project.next_file())).unwrap();
+            project
+                .add(node(Some(first), &project.next_file()))
+                .unwrap();
+            project.select(first).unwrap();
+            assert!(project.select(9).is_err());
+            assert!(matches!(
+                Project::open(&path, "abc"),
+                Err(ProjectError::Locked(_))
+            ));
+        }
+        let project = Project::open(&path, "abc").unwrap();
+        assert_eq!(project.nodes().len(), 2);
+        assert_eq!(project.current(), Some(1));
+        assert_eq!(project.next_file(), "model-3.toml");
+        assert_eq!(project.log().len(), 2);
+        drop(project);
+        assert!(matches!(
+            Project::open(&path, "other"),
+            Err(ProjectError::OtherData(_))
+        ));
+    }
+
+    #[test]
+    fn a_tree_that_leads_out_of_the_folder_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        for (file, parent) in [
+            ("../x.toml", "null"),
+            ("/etc/passwd", "null"),
+            ("a/b", "null"),
+            ("a", "7"),
+        ] {
+            let text = format!(
+                r#"{{"format_version":1,"data":"d","current":null,"nodes":[{{"id":1,"parent":{parent},"step":"","command":"","file":"{file}","rmse":null,"noise_rmse":null,"fit_percent":null}}]}}"#
+            );
+            fs::write(folder.path().join(TREE), text).unwrap();
+            let error = Project::open(folder.path(), "d").unwrap_err();
+            assert!(
+                matches!(error, ProjectError::Tree { .. }),
+                "{file}: {error}"
+            );
+        }
+        fs::write(folder.path().join(TREE), "{").unwrap();
+        assert!(Project::open(folder.path(), "d").is_err());
+    }
+}

@@ -1,0 +1,285 @@
+//! Requests, and what they come to.
+
+use std::convert::Infallible;
+use std::net::{Ipv4Addr, TcpListener};
+use std::sync::Arc;
+
+use axum::Router;
+use axum::body::Bytes;
+use axum::extract::{DefaultBodyLimit, Path, RawQuery, State};
+use axum::http::header::{CONTENT_DISPOSITION, CONTENT_TYPE};
+use axum::http::{HeaderValue, StatusCode};
+use axum::middleware;
+use axum::response::sse::{Event, KeepAlive, Sse};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use futures_util::stream;
+use serde_json::{Value, json};
+use tokio::sync::broadcast::error::RecvError;
+
+use crate::guard::{Guard, guard};
+use crate::work::Work;
+
+/// The largest request, bytes.
+const LARGEST: usize = 256 << 10;
+
+/// Why something was not done: one paragraph with the remedy.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal(pub String);
+
+impl<E: std::error::Error> From<E> for Refusal {
+    fn from(error: E) -> Self {
+        let mut text = error.to_string();
+        let mut cause = error.source();
+        while let Some(inner) = cause {
+            let words = inner.to_string();
+            if !text.contains(&words) {
+                text.push_str(": ");
+                text.push_str(&words);
+            }
+            cause = inner.source();
+        }
+        Self(text)
+    }
+}
+
+/// A file to be saved by the browser.
+#[derive(Debug, Clone)]
+pub struct Download {
+    /// Its name.
+    pub name: String,
+    /// What it is, as in `text/html`.
+    pub kind: &'static str,
+    /// What is in it.
+    pub content: Vec<u8>,
+}
+
+/// What can be done at the bench. Every method may be called from several threads; [`Bench::run`] from one at a time.
+pub trait Bench: Send + Sync + 'static {
+    /// The page.
+    fn page(&self) -> String;
+    /// Everything but the curves, as a JSON document.
+    fn state(&self) -> Value;
+    /// Records with the free runs of some models, as the page's script draws them.
+    ///
+    /// # Errors
+    /// [`Refusal`] in words for the user.
+    fn records(&self, models: &[u32]) -> Result<String, Refusal>;
+    /// What is quick: choosing another model.
+    ///
+    /// # Errors
+    /// [`Refusal`] in words for the user.
+    fn select(&self, model: u32) -> Result<(), Refusal>;
+    /// Whether this is work at all, before it is begun: its name.
+    ///
+    /// # Errors
+    /// [`Refusal`] in words for the user.
+    fn name(&self, request: &Value) -> Result<String, Refusal>;
+    /// Does a piece of work.
+    ///
+    /// # Errors
+    /// [`Refusal`] in words for the user.
+    fn run(&self, request: &Value, work: &Work) -> Result<(), Refusal>;
+    /// A file made of a model.
+    ///
+    /// # Errors
+    /// [`Refusal`] in words for the user.
+    fn file(&self, kind: &str, model: u32) -> Result<Download, Refusal>;
+}
+
+struct Shared<B> {
+    bench: B,
+    work: Work,
+}
+
+type At<B> = State<Arc<Shared<B>>>;
+
+/// Serves `bench` on loopback until the process ends; `port` 0 is any free one. `ready` hears the address, with this run's token.
+///
+/// # Errors
+/// When the port cannot be had.
+pub fn serve(bench: impl Bench, port: u16, ready: impl FnOnce(&str)) -> std::io::Result<()> {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
+    listener.set_nonblocking(true)?;
+    let guard = Guard::new(listener.local_addr()?.port())?;
+    let address = format!("http://{}/?token={}", listener.local_addr()?, guard.token());
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()?;
+    runtime.block_on(async {
+        let listener = tokio::net::TcpListener::from_std(listener)?;
+        ready(&address);
+        axum::serve(listener, router(bench, guard)).await
+    })
+}
+
+fn router<B: Bench>(bench: B, rules: Guard) -> Router {
+    let shared = Arc::new(Shared {
+        bench,
+        work: Work::new(),
+    });
+    Router::new()
+        .route("/", get(page::<B>))
+        .route("/api/state", get(state::<B>))
+        .route("/api/records", get(records::<B>))
+        .route("/api/events", get(events::<B>))
+        .route("/api/select", post(select::<B>))
+        .route("/api/run", post(run::<B>))
+        .route("/api/cancel", post(cancel::<B>))
+        .route("/api/file/{kind}/{model}", get(file::<B>))
+        .with_state(shared)
+        .layer(DefaultBodyLimit::max(LARGEST))
+        .layer(middleware::from_fn_with_state(rules, guard))
+}
+
+/// Runs what may take a while without holding up the other requests.
+async fn aside<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, Refusal> + Send + 'static,
+) -> Result<T, Response> {
+    match tokio::task::spawn_blocking(work).await {
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(why)) => Err(refused(StatusCode::UNPROCESSABLE_ENTITY, &why.0)),
+        // A panic in the library: a fault of ours, but the server goes on.
+        Err(_) => Err(refused(
+            StatusCode::INTERNAL_SERVER_ERROR,
+            "this failed inside the program; please report it with the log of the project",
+        )),
+    }
+}
+
+fn refused(status: StatusCode, why: &str) -> Response {
+    (status, axum::Json(json!({"error": why}))).into_response()
+}
+
+fn json_text(text: String) -> Response {
+    ([(CONTENT_TYPE, "application/json")], text).into_response()
+}
+
+fn read(body: &Bytes) -> Result<Value, Response> {
+    serde_json::from_slice(body)
+        .map_err(|e| refused(StatusCode::BAD_REQUEST, &format!("no JSON document: {e}")))
+}
+
+async fn page<B: Bench>(State(shared): At<B>) -> Response {
+    axum::response::Html(shared.bench.page()).into_response()
+}
+
+async fn state<B: Bench>(State(shared): At<B>) -> Result<Response, Response> {
+    let state = aside({
+        let shared = shared.clone();
+        move || Ok(shared.bench.state())
+    })
+    .await?;
+    let mut state = state;
+    if let Some(object) = state.as_object_mut() {
+        object.insert("work".to_owned(), shared.work.state());
+    }
+    Ok(axum::Json(state).into_response())
+}
+
+async fn records<B: Bench>(
+    State(shared): At<B>,
+    RawQuery(query): RawQuery,
+) -> Result<Response, Response> {
+    const MOST: usize = 6;
+    let query = query.unwrap_or_default();
+    let list = query
+        .split('&')
+        .find_map(|pair| pair.strip_prefix("models="));
+    let numbers = list.unwrap_or("").split(',').filter(|t| !t.is_empty());
+    let models: Vec<u32> = numbers
+        .map(str::parse)
+        .collect::<Result<_, _>>()
+        .map_err(|_| refused(StatusCode::BAD_REQUEST, "models are numbers: models=1,3"))?;
+    if models.len() > MOST {
+        let why = format!("at most {MOST} models are shown at once");
+        return Err(refused(StatusCode::BAD_REQUEST, &why));
+    }
+    aside(move || shared.bench.records(&models))
+        .await
+        .map(json_text)
+}
+
+async fn select<B: Bench>(State(shared): At<B>, body: Bytes) -> Result<Response, Response> {
+    let request = read(&body)?;
+    let model = request.get("model").and_then(Value::as_u64);
+    let model = model
+        .and_then(|m| u32::try_from(m).ok())
+        .ok_or_else(|| refused(StatusCode::BAD_REQUEST, "`model` is the number of a model"))?;
+    let work = shared.work.clone();
+    aside(move || shared.bench.select(model)).await?;
+    work.tell(&json!({"kind": "changed"}));
+    Ok(json_text("{}".to_owned()))
+}
+
+async fn run<B: Bench>(State(shared): At<B>, body: Bytes) -> Result<Response, Response> {
+    let request = read(&body)?;
+    let name = shared
+        .bench
+        .name(&request)
+        .map_err(|why| refused(StatusCode::BAD_REQUEST, &why.0))?;
+    if !shared.work.begin(&name) {
+        let why = "something is running already; wait for it, or cancel it";
+        return Err(refused(StatusCode::CONFLICT, why));
+    }
+    // Not awaited: the page hears of its end as of everything else.
+    tokio::task::spawn_blocking(move || {
+        let work = shared.work.clone();
+        let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            shared.bench.run(&request, &work)
+        }));
+        let error = match done {
+            Ok(Ok(())) => None,
+            Ok(Err(why)) => Some(why.0),
+            Err(_) => Some(
+                "this failed inside the program; please report it with the log of the project"
+                    .to_owned(),
+            ),
+        };
+        work.end(error.as_deref());
+    });
+    Ok((StatusCode::ACCEPTED, json_text("{}".to_owned())).into_response())
+}
+
+async fn cancel<B: Bench>(State(shared): At<B>) -> Response {
+    shared.work.ask_to_end();
+    json_text("{}".to_owned())
+}
+
+async fn file<B: Bench>(
+    State(shared): At<B>,
+    Path((kind, model)): Path<(String, String)>,
+) -> Result<Response, Response> {
+    let model = model
+        .parse()
+        .map_err(|_| refused(StatusCode::BAD_REQUEST, "a model's number is needed"))?;
+    let file = aside(move || shared.bench.file(&kind, model)).await?;
+    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
+    let name: String = file.name.chars().filter(|c| plain(*c)).collect();
+    let disposition = format!("attachment; filename=\"{name}\"");
+    let mut response = file.content.into_response();
+    let headers = response.headers_mut();
+    headers.insert(CONTENT_TYPE, HeaderValue::from_static(file.kind));
+    if let Ok(value) = HeaderValue::from_str(&disposition) {
+        headers.insert(CONTENT_DISPOSITION, value);
+    }
+    Ok(response)
+}
+
+async fn events<B: Bench>(State(shared): At<B>) -> Response {
+    let told = stream::unfold(shared.work.listen(), |mut events| async move {
+        let text = match events.recv().await {
+            Ok(text) => text,
+            // A page that slept asks for everything anew.
+            Err(RecvError::Lagged(_)) => json!({"kind": "changed"}).to_string(),
+            Err(RecvError::Closed) => return None,
+        };
+        Some((Ok::<_, Infallible>(Event::default().data(text)), events))
+    });
+    Sse::new(told)
+        .keep_alive(KeepAlive::default())
+        .into_response()
+}
+
+#[cfg(test)]
+mod tests;

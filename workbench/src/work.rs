@@ -1,0 +1,182 @@
+//! One piece of work at a time, told to every page that is open.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use serde_json::{Value, json};
+use tokio::sync::broadcast;
+
+/// A piece of work while it runs: it tells how far it is, and hears when it is to end.
+#[derive(Debug, Clone)]
+pub struct Work {
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    cancel: AtomicBool,
+    events: broadcast::Sender<String>,
+    running: Mutex<Option<Running>>,
+}
+
+#[derive(Debug, Clone)]
+struct Running {
+    name: String,
+    now: String,
+    /// The best so far over the evaluations, of one search after the other.
+    searches: Vec<Vec<(usize, f64)>>,
+}
+
+impl Running {
+    /// Notes the best of a search; fewer evaluations than before are another search's. Its number.
+    fn note(&mut self, evaluations: usize, best: f64) -> usize {
+        const KEPT: usize = 1000;
+        let last = self.searches.last().and_then(|search| search.last());
+        if last.is_none_or(|(before, _)| evaluations < *before) {
+            self.searches.push(Vec::new());
+        }
+        let number = self.searches.len().saturating_sub(1);
+        if let Some(search) = self.searches.last_mut() {
+            // Of a level stretch its two ends are enough.
+            let level = |(_, value): &(usize, f64)| *value == best;
+            if let [.., before, last] = search.as_slice()
+                && level(before)
+                && level(last)
+            {
+                search.pop();
+            }
+            search.push((evaluations, best));
+            if search.len() > KEPT {
+                let mut odd = false;
+                search.retain(|_| {
+                    odd = !odd;
+                    odd
+                });
+            }
+        }
+        number
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // What is kept is replaced whole: a panic elsewhere leaves nothing half-done in it.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Work {
+    pub(crate) fn new() -> Self {
+        let (events, _) = broadcast::channel(256);
+        Self {
+            shared: Arc::new(Shared {
+                cancel: AtomicBool::new(false),
+                events,
+                running: Mutex::new(None),
+            }),
+        }
+    }
+
+    /// Raised when the user wants the best so far at once.
+    #[must_use]
+    pub fn cancel(&self) -> &AtomicBool {
+        &self.shared.cancel
+    }
+
+    /// What the work is at now, in words.
+    pub fn now(&self, words: &str) {
+        if let Some(running) = lock(&self.shared.running).as_mut() {
+            words.clone_into(&mut running.now);
+        }
+        self.tell(&json!({"kind": "now", "words": words}));
+    }
+
+    /// The best that a search has after so many evaluations.
+    pub fn best(&self, evaluations: usize, best: f64) {
+        if !best.is_finite() {
+            return;
+        }
+        let number = match lock(&self.shared.running).as_mut() {
+            Some(running) => running.note(evaluations, best),
+            None => return,
+        };
+        self.tell(&json!({"kind": "best", "search": number, "evaluations": evaluations, "best": best}));
+    }
+
+    /// Something to know.
+    pub fn warning(&self, words: &str) {
+        self.tell(&json!({"kind": "warning", "words": words}));
+    }
+
+    pub(crate) fn tell(&self, event: &Value) {
+        // Nobody listening is no fault.
+        let _ = self.shared.events.send(event.to_string());
+    }
+
+    pub(crate) fn listen(&self) -> broadcast::Receiver<String> {
+        self.shared.events.subscribe()
+    }
+
+    /// What is running, for a page that has just been opened.
+    pub(crate) fn state(&self) -> Value {
+        match lock(&self.shared.running).as_ref() {
+            None => Value::Null,
+            Some(r) => json!({"name": r.name, "now": r.now, "searches": r.searches}),
+        }
+    }
+
+    /// Takes the bench for a piece of work; none while another one runs.
+    pub(crate) fn begin(&self, name: &str) -> bool {
+        let mut running = lock(&self.shared.running);
+        if running.is_some() {
+            return false;
+        }
+        *running = Some(Running {
+            name: name.to_owned(),
+            now: String::new(),
+            searches: Vec::new(),
+        });
+        drop(running);
+        self.shared.cancel.store(false, Ordering::Relaxed);
+        self.tell(&json!({"kind": "begins", "name": name}));
+        true
+    }
+
+    pub(crate) fn end(&self, error: Option<&str>) {
+        *lock(&self.shared.running) = None;
+        self.tell(&json!({"kind": "ends", "error": error}));
+    }
+
+    pub(crate) fn ask_to_end(&self) {
+        self.shared.cancel.store(true, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_search_has_a_curve_of_its_own() {
+        let work = Work::new();
+        assert!(work.begin("identifying"));
+        for (evaluations, best) in [(1, 3.0), (2, 2.0), (5, 2.0), (9, 2.0), (1, 4.0), (3, 1.0)] {
+            work.best(evaluations, best);
+        }
+        work.best(4, f64::INFINITY);
+        let searches = json!([[[1, 3.0], [2, 2.0], [9, 2.0]], [[1, 4.0], [3, 1.0]]]);
+        assert_eq!(work.state()["searches"], searches);
+        work.end(None);
+        assert!(work.state().is_null());
+    }
+
+    #[test]
+    fn a_long_search_keeps_its_course_and_little_more() {
+        let work = Work::new();
+        work.begin("identifying");
+        for n in 0..50_000 {
+            work.best(n, 1.0 / (n as f64 + 1.0));
+        }
+        let state = work.state();
+        let kept = state["searches"][0].as_array().unwrap();
+        assert!(kept.len() <= 1000 && kept.last().unwrap()[0] == 49_999);
+    }
+}

@@ -88,11 +88,11 @@ pub struct Project {
 }
 
 impl Project {
-    /// Opens the folder for the data set with this hash; makes it where there is none.
+    /// Opens the folder for the data set with this hash, or for whichever it has; makes it where there is none.
     ///
     /// # Errors
     /// [`ProjectError`] naming the file, and what to do.
-    pub fn open(folder: &Path, data: &str) -> Result<Self, ProjectError> {
+    pub fn open(folder: &Path, data: Option<&str>) -> Result<Self, ProjectError> {
         let io = |path: &Path| {
             let path = path.to_path_buf();
             move |cause| ProjectError::Io { path, cause }
@@ -122,23 +122,35 @@ impl Project {
                 let tree: Tree =
                     serde_json::from_slice(&bytes).map_err(|e| wrong(e.to_string()))?;
                 check(&tree).map_err(wrong)?;
-                if tree.data != data {
-                    return Err(ProjectError::OtherData(folder.to_path_buf()));
-                }
                 tree
             }
             Err(e) if e.kind() == io::ErrorKind::NotFound => Tree {
                 format_version: FORMAT,
-                data: data.to_owned(),
                 ..Tree::default()
             },
             Err(cause) => return Err(io(&path)(cause)),
         };
-        Ok(Self {
+        let mut project = Self {
             folder: folder.to_path_buf(),
             tree,
             _lock: lock,
-        })
+        };
+        if let Some(data) = data {
+            project.set_data(data)?;
+        }
+        Ok(project)
+    }
+
+    /// Says of which data set the models are.
+    ///
+    /// # Errors
+    /// [`ProjectError::OtherData`] where there are models of another one.
+    pub fn set_data(&mut self, data: &str) -> Result<(), ProjectError> {
+        if !self.tree.nodes.is_empty() && self.tree.data != data {
+            return Err(ProjectError::OtherData(self.folder.clone()));
+        }
+        data.clone_into(&mut self.tree.data);
+        Ok(())
     }
 
     /// The folder.
@@ -295,7 +307,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("p");
         {
-            let mut project = Project::open(&path, "abc").unwrap();
+            let mut project = Project::open(&path, Some("abc")).unwrap();
             let first = project.add(node(None, &project.next_file())).unwrap();
             project
                 .add(node(Some(first), &project.next_file()))
@@ -303,18 +315,18 @@ mod tests {
             project.select(first).unwrap();
             assert!(project.select(9).is_err());
             assert!(matches!(
-                Project::open(&path, "abc"),
+                Project::open(&path, Some("abc")),
                 Err(ProjectError::Locked(_))
             ));
         }
-        let project = Project::open(&path, "abc").unwrap();
+        let project = Project::open(&path, Some("abc")).unwrap();
         assert_eq!(project.nodes().len(), 2);
         assert_eq!(project.current(), Some(1));
         assert_eq!(project.next_file(), "model-3.toml");
         assert_eq!(project.log().len(), 2);
         drop(project);
         assert!(matches!(
-            Project::open(&path, "other"),
+            Project::open(&path, Some("other")),
             Err(ProjectError::OtherData(_))
         ));
     }
@@ -332,13 +344,13 @@ mod tests {
                 r#"{{"format_version":1,"data":"d","current":null,"nodes":[{{"id":1,"parent":{parent},"step":"","command":"","file":"{file}","rmse":null,"noise_rmse":null,"fit_percent":null}}]}}"#
             );
             fs::write(folder.path().join(TREE), text).unwrap();
-            let error = Project::open(folder.path(), "d").unwrap_err();
+            let error = Project::open(folder.path(), Some("d")).unwrap_err();
             assert!(
                 matches!(error, ProjectError::Tree { .. }),
                 "{file}: {error}"
             );
         }
         fs::write(folder.path().join(TREE), "{").unwrap();
-        assert!(Project::open(folder.path(), "d").is_err());
+        assert!(Project::open(folder.path(), Some("d")).is_err());
     }
 }

@@ -22,6 +22,8 @@ use crate::work::Work;
 
 /// The largest request, bytes.
 const LARGEST: usize = 256 << 10;
+/// The largest file that is uploaded, bytes.
+const LARGEST_FILE: usize = 512 << 20;
 
 /// Why something was not done: one paragraph with the remedy.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -70,6 +72,16 @@ pub trait Bench: Send + Sync + 'static {
     /// # Errors
     /// [`Refusal`] in words for the user.
     fn select(&self, model: u32) -> Result<(), Refusal>;
+    /// Other questions, and changes, that are quick: a JSON document for a JSON document.
+    ///
+    /// # Errors
+    /// [`Refusal`] in words for the user.
+    fn ask(&self, question: &Value) -> Result<Value, Refusal>;
+    /// Keeps a file of the user's, and tells what is in it. `name` is whatever the page says.
+    ///
+    /// # Errors
+    /// [`Refusal`] in words for the user.
+    fn upload(&self, name: &str, content: &[u8]) -> Result<Value, Refusal>;
     /// Whether this is work at all, before it is begun: its name.
     ///
     /// # Errors
@@ -124,6 +136,11 @@ fn router<B: Bench>(bench: B, rules: Guard) -> Router {
         .route("/api/records", get(records::<B>))
         .route("/api/events", get(events::<B>))
         .route("/api/select", post(select::<B>))
+        .route("/api/ask", post(ask::<B>))
+        .route(
+            "/api/upload/{name}",
+            post(upload::<B>).layer(DefaultBodyLimit::max(LARGEST_FILE)),
+        )
         .route("/api/run", post(run::<B>))
         .route("/api/cancel", post(cancel::<B>))
         .route("/api/file/{kind}/{model}", get(file::<B>))
@@ -210,6 +227,23 @@ async fn select<B: Bench>(State(shared): At<B>, body: Bytes) -> Result<Response,
     aside(move || shared.bench.select(model)).await?;
     work.tell(&json!({"kind": "changed"}));
     Ok(json_text("{}".to_owned()))
+}
+
+async fn ask<B: Bench>(State(shared): At<B>, body: Bytes) -> Result<Response, Response> {
+    let question = read(&body)?;
+    let answer = aside(move || shared.bench.ask(&question)).await?;
+    Ok(axum::Json(answer).into_response())
+}
+
+async fn upload<B: Bench>(
+    State(shared): At<B>,
+    Path(name): Path<String>,
+    body: Bytes,
+) -> Result<Response, Response> {
+    let work = shared.work.clone();
+    let told = aside(move || shared.bench.upload(&name, &body)).await?;
+    work.tell(&json!({"kind": "changed"}));
+    Ok(axum::Json(told).into_response())
 }
 
 async fn run<B: Bench>(State(shared): At<B>, body: Bytes) -> Result<Response, Response> {

@@ -98,7 +98,9 @@ impl Work {
             Some(running) => running.note(evaluations, best),
             None => return,
         };
-        self.tell(&json!({"kind": "best", "search": number, "evaluations": evaluations, "best": best}));
+        self.tell(
+            &json!({"kind": "best", "search": number, "evaluations": evaluations, "best": best}),
+        );
     }
 
     /// Something to know.

@@ -38,7 +38,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         staging.commit()?;
     }
     if let Some(path) = &args.report {
-        let page = page::comparison(&model, &set, &found);
+        let page = page::comparison(&model, &set, &found, &page::command_line());
         write_atomic(path, |out| out.write_all(page.as_bytes()))?;
     }
     console.say(&describe(&model))?;

@@ -17,7 +17,7 @@ use model_core::control::HoldTimes;
 
 use super::Console;
 use super::drawings::{LoopPicture, ladder_picture, loop_picture};
-use super::page::{provenance, report_finding, report_runs, report_scores};
+use super::page::{command_line, provenance, report_finding, report_runs, report_scores};
 use super::words::{aligned, ladder_table};
 
 /// Show the whole way on bundled data: identify, compare, find the missing effect, add it, generate constants, close
@@ -159,7 +159,7 @@ fn real_input(
     }
     let runs: Vec<(&str, &[Vec<f64>])> = runs.iter().map(|(n, r)| (*n, r.as_slice())).collect();
     report_runs(report, &set.records, &runs, None);
-    provenance(report, &set, 0);
+    provenance(report, &set, 0, &command_line());
     console.say("flow over a ramp (2-D Navier–Stokes), free run")?;
     console.say(&aligned(
         &["model", "FIT % identified", "held out"],
@@ -199,7 +199,7 @@ fn hidden_effect(
         .filter_map(|(name, runs)| Some((*name, runs.as_deref()?)));
     report_runs(report, &set.records, &shown.collect::<Vec<_>>(), None);
     finding.model.save(&out.join("hidden-after.toml"))?;
-    provenance(report, &set, 0);
+    provenance(report, &set, 0, &command_line());
     let words = format!("{headline}. {meaning}");
     Ok((finding.model, words))
 }

@@ -2,17 +2,17 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use host_fit::design::{MaximiseRequest, Proof, TrackRequest};
 use host_fit::model::Model;
 use host_fit::output::write_atomic;
 use host_fit::steps::{self, Design, DesignRequest};
 use serde::Serialize;
 
-use super::Console;
 use super::average::{not_negative, positive};
 use super::drawings::proof_picture;
 use super::words::Words;
+use super::{Console, page};
 use crate::plants::Plants;
 
 /// Design an on/off law for the valve from a model and write it into the model file.
@@ -67,6 +67,9 @@ pub(crate) struct Args {
     /// The run on the plant as CSV (t, reference, friction, y, u).
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
+    /// Write a report page: the law, the loop, every trial.
+    #[arg(long, value_name = "out.html")]
+    report: Option<PathBuf>,
     /// Seed of the plants' effects and noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -87,13 +90,13 @@ fn share(text: &str) -> Result<f64, String> {
 
 /// A law and how it did on the simulated plants.
 #[derive(Serialize)]
-struct Tried {
+pub(super) struct Tried {
     #[serde(flatten)]
-    design: Design,
+    pub(super) design: Design,
     #[serde(flatten)]
-    proof: Option<Proof>,
+    pub(super) proof: Option<Proof>,
     /// What the plants are without, one sentence each.
-    not_tried: Vec<String>,
+    pub(super) not_tried: Vec<String>,
 }
 
 impl Words for Tried {
@@ -129,7 +132,44 @@ impl Args {
         }
     }
 
-    fn picture(&self) -> PathBuf {
+    /// The law, tried in the loop.
+    pub(super) fn tried(&self, model: &Model) -> anyhow::Result<Tried> {
+        if self.tracks() && self.target.is_none() {
+            bail!("--goal track needs --target Y, the friction to hold");
+        }
+        let design = steps::design(model, &self.request())?;
+        // A law is worth having also where the simulator has no plant to try it on.
+        let plants = Plants::of(model, self.seed);
+        let proof = plants
+            .as_ref()
+            .ok()
+            .map(|plants| steps::try_out(&design, plants.blown, &plants.nearest, &plants.others));
+        Ok(Tried {
+            design,
+            proof,
+            not_tried: match plants {
+                Ok(plants) => plants.left_out,
+                Err(error) => vec![format!("the law was not tried on a plant: {error:#}")],
+            },
+        })
+    }
+
+    /// What the law is for, in a few words.
+    pub(super) fn goal_words(&self) -> String {
+        match (self.goal, self.target) {
+            (Goal::Track, Some(target)) => format!("law: hold {target}"),
+            (Goal::Track, None) => "law: hold".to_owned(),
+            (Goal::Maximise, _) => "law: most friction for the air".to_owned(),
+        }
+    }
+
+    /// Whether the law is to hold the friction at a value.
+    pub(super) fn tracks(&self) -> bool {
+        self.goal == Goal::Track
+    }
+
+    /// Where the picture of the loop goes.
+    pub(super) fn picture(&self) -> PathBuf {
         self.picture.clone().unwrap_or_else(|| {
             let stem = self.output.file_stem().unwrap_or_default();
             let name = format!("{}-loop.svg", stem.to_string_lossy());
@@ -148,19 +188,13 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     }
     let model = Model::load(&args.model)?;
     let bar = console.progress(0, "{spinner} designing and trying in the loop {elapsed}");
-    let design = steps::design(&model, &args.request())?;
-    // A law is worth having also where the simulator has no plant to try it on.
-    let plants = Plants::of(&model, args.seed);
-    let proof = plants
-        .as_ref()
-        .ok()
-        .map(|plants| steps::try_out(&design, plants.blown, &plants.nearest, &plants.others));
+    let tried = args.tried(&model)?;
     bar.finish_and_clear();
     let (picture, csv) = (args.picture(), args.csv.as_ref());
     let mut keys = vec![("model", args.output.as_path())];
     let mut written = vec![args.output.as_path()];
-    if let Some(proof) = &proof {
-        let svg = proof_picture(proof, args.goal == Goal::Track);
+    if let Some(proof) = &tried.proof {
+        let svg = proof_picture(proof, args.tracks());
         write_atomic(&picture, |file| file.write_all(svg.as_bytes()))
             .context("saving the picture")?;
         keys.push(("picture", &picture));
@@ -171,15 +205,11 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
             written.push(path);
         }
     }
-    design.model.save(&args.output)?;
-    let not_tried = match plants {
-        Ok(plants) => plants.left_out,
-        Err(error) => vec![format!("the law was not tried on a plant: {error:#}")],
-    };
-    let tried = Tried {
-        design,
-        proof,
-        not_tried,
-    };
+    tried.design.model.save(&args.output)?;
+    if let Some(path) = &args.report {
+        let page = page::law(&model, &tried, args.tracks(), &page::command_line());
+        write_atomic(path, |file| file.write_all(page.as_bytes())).context("saving the report")?;
+        written.push(path);
+    }
     console.show(&tried, &keys, &written)
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use host_fit::diagnose::Options;
+use host_fit::model::Model;
 use host_fit::output::write_atomic;
 use host_fit::steps;
 
@@ -37,18 +38,28 @@ pub(crate) struct Args {
     effect_files: EffectFiles,
 }
 
+impl Args {
+    pub(super) fn options(&self) -> Options {
+        Options {
+            most_effects: self.most_effects as usize,
+            seed: self.seed,
+        }
+    }
+
+    /// Makes the effects of the user's own known to `model`.
+    pub(super) fn define(&self, model: &mut Model) -> anyhow::Result<()> {
+        self.effect_files.define(model)
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let (mut model, set) = args.from.load()?;
-    args.effect_files.define(&mut model)?;
-    let options = Options {
-        most_effects: args.most_effects as usize,
-        seed: args.seed,
-    };
-    let finding = steps::diagnose(&model, &set, &options, &console.watch())?;
+    args.define(&mut model)?;
+    let finding = steps::diagnose(&model, &set, &args.options(), &console.watch())?;
     let mut written: Vec<&Path> = Vec::new();
     if let Some(path) = &args.report {
-        let page = page::finding(&model, &set, &finding, args.seed);
+        let page = page::finding(&model, &set, &finding, args.seed, &page::command_line());
         write_atomic(path, |out| out.write_all(page.as_bytes()))?;
         written.push(path);
     }

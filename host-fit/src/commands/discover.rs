@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use host_fit::discover::Options;
+use host_fit::model::Model;
 use host_fit::output::write_atomic;
 use host_fit::steps;
 
@@ -41,28 +42,35 @@ pub(crate) struct Args {
     effect_files: EffectFiles,
 }
 
+impl Args {
+    /// Makes the effects of the user's own known to `model`; what to look for in it.
+    pub(super) fn prepare(&self, model: &mut Model) -> anyhow::Result<Options> {
+        self.effect_files.define(model)?;
+        for name in &self.without {
+            if model.spec(name).is_none() {
+                bail!("there is no effect `{name}` to forget; `host-fit effects` lists them");
+            }
+            if model.effect_names().contains(name) {
+                bail!(
+                    "the model has `{name}`, which is to be forgotten; start from a model without it"
+                );
+            }
+        }
+        Ok(Options {
+            terms: self.terms as usize,
+            without: self.without.clone(),
+        })
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let (mut model, set) = args.from.load()?;
-    args.effect_files.define(&mut model)?;
-    for name in &args.without {
-        if model.spec(name).is_none() {
-            bail!("there is no effect `{name}` to forget; `host-fit effects` lists them");
-        }
-        if model.effect_names().contains(name) {
-            bail!(
-                "the model has `{name}`, which is to be forgotten; start from a model without it"
-            );
-        }
-    }
-    let options = Options {
-        terms: args.terms as usize,
-        without: args.without.clone(),
-    };
+    let options = args.prepare(&mut model)?;
     let found = steps::discover(&model, &set, &options, &console.watch())?;
     let mut written: Vec<&Path> = Vec::new();
     if let Some(path) = &args.report {
-        let page = page::discovery(&model, &set, &found);
+        let page = page::discovery(&model, &set, &found, &page::command_line());
         write_atomic(path, |out| out.write_all(page.as_bytes()))?;
         written.push(path);
     }

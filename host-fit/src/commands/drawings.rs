@@ -3,11 +3,12 @@
 use closed_loop::{SAMPLE_PERIOD_S, Trace};
 use host_fit::data::{DataSet, Record};
 use host_fit::design::Proof;
-use host_fit::diagnose::Diagnosis;
+use host_fit::diagnose::{Diagnosis, Separation};
 use host_fit::picture::{
     ClosedLoop, LabelledRun, Ladder, LadderRecord, LadderStep, LoopRun, Overlay, closed_loop,
     ladder, overlay,
 };
+use host_fit::simulate::Signals;
 
 use super::words::role_name;
 
@@ -59,6 +60,39 @@ pub(crate) fn ladder_picture(diagnosis: &Diagnosis, set: &DataSet) -> String {
         steps: &steps,
         records: &records,
         noise_rmse: diagnosis.ladder.last().and_then(|rung| rung.noise_rmse),
+    })
+}
+
+/// The experiment that tells models apart: its command, and what each of them expects of it.
+pub(crate) fn experiment_picture(separation: &Separation) -> String {
+    let experiment = &separation.experiment;
+    let signals = Signals {
+        u: &experiment.u,
+        y: None,
+        channels: Vec::new(),
+    };
+    let expected = separation.models.iter().filter_map(|model| {
+        let y = model.run_free(&signals).ok()?;
+        Some((model.effect_names().join(" + "), y))
+    });
+    let expected: Vec<(String, Vec<f64>)> = expected.collect();
+    let runs: Vec<LoopRun<'_>> = expected
+        .iter()
+        .map(|(label, y)| LoopRun {
+            label,
+            y,
+            u: &experiment.u,
+            air: &[],
+        })
+        .collect();
+    closed_loop(&ClosedLoop {
+        title: "What each of the models expects",
+        y_label: "friction gain y",
+        air_label: "",
+        sample_period_s: experiment.sample_period_s,
+        reference: &[],
+        runs: &runs,
+        window_s: None,
     })
 }
 

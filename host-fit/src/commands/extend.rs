@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use host_fit::model::Model;
 use host_fit::output::write_atomic;
 use host_fit::steps;
 
@@ -27,10 +28,22 @@ pub(crate) struct Args {
     effect_files: EffectFiles,
 }
 
+impl Args {
+    /// The effects to add.
+    pub(super) fn effects(&self) -> &[String] {
+        &self.effect
+    }
+
+    /// Makes the effects of the user's own known to `model`.
+    pub(super) fn define(&self, model: &mut Model) -> anyhow::Result<()> {
+        self.effect_files.define(model)
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let (mut model, set) = args.from.load()?;
-    args.effect_files.define(&mut model)?;
+    args.define(&mut model)?;
     let extension = steps::extend(&model, &set, &args.effect, &console.watch())?;
     extension.model.save(&args.output)?;
     let mut written: Vec<&Path> = vec![&args.output];

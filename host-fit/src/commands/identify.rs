@@ -188,10 +188,17 @@ impl Request {
     }
 }
 
+impl Args {
+    /// What to identify and how; reads the effect files.
+    pub(super) fn request(&self) -> anyhow::Result<IdentifyRequest> {
+        self.request.library()
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let set = DataSet::load(&args.dataset)?;
-    let found = steps::identify(&set, &args.request.library()?, &console.watch())?;
+    let found = steps::identify(&set, &args.request()?, &console.watch())?;
     found.model.save(&args.output)?;
     let mut written: Vec<&Path> = vec![&args.output];
     if let Some(path) = &args.report {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use host_fit::data::import::{Import, Mapping};
-use host_fit::steps;
+use host_fit::steps::{self, ImportedSet};
 
 use super::Console;
 use super::average::positive;
@@ -76,6 +76,19 @@ pub(crate) struct Args {
 }
 
 impl Args {
+    /// The data set that the files make.
+    pub(super) fn import(&self) -> anyhow::Result<ImportedSet> {
+        let files: Vec<&Path> = self.files.iter().map(PathBuf::as_path).collect();
+        let request = Import {
+            mapping: self.mapping()?,
+            title: self.title.clone(),
+            validate: self.validate.clone(),
+            hold_out_from_s: self.hold_out_from,
+            graded: self.graded,
+        };
+        Ok(steps::import(&files, &request)?)
+    }
+
     fn mapping(&self) -> anyhow::Result<Mapping> {
         let base = match &self.like {
             Some(path) => Mapping::of(path)?,
@@ -104,15 +117,7 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
-    let files: Vec<&Path> = args.files.iter().map(PathBuf::as_path).collect();
-    let request = Import {
-        mapping: args.mapping()?,
-        title: args.title.clone(),
-        validate: args.validate.clone(),
-        hold_out_from_s: args.hold_out_from,
-        graded: args.graded,
-    };
-    let found = steps::import(&files, &request)?;
+    let found = args.import()?;
     found.imported.save(&args.output)?;
     console.show(&found, &[("dataset", &args.output)], &[&args.output])
 }

@@ -2,6 +2,7 @@
 
 use host_fit::data::{DataSet, Record};
 use host_fit::diagnose::{Diagnosis, Verdict};
+use host_fit::discover::FoundTerm;
 use host_fit::indicators::Scores;
 use host_fit::model::Model;
 use host_fit::picture::{
@@ -11,11 +12,17 @@ use host_fit::picture::{
 use host_fit::residual::Failures;
 use host_fit::steps::{Comparison, Extension, Finding, Identification, Terms};
 
-use super::drawings::ladder_picture;
-use super::words::{describe, ladder_rows, ranking_rows, role_name, score_rows, short};
+use super::design::Tried;
+use super::drawings::{ladder_picture, proof_picture};
+use super::words::{Words, describe, ladder_rows, ranking_rows, role_name, score_rows, short};
 
-/// The page of a comparison.
-pub(crate) fn comparison(model: &Model, set: &DataSet, found: &Comparison) -> String {
+/// The page of a comparison, made by `command`.
+pub(crate) fn comparison(
+    model: &Model,
+    set: &DataSet,
+    found: &Comparison,
+    command: &str,
+) -> String {
     let mut report = Report::new("Comparison", title(set));
     report.section("How well the model matches");
     report.paragraph(&describe(model));
@@ -36,7 +43,7 @@ pub(crate) fn comparison(model: &Model, set: &DataSet, found: &Comparison) -> St
         .samples(&records, &found.runs, model.longest_delay());
     let lit = Some((&found.failures, samples.as_slice()));
     report_runs(&mut report, &records, &[("model", &found.runs)], lit);
-    provenance(&mut report, set, model.training.seed);
+    provenance(&mut report, set, model.training.seed, command);
     report.html()
 }
 
@@ -63,7 +70,7 @@ pub(crate) fn identification(set: &DataSet, found: &Identification, run: &Compar
         .samples(&records, &run.runs, model.longest_delay());
     let lit = Some((&run.failures, samples.as_slice()));
     report_runs(&mut report, &records, &[("model", &run.runs)], lit);
-    provenance(&mut report, set, model.training.seed);
+    provenance(&mut report, set, model.training.seed, &command_line());
     report.html()
 }
 
@@ -106,12 +113,18 @@ pub(crate) fn extension(
     runs.push(("after", &after.runs));
     let lit = Some((&after.failures, samples.as_slice()));
     report_runs(&mut report, &records, &runs, lit);
-    provenance(&mut report, set, model.training.seed);
+    provenance(&mut report, set, model.training.seed, &command_line());
     report.html()
 }
 
 /// The page of a diagnosis of `given`.
-pub(crate) fn finding(given: &Model, set: &DataSet, found: &Finding, seed: u64) -> String {
+pub(crate) fn finding(
+    given: &Model,
+    set: &DataSet,
+    found: &Finding,
+    seed: u64,
+    command: &str,
+) -> String {
     let mut report = Report::new("Diagnosis", title(set));
     report_finding(&mut report, set, found);
     // A model whose free run diverges has neither scores nor pictures.
@@ -128,16 +141,22 @@ pub(crate) fn finding(given: &Model, set: &DataSet, found: &Finding, seed: u64) 
         if let Some(before) = &found.runs_before {
             all.push(("as given", before));
         }
+        // The ladder's steps, as curves.
+        if let Some(base) = &found.runs_base
+            && !found.diagnosis.missing.is_empty()
+        {
+            all.push(("refitted without effects", base));
+        }
         all.push(("with what was missing", runs));
         let lit = Some((failures, samples.as_slice()));
         report_runs(&mut report, &records, &all, lit);
     }
-    provenance(&mut report, set, seed);
+    provenance(&mut report, set, seed, command);
     report.html()
 }
 
 /// The page of a discovery beside `given`.
-pub(crate) fn discovery(given: &Model, set: &DataSet, found: &Terms) -> String {
+pub(crate) fn discovery(given: &Model, set: &DataSet, found: &Terms, command: &str) -> String {
     let mut report = Report::new("Discovery", title(set));
     let terms = &found.discovery.terms;
     let tone = if terms.is_empty() {
@@ -150,25 +169,8 @@ pub(crate) fn discovery(given: &Model, set: &DataSet, found: &Terms) -> String {
     report.table("", &LADDER, &ladder_rows(&found.discovery.ladder));
     for term in terms {
         report.section(&format!("{} by {}", term.changes, term.coordinate));
-        let points: Vec<BandPoint> = term
-            .curve
-            .iter()
-            .map(|p| BandPoint {
-                x: p.x,
-                value: p.value,
-                low: p.low,
-                high: p.high,
-            })
-            .collect();
-        let plot = CurvePlot {
-            title: "",
-            x_label: &format!("{} ({})", term.coordinate, term.coordinate_unit),
-            y_label: &format!("{} ({})", term.changes, term.unit),
-            points: &points,
-            ..CurvePlot::default()
-        };
         report.figure(
-            &curve(&plot),
+            &term_picture(term),
             "The curve that was fitted with everything else, in straight lines between its points.",
         );
         report.paragraph("The effect file that the term makes:");
@@ -183,8 +185,54 @@ pub(crate) fn discovery(given: &Model, set: &DataSet, found: &Terms) -> String {
     }
     all.push(("with the terms", &found.runs));
     report_runs(&mut report, &given.targets(&set.records), &all, None);
-    provenance(&mut report, set, 0);
+    provenance(&mut report, set, 0, command);
     report.html()
+}
+
+/// The page of a law for `model` that was tried in the loop.
+pub(super) fn law(model: &Model, tried: &Tried, tracks: bool, command: &str) -> String {
+    let mut report = Report::new("A law for the valve", &describe(model));
+    report.section("The law");
+    for line in tried.design.words().lines() {
+        report.paragraph(line);
+    }
+    if !tried.not_tried.is_empty() {
+        report.list(&tried.not_tried);
+    }
+    if let Some(proof) = &tried.proof {
+        report.section("In the loop");
+        report.figure(
+            &proof_picture(proof, tracks),
+            "On the physical plant that the model resembles most, seen through a noisy sensor.",
+        );
+        report.section("Every trial");
+        report.code(&proof.words());
+    }
+    report.provenance("tool", concat!("host-fit ", env!("CARGO_PKG_VERSION")));
+    report.provenance("command", command);
+    report.provenance("data", &model.training.data_hash);
+    report.html()
+}
+
+/// The curve of a term.
+pub(super) fn term_picture(term: &FoundTerm) -> String {
+    let points: Vec<BandPoint> = term
+        .curve
+        .iter()
+        .map(|p| BandPoint {
+            x: p.x,
+            value: p.value,
+            low: p.low,
+            high: p.high,
+        })
+        .collect();
+    curve(&CurvePlot {
+        title: "",
+        x_label: &format!("{} ({})", term.coordinate, term.coordinate_unit),
+        y_label: &format!("{} ({})", term.changes, term.unit),
+        points: &points,
+        ..CurvePlot::default()
+    })
 }
 
 /// Columns of a ladder's table.
@@ -338,27 +386,29 @@ pub(super) fn ranking_picture(diagnosis: &Diagnosis) -> String {
 }
 
 /// What a page was made from.
-pub(crate) fn provenance(report: &mut Report, set: &DataSet, seed: u64) {
+pub(crate) fn provenance(report: &mut Report, set: &DataSet, seed: u64, command: &str) {
     report.provenance("tool", concat!("host-fit ", env!("CARGO_PKG_VERSION")));
-    report.provenance("command", &command_line());
+    report.provenance("command", command);
     report.provenance("seed", &seed.to_string());
     report.provenance("data", &set.hash);
     report.provenance("records", &set.records.len().to_string());
 }
 
 /// What the user wrote, as it could be written again.
-fn command_line() -> String {
-    let quoted = |word: String| {
-        let plain = |c: char| c.is_alphanumeric() || "-_=./,:+".contains(c);
-        match !word.is_empty() && word.chars().all(plain) {
-            true => word,
-            false => format!("'{}'", word.replace('\'', "'\\''")),
-        }
-    };
+pub(super) fn command_line() -> String {
     let words = std::env::args_os().skip(1);
-    let words = words.map(|word| quoted(word.to_string_lossy().into_owned()));
+    let words = words.map(|word| quoted(&word.to_string_lossy()));
     let all: Vec<String> = std::iter::once("host-fit".to_owned())
         .chain(words)
         .collect();
     all.join(" ")
+}
+
+/// A word of a command, as a shell takes it.
+pub(super) fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_=./,:+".contains(c);
+    match !word.is_empty() && word.chars().all(plain) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', "'\\''")),
+    }
 }

@@ -13,6 +13,8 @@ use std::sync::atomic::Ordering;
 pub struct Separation {
     /// The effects that one of the models has and another has not.
     pub effects: Vec<String>,
+    /// The models: the final one first.
+    pub models: Vec<Model>,
     /// The command that separates the models most.
     pub experiment: Experiment,
 }
@@ -83,6 +85,7 @@ impl Session<'_> {
         let experiment = separating(&models, noise, &Limits::default(), self.options.seed).ok()?;
         Some(Separation {
             effects,
+            models,
             experiment,
         })
     }

@@ -294,6 +294,7 @@ fn page(title: &str, bundle: &Bundle, policy: &str, body: &str) -> String {
          <meta name=\"color-scheme\" content=\"light dark\">\n\
          <meta http-equiv=\"Content-Security-Policy\" \
          content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src '{hash}'{policy}\">\n\
+         <link rel=\"icon\" href=\"data:,\">\n\
          <title>{title}</title>\n<style>{style}{STYLE}:root,:root.on-paper{{{LIGHT}{light}}}\
          @media screen and (prefers-color-scheme:dark){{:root{{{DARK}{dark}}}{rules}}}</style>\n\
          <script type=\"module\">{script}</script></head>\n\

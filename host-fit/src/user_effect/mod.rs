@@ -7,6 +7,7 @@
 //! operations in the same order. `docs/user-effects.md` describes the file.
 
 mod expression;
+mod fault_place;
 mod interpreter;
 mod program;
 mod rust;

@@ -13,7 +13,11 @@ export class Bars {
     for (const bar of /** @type {NodeListOf<SVGElement>} */ (figures)) {
       const [coordinate, bin] = (bar.dataset.bar ?? "").split(":").map(Number);
       const place = payload.coordinates[coordinate];
-      if (!place || place.places.every((p) => p.length === 0)) continue;
+      if (!place || place.places.every((p) => p.length === 0)) {
+        // It stands for no samples: nothing to press, but its value is read.
+        bar.setAttribute("role", "img");
+        continue;
+      }
       this.bars.set(`${coordinate}:${bin}`, bar);
       bar.classList.add("bar");
       // One stop of the tab key for each panel; the arrows go along it.

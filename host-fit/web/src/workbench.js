@@ -1,97 +1,26 @@
 // The workbench's page: what the server knows, drawn; what is pressed, sent to it.
 
-import uPlot from "uplot";
 import { Group } from "./group.js";
-import { significant, ticks } from "./number.js";
-import { saveButtons } from "./save.js";
+import { significant } from "./number.js";
+import { button, el, options, picture, place, table } from "./bench/dom.js";
+import * as editor from "./bench/editor.js";
+import * as importer from "./bench/importer.js";
+import { clear, progress } from "./bench/progress.js";
+import { ask, attempt, complain, fileOf, run, token } from "./bench/server.js";
 
 /**
- * @typedef {{id: number, parent: number | null, step: string, command: string, rmse: number | null, noise_rmse: number | null, fit_percent: number | null}} Model
- * @typedef {{effect: string, error_reduction_percent: number, p_value: number, significant: boolean, parameters: Record<string, {value: number, unit: string, low: number, high: number}>, confounded_with: string[]}} Candidate
- * @typedef {{headline: string, meaning: string, missing: string[], ranking: Candidate[], picture: string}} Diagnosis
- * @typedef {object} State
- * @property {{title: string, path: string, hash: string, period: number, records: {name: string, use: string, samples: number}[], remarks: string[]}} data
- * @property {string} project
- * @property {number | null} current
- * @property {Model[]} models
- * @property {string[]} log
- * @property {{describe: string, columns: string[], rows: string[][], where: string[], where_picture: string, ladder_picture: string, error: string | null} | null} model
- * @property {Diagnosis | null} diagnosis
- * @property {{name: string, now: string, searches: [number, number][][]} | null} work
+ * @typedef {import("./bench/server.js").State} State
+ * @typedef {import("./bench/server.js").Model} Model
+ * @typedef {import("./bench/server.js").Candidate} Candidate
  */
-
-const token = new URLSearchParams(location.search).get("token") ?? "";
-
-/** @param {string} path @param {unknown=} body @returns {Promise<any>} */
-async function ask(path, body) {
-  const response = await fetch(path, {
-    method: body === undefined ? "GET" : "POST",
-    headers: { "x-token": token, "content-type": "application/json" },
-    body: body === undefined ? undefined : JSON.stringify(body),
-  });
-  const text = await response.text();
-  if (response.ok) return JSON.parse(text);
-  let why = text;
-  try {
-    why = JSON.parse(text).error;
-  } catch {
-    // Not of the bench: the text says it.
-  }
-  throw new Error(why);
-}
-
-/**
- * An element with attributes, listeners (`onclick`) and children.
- * @param {string} tag @param {Record<string, any>=} attributes @param {...(Node | string | null | undefined)} children
- */
-function el(tag, attributes = {}, ...children) {
-  const element = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
-    else if (value === true) element.setAttribute(name, "");
-    else if (value !== false && value !== null && value !== undefined) element.setAttribute(name, String(value));
-  }
-  element.append(...children.filter((c) => c !== null && c !== undefined));
-  return element;
-}
-
-/** @param {string} id */
-const place = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
-
-/** A picture of the server, which escapes what is the user's. @param {string} svg @param {string=} group */
-function picture(svg, group) {
-  const figure = el("figure", group ? { "data-group": group } : {});
-  figure.innerHTML = svg;
-  saveButtons([figure]);
-  return figure;
-}
 
 /** @type {State | null} */
 let state = null;
-/** Models that are shown beside the current one. @type {Set<number>} */
-const beside = new Set();
+/** Models that are shown beside the current one: kept in the address. @type {Set<number>} */
+const beside = new Set(/beside=([\d,]+)/.exec(location.hash)?.[1].split(",").map(Number));
 /** @type {Group | null} */
 let group = null;
 let shown = "";
-
-/** @param {unknown} error */
-function complain(error) {
-  place("message").replaceChildren(
-    el("div", { class: "verdict warning", role: "alert" }, el("p", {}, error instanceof Error ? error.message : String(error))),
-  );
-}
-
-/** @param {() => Promise<unknown>} does */
-async function attempt(does) {
-  place("message").replaceChildren();
-  try {
-    await does();
-  } catch (error) {
-    complain(error);
-  }
-}
-
-const run = (/** @type {object} */ request) => attempt(() => ask("/api/run", request));
 
 async function refresh() {
   state = await ask("/api/state");
@@ -106,22 +35,44 @@ function draw() {
   drawModels(state);
   drawModel(state);
   drawDiagnosis(state);
+  drawDiscovery(state);
+  drawLaw(state);
+  editor.drawOwn(state, refresh);
   place("log").replaceChildren(
     state.log.length ? el("pre", { tabindex: "0", "aria-label": "commands" }, state.log.join("\n")) : el("p", {}, "Nothing was done yet."),
   );
 }
 
+/** @param {string} id @param {boolean} there */
+const section = (id, there) => (place(`${id}-section`).hidden = !there);
+
 /** @param {State} s */
 function drawData(s) {
-  document.title = `Workbench: ${s.data.title}`;
-  place("title").textContent = s.data.title;
+  const { data } = s;
+  document.title = `Workbench: ${data?.title ?? "no data yet"}`;
+  place("title").textContent = data?.title ?? "Workbench";
   place("project").textContent = `project folder ${s.project}`;
+  const importing = /** @type {HTMLDetailsElement} */ (place("import"));
+  // Once there are models, another data set is another project.
+  importing.hidden = s.models.length > 0;
+  section("identify", data !== null);
+  section("models", data !== null);
+  section("own", s.current !== null);
+  if (!importing.hidden) importer.drawUploads(s.uploads);
+  if (!data) {
+    importing.open = true;
+    place("data").replaceChildren(el("p", {}, "No data set yet: import recordings."));
+    return;
+  }
   place("data").replaceChildren(
-    el("p", {}, `${s.data.records.length} records at ${significant(1000 * s.data.period, 3)} ms: `,
-      s.data.records.map((r) => `${r.name} (${r.use}, ${significant(r.samples * s.data.period, 3)} s)`).join(", ")),
-    ...(s.data.remarks.length ? [el("ul", {}, ...s.data.remarks.map((r) => el("li", {}, r)))] : []),
+    el("p", {}, `${data.records.length} records at ${significant(1000 * data.period, 3)} ms: `,
+      data.records.map((r) => `${r.name} (${r.use}, ${significant(r.samples * data.period, 3)} s)`).join(", ")),
+    ...(data.remarks.length ? [el("p", {}, "What the commands can tell:"), el("ul", {}, ...data.remarks.map((r) => el("li", {}, r)))] : [el("p", {}, "The commands can tell a model of this kind.")]),
   );
 }
+
+/** @param {Model} m */
+const error = (m) => (m.rmse === null ? "diverges" : `RMSE ${significant(m.rmse, 3)}${m.noise_rmse ? ` (${significant(m.rmse / m.noise_rmse, 3)} × noise)` : ""}`);
 
 /** @param {State} s */
 function drawModels(s) {
@@ -133,40 +84,42 @@ function drawModels(s) {
   const branch = (m) => {
     const current = m.id === s.current;
     return el("li", {},
-      el("button", { type: "button", class: current ? "model current" : "model", "aria-pressed": current, onclick: () => attempt(() => ask("/api/select", { model: m.id })) },
-        `${m.id}. ${m.step}`),
-      " ",
-      el("span", { class: "muted" }, m.rmse === null ? "diverges" : `RMSE ${significant(m.rmse, 3)}${m.noise_rmse ? ` (${significant(m.rmse / m.noise_rmse, 3)} × noise)` : ""}`),
-      " ",
+      button(`${m.id}. ${m.step}`, () => attempt(() => ask("/api/select", { model: m.id })), { class: current ? "model current" : "model", "aria-pressed": current ? "true" : "false" }),
+      " ", el("span", { class: "muted" }, error(m)), " ",
       current ? null : el("label", {}, el("input", { type: "checkbox", checked: beside.has(m.id), onchange: () => {
         if (!beside.delete(m.id)) beside.add(m.id);
+        address();
         void attempt(records);
       } }), "show beside"),
       under(m.id));
   };
   const current = s.models.find((m) => m.id === s.current);
+  const files = [["model", "model.toml"], ["constants", "identified.rs"], ["report", "report.html"], ...(s.law?.picture ? [["loop", "loop.csv"]] : [])];
   place("models").replaceChildren(
     under(null) ?? el("p", {}, "No model yet: identify one above."),
     ...(current ? [el("p", { class: "actions" },
-      el("button", { type: "button", disabled: current.parent === null, onclick: () => attempt(() => ask("/api/select", { model: current.parent })) }, "Undo"),
-      ...[["model", "model.toml"], ["constants", "identified.rs"], ["report", "report.html"]].map(([kind, name]) =>
-        el("a", { href: `/api/file/${kind}/${current.id}?token=${token}`, download: name }, `download ${name}`)))] : []),
+      button("Undo", () => attempt(() => ask("/api/select", { model: current.parent })), { disabled: current.parent === null }),
+      ...files.map(([kind, name]) => el("a", { href: fileOf(kind, current.id), download: name }, `download ${name}`)))] : []),
   );
+}
+
+/** Which models are beside goes into the address, so that a view can be sent. */
+function address() {
+  const words = location.hash.replace(/^#/, "").split("&").filter((word) => word !== "" && !word.startsWith("beside="));
+  if (beside.size) words.push(`beside=${[...beside].join(",")}`);
+  history.replaceState(history.state, "", words.length ? `#${words.join("&")}` : location.pathname + location.search);
 }
 
 /** @param {State} s */
 function drawModel(s) {
   const { model } = s;
-  const sections = ["match", "where", "records", "missing"].map((id) => place(`${id}-section`));
-  sections.forEach((section) => (section.hidden = !model));
+  for (const id of ["match", "where", "missing", "discovery", "law"]) section(id, model !== null);
   if (!model) return;
   place("match").replaceChildren(
     el("p", {}, model.describe),
     ...(model.error ? [el("div", { class: "verdict warning" }, el("p", {}, model.error))] : []),
     picture(model.ladder_picture),
-    el("div", { class: "table" }, el("table", {},
-      el("thead", {}, el("tr", {}, ...model.columns.map((c, i) => el("th", { scope: "col", class: i > 1 ? "n" : "" }, c)))),
-      el("tbody", {}, ...model.rows.map((row) => el("tr", {}, ...row.map((cell, i) => el("td", { class: i > 1 ? "n" : "" }, cell))))))),
+    table(model.columns, model.rows, (i) => i > 1),
   );
   place("where").replaceChildren(
     ...model.where.map((sentence) => el("p", {}, sentence)),
@@ -174,106 +127,110 @@ function drawModel(s) {
   );
 }
 
+/** @param {State} s @param {string} text @param {object} request @param {Record<string, any>=} attributes */
+const does = (s, text, request, attributes = {}) => button(text, () => run(request), { disabled: s.work !== null, ...attributes });
+
+/** @param {string} headline @param {string} meaning */
+const verdict = (headline, meaning) => el("div", { class: "verdict finding" }, el("p", { class: "headline" }, headline), el("p", {}, meaning));
+
 /** @param {State} s */
 function drawDiagnosis(s) {
-  const found = s.diagnosis;
-  const model = s.current;
-  const button = el("button", { type: "button", id: "diagnose", disabled: s.work !== null, onclick: () => run({ action: "diagnose", model }) }, "Diagnose");
+  const { diagnosis: found, current: model } = s;
+  if (model === null) return;
+  const diagnose = does(s, found ? "Diagnose again" : "Diagnose", { command: "diagnose", model }, { id: "diagnose" });
   if (!found) {
-    place("missing").replaceChildren(el("p", {}, "Every effect of the catalogue is refitted with everything else and judged on the held-out records."), button);
+    place("missing").replaceChildren(el("p", {}, "Every effect of the catalogue is refitted with everything else and judged on the held-out records."), diagnose);
     return;
   }
-  const row = (/** @type {Candidate} */ c) =>
-    el("tr", {},
-      el("td", {}, c.effect),
-      el("td", { class: "n" }, `${significant(c.error_reduction_percent, 3)} %`),
-      el("td", { class: "n" }, significant(c.p_value, 2)),
-      el("td", {}, c.significant ? "yes" : "no"),
-      el("td", {}, Object.entries(c.parameters).map(([name, p]) => `${name} ${significant(p.value, 3)} ${p.unit} (${significant(p.low, 3)} to ${significant(p.high, 3)})`).join("; ")),
-      el("td", {}, el("button", { type: "button", disabled: s.work !== null, "aria-label": `add ${c.effect}`, onclick: () => run({ action: "extend", model, effect: c.effect }) }, "Add")));
+  const parameters = (/** @type {Candidate} */ c) =>
+    Object.entries(c.parameters).map(([name, p]) => `${name} ${significant(p.value, 3)} ${p.unit === "-" ? "" : p.unit} (${significant(p.low, 3)} to ${significant(p.high, 3)})`).join("; ") +
+    (c.confounded_with.length ? `; or ${c.confounded_with.join(", ")}` : "");
+  const has = s.model?.effects ?? [];
+  const row = (/** @type {Candidate} */ c) => [
+    c.effect,
+    `${significant(c.error_reduction_percent, 3)} %`,
+    !c.refitted ? "–" : c.p_value < 0.001 ? "< 0.001" : significant(c.p_value, 2),
+    c.significant ? "yes" : "no",
+    parameters(c),
+    does(s, "Add", { command: "extend", model, options: { effect: c.effect } }, { "aria-label": `add ${c.effect}`, disabled: s.work !== null || has.includes(c.effect) }),
+  ];
   place("missing").replaceChildren(
-    el("div", { class: "verdict finding" }, el("p", { class: "headline" }, found.headline), el("p", {}, found.meaning)),
+    verdict(found.headline, found.meaning),
     ...(found.ranking.length ? [
       picture(found.picture),
-      el("div", { class: "table" }, el("table", {},
-        el("thead", {}, el("tr", {}, ...["effect", "error falls", "p", "counts", "parameters (95 % interval)", ""].map((c, i) => el("th", { scope: "col", class: i === 1 || i === 2 ? "n" : "" }, c)))),
-        el("tbody", {}, ...found.ranking.map(row)))),
+      table(["effect", "error falls", "p", "counts", "parameters (95 % interval)", ""], found.ranking.map(row), (i) => i === 1 || i === 2),
     ] : []),
-    button,
+    ...(found.experiment && found.experiment_picture ? [
+      el("h3", {}, `The experiment that tells apart ${found.experiment.effects.join(", ")}`),
+      el("p", {}, found.experiment.description),
+      picture(found.experiment_picture),
+    ] : []),
+    el("p", { class: "actions" }, diagnose,
+      ...(found.experiment ? [el("a", { href: fileOf("experiment", model), download: "experiment.csv" }, "download experiment.csv")] : []),
+      el("a", { href: fileOf("diagnosis", model), download: "diagnosis.html" }, "download diagnosis.html")),
   );
 }
 
-/** @type {uPlot | null} */
-let curve = null;
+/** @param {State} s */
+function drawDiscovery(s) {
+  const { discovery: found, current: model } = s;
+  if (model === null) return;
+  const discover = does(s, found ? "Discover again" : "Discover", { command: "discover", model }, { id: "discover" });
+  place("discovery").replaceChildren(
+    ...(found ? [
+      verdict(found.headline, found.meaning),
+      ...found.terms.flatMap((term) => [
+        el("h3", {}, term.title),
+        picture(term.picture),
+        el("p", {}, term.is_formula ? "As a formula: " : "No formula does as well; as a table: ", el("code", {}, term.formula)),
+        el("p", {}, button("Open its effect file", () => editor.edit(term.file), { "aria-label": `Open its effect file: ${term.effect}` })),
+      ]),
+    ] : [el("p", {}, "Curves of every coordinate at every place are fitted with everything else; one counts if the held-out error falls by more than chance and than the flow’s own memory manages.")]),
+    el("p", { class: "actions" }, discover,
+      ...(found ? [el("a", { href: fileOf("discovery", model), download: "discovery.html" }, "download discovery.html")] : [])),
+  );
+}
+
+/** @param {State} s */
+function drawLaw(s) {
+  for (const b of document.querySelectorAll("#design button")) b.toggleAttribute("disabled", s.work !== null);
+  place("law").replaceChildren(
+    ...(s.law ? [el("pre", { tabindex: "0", "aria-label": "the law" }, s.law.words), ...(s.law.picture ? [picture(s.law.picture)] : [])] : []),
+  );
+}
 
 /** @param {State} s */
 function drawWork(s) {
-  const busy = s.work !== null;
-  for (const button of document.querySelectorAll("#identify button")) button.toggleAttribute("disabled", busy);
-  place("work").hidden = !busy;
-  curve?.destroy();
-  curve = null;
+  for (const b of document.querySelectorAll("#identify button")) b.toggleAttribute("disabled", s.work !== null);
+  place("work").hidden = s.work === null;
+  clear();
   if (!s.work) return;
   place("work-name").textContent = s.work.name;
   place("work-now").textContent = s.work.now;
   progress(s.work.searches);
 }
 
-/** The best so far over the evaluations: one line for each search, one behind the other. @param {[number, number][][]} searches */
-function progress(searches) {
-  if (searches.flat().length < 2) return;
-  const style = getComputedStyle(document.documentElement);
-  const colour = (/** @type {string} */ name) => style.getPropertyValue(name).trim();
-  const axis = { stroke: colour("--ink"), grid: { stroke: colour("--grid") }, ticks: { stroke: colour("--axis") } };
-  /** @type {(number | null)[][]} */
-  const data = [[], []];
-  let before = 0;
-  for (const search of searches) {
-    for (const [evaluations, best] of search ?? []) {
-      data[0].push(before + evaluations);
-      data[1].push(best);
-    }
-    before = Number(data[0].at(-1) ?? 0) + 1;
-    // A gap: the next search starts from its own guess.
-    data[0].push(before);
-    data[1].push(null);
-  }
-  if (curve) return curve.setData(/** @type {uPlot.AlignedData} */ (data));
-  const values = (/** @type {uPlot} */ _u, /** @type {number[]} */ splits) => ticks(splits, splits.length > 1 ? splits[1] - splits[0] : 1);
-  curve = new uPlot(
-    {
-      width: Math.min(620, place("work").clientWidth || 620),
-      height: 180,
-      legend: { show: false },
-      cursor: { show: false },
-      scales: { x: { time: false } },
-      axes: [{ ...axis, values, label: "evaluations" }, { ...axis, values, label: "best so far", size: 70 }],
-      series: [{}, { stroke: colour("--s0"), width: 2, points: { show: false } }],
-    },
-    /** @type {uPlot.AlignedData} */ (data),
-    place("curve"),
-  );
-}
-
 /** Brings the curves of the current model, and of those beside it. */
 async function records() {
   if (!state) return;
+  if (!state.data) {
+    section("records", false);
+    return;
+  }
   const existing = state.models.map((m) => m.id);
   const models = [...[...beside].filter((id) => existing.includes(id) && id !== state?.current), ...(state.current ? [state.current] : [])].slice(-6);
-  const key = JSON.stringify([models, state.current]);
-  const where = state.model !== null;
-  if (key === shown && group && where) {
+  const key = JSON.stringify([models, state.data.hash]);
+  if (key === shown && group) {
     // The bars were drawn anew.
     group.rebind();
     return;
   }
   const payload = await ask(`/api/records?models=${models.join(",")}`);
   shown = key;
-  const target = place("g1");
+  section("records", true);
   group?.destroy();
-  target.replaceChildren();
-  place("records-section").hidden = false;
-  group = new Group(target, payload);
+  place("g1").replaceChildren();
+  group = new Group(place("g1"), payload);
   Object.assign(globalThis, { hostFit: { groups: [group] } });
 }
 
@@ -303,24 +260,16 @@ function listen() {
   };
 }
 
-const form = /** @type {HTMLFormElement} */ (place("identify"));
-form.addEventListener("submit", (event) => {
-  event.preventDefault();
-  const fields = new FormData(form);
-  const number = (/** @type {string} */ name) => {
-    const text = String(fields.get(name) ?? "");
-    return text === "" ? null : Number(text);
-  };
-  void run({
-    action: "identify",
-    delay: fields.get("delay") || null,
-    n1: number("n1"),
-    n2: number("n2"),
-    max_lag: number("max_lag"),
-    evaluations: number("evaluations"),
-    seed: number("seed") ?? 0,
+for (const [id, command] of [["identify", "identify"], ["design", "design"]]) {
+  const form = /** @type {HTMLFormElement} */ (place(id));
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    const model = command === "design" ? { model: state?.current } : {};
+    void run({ command, ...model, options: options(form) });
   });
-});
+}
 place("cancel").addEventListener("click", () => attempt(() => ask("/api/cancel", {})));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => group?.restyle());
+importer.listen();
+editor.listen(refresh);
 listen();

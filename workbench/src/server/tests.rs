@@ -25,6 +25,12 @@ impl Bench for Dummy {
             _ => Err(Refusal("there is no such model".to_owned())),
         }
     }
+    fn ask(&self, question: &Value) -> Result<Value, Refusal> {
+        Ok(question.clone())
+    }
+    fn upload(&self, name: &str, content: &[u8]) -> Result<Value, Refusal> {
+        Ok(json!({"name": name, "bytes": content.len()}))
+    }
     fn name(&self, request: &Value) -> Result<String, Refusal> {
         let name = request.get("action").and_then(Value::as_str);
         name.map(str::to_owned)
@@ -165,10 +171,18 @@ fn other_names_and_other_sites_are_kept_out() {
 #[test]
 fn large_requests_are_refused() {
     let (app, token) = app();
-    let body = Body::from(vec![b' '; LARGEST + 1]);
-    let post = request(Method::POST, "/api/run", Some(&token)).body(body);
+    let sent = |path: &str, bytes: usize| {
+        let body = Body::from(vec![b' '; bytes]);
+        let post = request(Method::POST, path, Some(&token)).body(body);
+        status(&app, post.expect("a request"))
+    };
+    for path in ["/api/run", "/api/select", "/api/ask"] {
+        assert_eq!(sent(path, LARGEST + 1), StatusCode::PAYLOAD_TOO_LARGE);
+    }
+    // Recordings are larger than questions, and have their limit as well.
+    assert_eq!(sent("/api/upload/a.csv", LARGEST + 1), StatusCode::OK);
     assert_eq!(
-        status(&app, post.expect("a request")),
+        sent("/api/upload/a.csv", LARGEST_FILE + 1),
         StatusCode::PAYLOAD_TOO_LARGE
     );
 }
@@ -257,7 +271,9 @@ fn piece() -> impl Strategy<Value = String> {
         Just("/api/records?models=1,2".to_owned()),
         Just("/api/file/model/1".to_owned()),
         Just("/api/cancel".to_owned()),
-        "/api/(run|file|records|select)[/?=&%.,a-z0-9-]{0,30}",
+        Just("/api/ask".to_owned()),
+        Just("/api/upload/a.csv".to_owned()),
+        "/api/(run|file|records|select|upload)[/?=&%.,a-z0-9-]{0,30}",
         "/[ -~]{0,40}",
     ]
 }

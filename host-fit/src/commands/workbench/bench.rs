@@ -1,85 +1,78 @@
-//! The steps of the library, done for the page and kept in the project folder.
+//! What the page sees of the project, and how models get into it.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use host_fit::data::DataSet;
-use host_fit::diagnose::Options;
-use host_fit::excitation::Excitation;
 use host_fit::model::Model;
-use host_fit::output::write_atomic;
 use host_fit::picture::{Ladder, LadderStep, ladder, workbench_page};
-use host_fit::search::Snapshot;
-use host_fit::steps::{self, Comparison, Onlooker};
+use host_fit::steps::{self, Comparison, ImportedSet};
 use serde_json::{Value, json};
 use workbench::{Bench, Download, Node, Project, Refusal, Work};
 
-use super::request::Request;
+use super::data::{Data, Uploads};
+use super::own::OwnEffects;
+use super::request::Line;
 use crate::commands::page;
-use crate::commands::words::{describe, role_name, score_rows};
+use crate::commands::words::{describe, score_rows};
 
-/// A data set, and the models that are made of it.
+/// A project, the data set, and the models that are made of it.
 pub(super) struct ModelBench {
-    /// As the user named it, for commands.
-    dataset: String,
-    set: DataSet,
-    /// What the commands of the set can tell: asked for once.
-    remarks: Vec<String>,
-    project: Mutex<Project>,
-    /// Free runs and failures by model; those that diverge by what is said of it.
+    pub(super) folder: PathBuf,
+    pub(super) project: Mutex<Project>,
+    pub(super) uploads: Uploads,
+    pub(super) own: OwnEffects,
+    data: Mutex<Option<Arc<Data>>>,
+    /// Free runs and failures by model.
     compared: Mutex<HashMap<u32, Arc<Compared>>>,
 }
 
-struct Compared {
-    model: Model,
-    run: Result<Comparison, String>,
+/// A model with its free runs, or with what is said where they diverge.
+pub(super) struct Compared {
+    pub(super) model: Model,
+    pub(super) run: Result<Comparison, String>,
 }
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+/// A step with the model that it made.
+pub(super) struct Made<'a> {
+    pub(super) model: &'a Model,
+    /// The model that it was made from.
+    pub(super) from: Option<u32>,
+    /// In a few words.
+    pub(super) step: String,
+    /// As a command.
+    pub(super) command: String,
+}
+
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     // A panic in between leaves whole values: each is replaced at once.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// The page, listening to a step.
-struct Page<'a>(&'a Work);
-
-impl Onlooker for Page<'_> {
-    fn begins(&self, what: &str) {
-        self.0.now(what);
-    }
-    fn now(&self, what: &str) {
-        self.0.now(what);
-    }
-    fn sees(&self, snapshot: &Snapshot) {
-        self.0.best(snapshot.evaluations, snapshot.best);
-    }
-    fn hears(&self, warning: &str) {
-        self.0.warning(warning);
-    }
-    fn interrupt(&self) -> &AtomicBool {
-        self.0.cancel()
-    }
 }
 
 /// What the page makes of the project: the script fills the places in.
 const BODY: &str = include_str!("page.html");
 
 impl ModelBench {
-    pub(super) fn open(dataset: &Path, set: DataSet, folder: &Path) -> anyhow::Result<Self> {
-        let shortest = set.records.iter().map(host_fit::data::Record::len).min();
-        let longest_lag = 500.min(shortest.unwrap_or(4) / 4);
+    /// Opens the project in `folder` on a data set; without one, on the one that was imported into the project, if any.
+    pub(super) fn open(dataset: Option<&Path>, folder: &Path) -> anyhow::Result<Self> {
+        let imported = folder.join(super::IMPORTED);
+        let path = match dataset {
+            Some(path) => Some(path.to_owned()),
+            None => imported.exists().then_some(imported),
+        };
+        let data = path.map(|path| Data::load(&path)).transpose()?;
+        let project = Project::open(folder, data.as_ref().map(|data| data.set.hash.as_str()))?;
         Ok(Self {
-            dataset: dataset.display().to_string(),
-            remarks: Excitation::of(&set, longest_lag).remarks,
-            project: Mutex::new(Project::open(folder, &set.hash)?),
-            set,
+            folder: folder.to_owned(),
+            project: Mutex::new(project),
+            uploads: Uploads::of(folder),
+            own: OwnEffects::of(folder),
+            data: Mutex::new(data.map(Arc::new)),
             compared: Mutex::default(),
         })
     }
 
-    /// Takes a model that the user has into the project, unless the current one is that already.
+    /// Takes a model that the user has into the project, unless it is there already.
     pub(super) fn bring(&self, path: &Path) -> anyhow::Result<()> {
         let model = Model::load(path)?;
         let known = {
@@ -91,64 +84,90 @@ impl ModelBench {
         match known {
             Some(id) => lock(&self.project).select(id)?,
             None => {
-                let command = format!("# {} brought along", path.display());
-                self.keep(&model, None, "brought along", &command)
-                    .map_err(|why| anyhow::anyhow!(why.0))?;
+                let made = Made {
+                    model: &model,
+                    from: None,
+                    step: "brought along".to_owned(),
+                    command: format!("# {} brought along", path.display()),
+                };
+                self.keep(&made).map_err(|why| anyhow::anyhow!(why.0))?;
             }
         }
         Ok(())
     }
 
-    /// Writes a model into the project and makes it the current one.
-    fn keep(
-        &self,
-        model: &Model,
-        parent: Option<u32>,
-        step: &str,
-        command: &str,
-    ) -> Result<(), Refusal> {
-        let run = steps::compare(model, &self.set);
-        let held_out = run
-            .as_ref()
-            .ok()
-            .and_then(|run| run.scores.held_out().cloned());
+    /// The data set.
+    pub(super) fn data(&self) -> Result<Arc<Data>, Refusal> {
+        let none = || Refusal("there is no data set yet: import one".to_owned());
+        lock(&self.data).clone().ok_or_else(none)
+    }
+
+    /// Takes an imported data set onto the bench.
+    pub(super) fn take(&self, found: &ImportedSet, command: &str) -> Result<(), Refusal> {
+        // Models of another data set are in the way; that is to be known before anything is written.
+        lock(&self.project).set_data(&found.hash)?;
+        let folder = self.folder.join(super::IMPORTED);
+        found.imported.save(&folder)?;
+        let data = Data::load(&folder).map_err(|e| Refusal(format!("{e:#}")))?;
+        *lock(&self.data) = Some(Arc::new(data));
+        Ok(lock(&self.project).note(command)?)
+    }
+
+    /// Writes a model into the project and makes it the current one. Its number.
+    pub(super) fn keep(&self, made: &Made<'_>) -> Result<u32, Refusal> {
+        let run = steps::compare(made.model, &self.data()?.set);
+        let held_out = run.as_ref().ok().and_then(|run| run.scores.held_out());
+        let finite = |value: f64| value.is_finite().then_some(value);
         let mut project = lock(&self.project);
         let file = project.next_file();
-        model.save(&project.folder().join(&file))?;
-        let finite = |value: f64| value.is_finite().then_some(value);
+        made.model.save(&project.folder().join(&file))?;
         let id = project.add(Node {
             id: 0,
-            parent,
-            step: step.to_owned(),
-            command: command.to_owned(),
+            parent: made.from,
+            step: made.step.clone(),
+            command: made.command.clone(),
             file,
-            rmse: held_out.as_ref().and_then(|i| finite(i.rmse)),
-            noise_rmse: held_out.as_ref().and_then(|i| i.noise_rmse),
-            fit_percent: held_out.as_ref().and_then(|i| finite(i.fit_percent)),
+            rmse: held_out.and_then(|i| finite(i.rmse)),
+            noise_rmse: held_out.and_then(|i| i.noise_rmse),
+            fit_percent: held_out.and_then(|i| finite(i.fit_percent)),
         })?;
         drop(project);
         let compared = Compared {
-            model: model.clone(),
+            model: made.model.clone(),
             run: run.map_err(|e| Refusal::from(e).0),
         };
         lock(&self.compared).insert(id, Arc::new(compared));
-        Ok(())
+        Ok(id)
+    }
+
+    /// Where a model's file lies.
+    pub(super) fn path(&self, id: u32) -> Result<PathBuf, Refusal> {
+        let project = lock(&self.project);
+        Ok(project.path(project.node(id)?))
     }
 
     /// A model with its free runs.
-    fn compared(&self, id: u32) -> Result<Arc<Compared>, Refusal> {
+    pub(super) fn compared(&self, id: u32) -> Result<Arc<Compared>, Refusal> {
         if let Some(known) = lock(&self.compared).get(&id) {
             return Ok(known.clone());
         }
-        let path = {
-            let project = lock(&self.project);
-            project.path(project.node(id)?)
-        };
-        let model = Model::load(&path)?;
-        let run = steps::compare(&model, &self.set).map_err(|e| Refusal::from(e).0);
+        let model = Model::load(&self.path(id)?)?;
+        let run = steps::compare(&model, &self.data()?.set).map_err(|e| Refusal::from(e).0);
         let found = Arc::new(Compared { model, run });
         lock(&self.compared).insert(id, found.clone());
         Ok(found)
+    }
+
+    /// A file beside a model: what came of a step on it.
+    pub(super) fn beside(&self, what: &str, id: u32, ending: &str) -> PathBuf {
+        self.folder.join(format!("{what}-{id}.{ending}"))
+    }
+
+    /// What was kept of a step on a model; none where it was not done.
+    fn kept(&self, what: &str, id: Option<u32>) -> Value {
+        let read = id.and_then(|id| std::fs::read(self.beside(what, id, "json")).ok());
+        let read = read.and_then(|text| serde_json::from_slice(&text).ok());
+        read.unwrap_or_default()
     }
 
     /// The held-out error from the first model of a branch to this one.
@@ -180,18 +199,12 @@ impl ModelBench {
         })
     }
 
-    fn diagnosis_file(&self, id: u32) -> PathBuf {
-        lock(&self.project)
-            .folder()
-            .join(format!("diagnosis-{id}.json"))
-    }
-
     fn model_state(&self, id: u32) -> Value {
         let compared = match self.compared(id) {
             Ok(compared) => compared,
             Err(why) => {
                 return json!({
-                    "describe": "", "columns": [], "rows": [], "where": [], "where_picture": "",
+                    "describe": "", "effects": [], "columns": [], "rows": [], "where": [], "where_picture": "",
                     "ladder_picture": self.ladder(id), "error": why.0,
                 });
             }
@@ -207,6 +220,7 @@ impl ModelBench {
         };
         json!({
             "describe": describe(&compared.model),
+            "effects": compared.model.effect_names(),
             "columns": ["record", "use", "FIT, %", "ρ", "RMSE", "noise", "ε", "inside"],
             "rows": rows,
             "where": words,
@@ -223,45 +237,27 @@ impl Bench for ModelBench {
     }
 
     fn state(&self) -> Value {
-        let (current, models, log, folder) = {
+        let (current, models, log) = {
             let project = lock(&self.project);
-            let folder = project.folder().display().to_string();
-            (
-                project.current(),
-                project.nodes().to_vec(),
-                project.log(),
-                folder,
-            )
+            (project.current(), project.nodes().to_vec(), project.log())
         };
-        let diagnosis = current.and_then(|id| {
-            let text = std::fs::read(self.diagnosis_file(id)).ok()?;
-            serde_json::from_slice::<Value>(&text).ok()
-        });
-        let records: Vec<Value> = self
-            .set
-            .records
-            .iter()
-            .map(|r| json!({"name": r.name, "use": role_name(r.role), "samples": r.len()}))
-            .collect();
         json!({
-            "data": {
-                "title": self.set.title.as_deref().unwrap_or("data set"),
-                "path": self.dataset,
-                "hash": self.set.hash,
-                "period": self.set.sample_period_s,
-                "records": records,
-                "remarks": self.remarks,
-            },
-            "project": folder,
+            "data": self.data().ok().map(|data| data.state()),
+            "project": self.folder.display().to_string(),
             "current": current,
             "models": models,
             "log": log,
+            "uploads": self.uploads.names(),
+            "own": self.own.state(),
             "model": current.map(|id| self.model_state(id)),
-            "diagnosis": diagnosis,
+            "diagnosis": self.kept("diagnosis", current),
+            "discovery": self.kept("discovery", current),
+            "law": self.kept("law", current),
         })
     }
 
     fn records(&self, models: &[u32]) -> Result<String, Refusal> {
+        let data = self.data()?;
         let compared: Vec<(String, Arc<Compared>)> = models
             .iter()
             .map(|id| {
@@ -275,9 +271,9 @@ impl Bench for ModelBench {
             .collect();
         // The last one is worked on: its bars are on the page.
         let Some((_, last)) = compared.last() else {
-            return Ok(page::living(&self.set.records, &[], None).json());
+            return Ok(page::living(&data.set.records, &[], None).json());
         };
-        let records = last.model.targets(&self.set.records);
+        let records = last.model.targets(&data.set.records);
         let delay = last.model.longest_delay();
         let samples = last.run.as_ref().ok().map(|run| {
             let places = run.failures.samples(&records, &run.runs, delay);
@@ -293,60 +289,43 @@ impl Bench for ModelBench {
         Ok(lock(&self.project).select(model)?)
     }
 
-    fn name(&self, request: &Value) -> Result<String, Refusal> {
-        Request::read(request).map(|r| r.name()).map_err(Refusal)
-    }
-
-    fn run(&self, request: &Value, work: &Work) -> Result<(), Refusal> {
-        let request = Request::read(request).map_err(Refusal)?;
-        let page = Page(work);
-        let to = lock(&self.project).next_file();
-        let in_folder = |file: &str| {
-            let project = lock(&self.project);
-            project.folder().join(file).display().to_string()
-        };
-        let command = |from: &str| request.command(&self.dataset, from, &in_folder(&to));
-        match &request {
-            Request::Identify { .. } => {
-                let asked = request.identify().unwrap_or_default();
-                let found = steps::identify(&self.set, &asked, &page)?;
-                self.keep(&found.model, None, "identified", &command(""))
-            }
-            Request::Extend { model, effect } => {
-                let given = self.compared(*model)?;
-                let from = in_folder(&lock(&self.project).node(*model)?.file.clone());
-                let effects = std::slice::from_ref(effect);
-                let found = steps::extend(&given.model, &self.set, effects, &page)?;
-                let step = format!("+ {effect}");
-                self.keep(&found.model, Some(*model), &step, &command(&from))
-            }
-            Request::Diagnose { model, seed } => {
-                let given = self.compared(*model)?;
-                let file = lock(&self.project).node(*model)?.file.clone();
-                let options = Options {
-                    seed: *seed,
-                    ..Options::default()
-                };
-                let found = steps::diagnose(&given.model, &self.set, &options, &page)?;
-                let mut kept = serde_json::to_value(&found)?;
-                if let Some(kept) = kept.as_object_mut() {
-                    kept.insert("headline".to_owned(), found.headline.clone().into());
-                    kept.insert("meaning".to_owned(), found.meaning.clone().into());
-                    let picture = page::ranking_picture(&found.diagnosis);
-                    kept.insert("picture".to_owned(), picture.into());
-                }
-                let text = serde_json::to_vec(&kept)?;
-                write_atomic(&self.diagnosis_file(*model), |out| out.write_all(&text))?;
-                lock(&self.project).note(&command(&in_folder(&file)))?;
-                Ok(())
-            }
+    fn ask(&self, question: &Value) -> Result<Value, Refusal> {
+        let object = question.as_object().filter(|object| object.len() == 1);
+        let asked = object.and_then(|object| object.iter().next());
+        match asked.and_then(|(what, about)| Some((what.as_str(), about.as_str()?))) {
+            Some(("check", text)) => Ok(OwnEffects::check(text)),
+            Some(("keep", text)) => self.own.keep(text),
+            Some(("forget", name)) => self.own.forget(name),
+            Some(("inspect", file)) => self.uploads.inspect(file),
+            _ => Err(Refusal(
+                "one of `check`, `keep`, `forget` and `inspect` with a text is needed".to_owned(),
+            )),
         }
     }
 
+    fn upload(&self, name: &str, bytes: &[u8]) -> Result<Value, Refusal> {
+        self.uploads.keep(name, bytes)
+    }
+
+    fn name(&self, request: &Value) -> Result<String, Refusal> {
+        Ok(self.prepare(request)?.line.text())
+    }
+
+    fn run(&self, request: &Value, work: &Work) -> Result<(), Refusal> {
+        self.prepare(request)?.run(self, work)
+    }
+
     fn file(&self, kind: &str, model: u32) -> Result<Download, Refusal> {
-        let path = {
-            let project = lock(&self.project);
-            project.path(project.node(model)?)
+        let path = self.path(model)?;
+        let written = |what: &str, name: String, kind: &'static str| {
+            let ending = name.rsplit('.').next().unwrap_or_default();
+            let content = std::fs::read(self.beside(what, model, ending));
+            let content = content.map_err(|_| Refusal(format!("model {model} has no {what}")))?;
+            Ok(Download {
+                name,
+                kind,
+                content,
+            })
         };
         match kind {
             "model" => Ok(Download {
@@ -360,15 +339,26 @@ impl Bench for ModelBench {
                 content: steps::constants(&Model::load(&path)?)?.text.into_bytes(),
             }),
             "report" => {
-                let compared = self.compared(model)?;
+                let (compared, data) = (self.compared(model)?, self.data()?);
                 let run = compared.run.as_ref().map_err(|why| Refusal(why.clone()))?;
+                let command = Line::compare(&path, &data.path);
+                let page = page::comparison(&compared.model, &data.set, run, &command);
                 Ok(Download {
                     name: format!("model-{model}.html"),
                     kind: "text/html; charset=utf-8",
-                    content: page::comparison(&compared.model, &self.set, run).into_bytes(),
+                    content: page.into_bytes(),
                 })
             }
-            _ => Err(Refusal("files are model, constants and report".to_owned())),
+            "diagnosis" | "discovery" => written(
+                kind,
+                format!("{kind}-{model}.html"),
+                "text/html; charset=utf-8",
+            ),
+            "experiment" | "loop" => written(kind, format!("{kind}-{model}.csv"), "text/csv"),
+            _ => Err(Refusal(
+                "files are model, constants, report, diagnosis, discovery, experiment and loop"
+                    .to_owned(),
+            )),
         }
     }
 }

@@ -1,29 +1,30 @@
 //! `host-fit workbench`: the whole way on a local page.
 
 mod bench;
+mod data;
+mod own;
 mod request;
+mod task;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use bench::ModelBench;
-use host_fit::data::DataSet;
-
 use super::Console;
+use bench::ModelBench;
 
-/// Serve a page on this machine: see the records, identify, compare, find what is missing, add it, undo, download.
+/// Serve a page on this machine: import recordings, see them, identify, compare, find what is missing, add it, design a law.
 ///
 /// The page is served on 127.0.0.1 alone, to whoever has the address that is printed. Whatever is done there is kept in
 /// the project folder: models that every other command reads, the tree of how they came about, the log of commands.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Folder with dataset.toml, or one CSV file.
+    /// Folder with dataset.toml, or one CSV file; without it, files are imported on the page, or were before.
     #[arg(value_name = "DATASET")]
-    dataset: PathBuf,
+    dataset: Option<PathBuf>,
     /// A model to start from.
     #[arg(long, value_name = "model.toml")]
     model: Option<PathBuf>,
-    /// Project folder [default: the data set's name and .workbench, in the current folder].
+    /// Project folder [default: the data set's name (or `new`) and .workbench, in the current folder].
     #[arg(long, value_name = "DIR")]
     project: Option<PathBuf>,
     /// Port to serve on; 0 takes any free one.
@@ -36,12 +37,12 @@ pub(crate) struct Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
-    let set = DataSet::load(&args.dataset)?;
-    let project = match &args.project {
-        Some(folder) => folder.clone(),
-        None => beside(&args.dataset)?,
+    let project = match (&args.project, &args.dataset) {
+        (Some(folder), _) => folder.clone(),
+        (None, Some(dataset)) => named_by(dataset)?,
+        (None, None) => PathBuf::from("new.workbench"),
     };
-    let bench = ModelBench::open(&args.dataset, set, &project)?;
+    let bench = ModelBench::open(args.dataset.as_deref(), &project)?;
     if let Some(model) = &args.model {
         bench.bring(model)?;
     }
@@ -62,7 +63,8 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn beside(dataset: &Path) -> anyhow::Result<PathBuf> {
+/// The project folder of a data set.
+fn named_by(dataset: &Path) -> anyhow::Result<PathBuf> {
     let whole = std::fs::canonicalize(dataset)?;
     let named = match whole.file_name().is_some_and(|n| n == "dataset.toml") {
         true => whole.parent().unwrap_or(&whole),
@@ -70,6 +72,18 @@ fn beside(dataset: &Path) -> anyhow::Result<PathBuf> {
     };
     let name = named.file_stem().unwrap_or_default().to_string_lossy();
     Ok(PathBuf::from(format!("{name}.workbench")))
+}
+
+/// The data set within a project that was imported into it.
+const IMPORTED: &str = "data";
+
+/// The files of a folder whose names end so, sorted; none where there is no folder.
+fn names_in(folder: &Path, ending: &str) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    let mut names: Vec<String> = names.filter(|name| name.ends_with(ending)).collect();
+    names.sort();
+    names
 }
 
 /// Opens the browser where the system knows how; the address is printed anyway.

@@ -1,182 +1,298 @@
-//! What the page may ask for as work, and the command that does the same.
+//! What the page may ask for as work: a command of the program with its options.
+//!
+//! A request is read by the parser of the command line, so the page has the same options with the same limits and the same
+//! messages, and what it shows as a command is what was run. The files are the bench's to name: no option that names one is let in.
 
-use host_fit::steps::{DelayKind, IdentifyRequest};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
 use serde::Deserialize;
+use serde_json::{Number, Value};
+use workbench::Refusal;
 
-/// A piece of work.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(tag = "action", rename_all = "kebab-case", deny_unknown_fields)]
-pub(super) enum Request {
-    Identify {
-        #[serde(default)]
-        delay: Option<Delay>,
-        #[serde(default)]
-        n1: Option<u16>,
-        #[serde(default)]
-        n2: Option<u16>,
-        #[serde(default)]
-        max_lag: Option<u16>,
-        #[serde(default)]
-        evaluations: Option<u32>,
-        #[serde(default)]
-        seed: u64,
-    },
-    Diagnose {
-        model: u32,
-        #[serde(default)]
-        seed: u64,
-    },
-    Extend {
-        model: u32,
-        effect: String,
-    },
-}
+use crate::commands::page::quoted;
 
+/// A command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Delay {
-    Fixed,
-    StateDependent,
+pub(super) enum Command {
+    Identify,
+    Diagnose,
+    Discover,
+    Extend,
+    Design,
+    Import,
+}
+
+impl Command {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Identify => "identify",
+            Self::Diagnose => "diagnose",
+            Self::Discover => "discover",
+            Self::Extend => "extend",
+            Self::Design => "design",
+            Self::Import => "import",
+        }
+    }
+
+    /// Its options that name no file.
+    fn options(self) -> &'static [&'static str] {
+        match self {
+            Self::Identify => &[
+                "averaged",
+                "delay",
+                "effect",
+                "evaluations",
+                "interpolated",
+                "lags",
+                "max-lag",
+                "n1",
+                "n2",
+                "n3",
+                "objective",
+                "seed",
+                "threads",
+            ],
+            Self::Diagnose => &["most-effects", "seed"],
+            Self::Discover => &["terms", "without"],
+            Self::Extend => &["effect"],
+            Self::Design => &[
+                "air-price",
+                "goal",
+                "horizon",
+                "least-air",
+                "max-air",
+                "max-switches",
+                "min-off",
+                "min-on",
+                "pulses",
+                "ramp",
+                "seed",
+                "target",
+            ],
+            Self::Import => &[
+                "channel",
+                "graded",
+                "hold-out-from",
+                "no-channels",
+                "period",
+                "t",
+                "t-scale",
+                "title",
+                "u",
+                "u-offset",
+                "u-scale",
+                "u-threshold",
+                "validate",
+                "y",
+                "y-offset",
+                "y-scale",
+            ],
+        }
+    }
+
+    /// Whether it starts from a model.
+    pub(super) fn needs_a_model(self) -> bool {
+        !matches!(self, Self::Identify | Self::Import)
+    }
+}
+
+/// The value of an option.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(untagged)]
+enum Given {
+    Switch(bool),
+    Number(Number),
+    Text(String),
+    Several(Vec<String>),
+}
+
+/// A command with its options.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Request {
+    pub(super) command: Command,
+    /// The model that it starts from.
+    #[serde(default)]
+    pub(super) model: Option<u32>,
+    /// Files that were uploaded, for `import`.
+    #[serde(default)]
+    pub(super) files: Vec<String>,
+    #[serde(default)]
+    options: BTreeMap<String, Option<Given>>,
 }
 
 impl Request {
-    /// Reads and checks a request.
-    pub(super) fn read(request: &serde_json::Value) -> Result<Self, String> {
+    /// Reads a request.
+    pub(super) fn read(request: &Value) -> Result<Self, String> {
         let read =
             Self::deserialize(request).map_err(|e| format!("the request cannot be read: {e}"))?;
-        if let Self::Identify {
-            n1,
-            n2,
-            max_lag,
-            evaluations,
-            ..
-        } = &read
+        let known = read.command.options();
+        if let Some(other) = read
+            .options
+            .keys()
+            .find(|name| !known.contains(&name.as_str()))
         {
-            for (name, value, range) in [
-                ("state lags", n1.map(u32::from), 1..=100),
-                ("product lags", n2.map(u32::from), 0..=100),
-                ("the longest lag", max_lag.map(u32::from), 1..=20_000),
-                ("evaluations", *evaluations, 1..=1_000_000),
-            ] {
-                if value.is_some_and(|v| !range.contains(&v)) {
-                    return Err(format!(
-                        "{name}: a number from {} to {} is needed",
-                        range.start(),
-                        range.end()
-                    ));
+            return Err(format!(
+                "`{}` takes no option `{other}` here",
+                read.command.name()
+            ));
+        }
+        match (read.command.needs_a_model(), read.model) {
+            (true, None) => Err("`model` is missing: the number of a model".to_owned()),
+            (false, Some(_)) => Err(format!("`{}` starts from no model", read.command.name())),
+            _ => Ok(read),
+        }
+    }
+
+    /// The options as words of the command line; what is empty is left out.
+    pub(super) fn options(&self) -> Vec<String> {
+        let mut words = Vec::new();
+        for (name, given) in &self.options {
+            match given {
+                None | Some(Given::Switch(false)) => {}
+                Some(Given::Switch(true)) => words.push(format!("--{name}")),
+                Some(Given::Number(number)) => words.push(format!("--{name}={number}")),
+                Some(Given::Text(text)) if text.is_empty() => {}
+                Some(Given::Text(text)) => words.push(format!("--{name}={text}")),
+                Some(Given::Several(each)) => {
+                    words.extend(each.iter().map(|text| format!("--{name}={text}")));
                 }
             }
         }
-        Ok(read)
+        words
     }
+}
 
-    /// What it is called while it runs.
-    pub(super) fn name(&self) -> String {
-        match self {
-            Self::Identify { .. } => "identifying".to_owned(),
-            Self::Diagnose { model, .. } => format!("diagnosing model {model}"),
-            Self::Extend { model, effect } => format!("adding {effect} to model {model}"),
-        }
-    }
+/// A command with the files that it reads and writes.
+#[derive(Debug, Clone)]
+pub(super) struct Line {
+    command: Command,
+    words: Vec<String>,
+}
 
-    /// The request of the library, for an identification.
-    pub(super) fn identify(&self) -> Option<IdentifyRequest> {
-        let Self::Identify {
-            delay,
-            n1,
-            n2,
-            max_lag,
-            evaluations,
-            seed,
-        } = self
-        else {
-            return None;
+impl Line {
+    /// `files` come first and are no options, whatever they look like.
+    pub(super) fn new(command: Command, files: &[PathBuf], rest: Vec<String>) -> Self {
+        let file = |path: &PathBuf| match path.to_string_lossy() {
+            text if text.starts_with('-') => format!("./{text}"),
+            text => text.into_owned(),
         };
-        let base = IdentifyRequest::default();
-        Some(IdentifyRequest {
-            delay: delay.map(|delay| match delay {
-                Delay::Fixed => DelayKind::Fixed,
-                Delay::StateDependent => DelayKind::StateDependent,
-            }),
-            n1: *n1,
-            n2: *n2,
-            max_lag: *max_lag,
-            // The command's default.
-            evaluations: evaluations.map_or(20_000, |e| e as usize),
-            seed: *seed,
-            ..base
-        })
+        let mut words: Vec<String> = files.iter().map(file).collect();
+        words.extend(rest);
+        Self { command, words }
     }
 
-    /// The command that does the same: `data` and `from` are the files it reads, `to` the one it writes.
-    pub(super) fn command(&self, data: &str, from: &str, to: &str) -> String {
-        match self {
-            Self::Identify {
-                delay,
-                n1,
-                n2,
-                max_lag,
-                evaluations,
-                seed,
-            } => {
-                let mut text = format!("host-fit identify {data} -o {to}");
-                if let Some(delay) = delay {
-                    text.push_str(match delay {
-                        Delay::Fixed => " --delay fixed",
-                        Delay::StateDependent => " --delay state-dependent",
-                    });
-                }
-                for (option, value) in [
-                    ("n1", n1.map(u32::from)),
-                    ("n2", n2.map(u32::from)),
-                    ("max-lag", max_lag.map(u32::from)),
-                    ("evaluations", *evaluations),
-                ] {
-                    if let Some(value) = value {
-                        text.push_str(&format!(" --{option} {value}"));
-                    }
-                }
-                if *seed != 0 {
-                    text.push_str(&format!(" --seed {seed}"));
-                }
-                text
-            }
-            Self::Diagnose { seed, .. } => match seed {
-                0 => format!("host-fit diagnose {from} {data}"),
-                _ => format!("host-fit diagnose {from} {data} --seed {seed}"),
-            },
-            Self::Extend { effect, .. } => {
-                format!("host-fit extend {from} {data} --effect {effect} -o {to}")
-            }
-        }
+    /// Adds an option that names a file.
+    pub(super) fn file(mut self, option: &str, path: &Path) -> Self {
+        self.words.push(format!("--{option}={}", path.display()));
+        self
+    }
+
+    /// The command that compares a model with a data set.
+    pub(super) fn compare(model: &Path, data: &Path) -> String {
+        let words = [model, data].map(|path| quoted(&path.to_string_lossy()));
+        format!("host-fit compare {} --report=report.html", words.join(" "))
+    }
+
+    /// As the user could write it.
+    pub(super) fn text(&self) -> String {
+        let words = self.words.iter().map(|word| quoted(word));
+        let all = ["host-fit".to_owned(), self.command.name().to_owned()];
+        all.into_iter().chain(words).collect::<Vec<_>>().join(" ")
+    }
+
+    /// What the command line's parser makes of it.
+    pub(super) fn parse<A: clap::Args>(&self) -> Result<A, Refusal> {
+        let parser = clap::Command::new(self.command.name())
+            .no_binary_name(true)
+            .disable_help_flag(true);
+        let told = |error: clap::Error| {
+            let text = error.to_string();
+            let first = text.split("\n\n").next().unwrap_or_default();
+            let words = first.split_whitespace().collect::<Vec<_>>().join(" ");
+            Refusal(words.trim_start_matches("error: ").to_owned())
+        };
+        let matches = A::augment_args(parser)
+            .try_get_matches_from(&self.words)
+            .map_err(told)?;
+        A::from_arg_matches(&matches).map_err(told)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::commands::{design, identify};
     use serde_json::json;
 
+    fn line(value: Value) -> Result<Line, String> {
+        let request = Request::read(&value)?;
+        let (from, set) = (PathBuf::from("a.toml"), PathBuf::from("my set"));
+        let files = match request.command {
+            Command::Identify => vec![set],
+            Command::Design => vec![from],
+            _ => vec![from, set],
+        };
+        Ok(Line::new(request.command, &files, request.options()).file("output", "b.toml".as_ref()))
+    }
+
     #[test]
-    fn a_request_reads_as_the_command_that_it_is() {
-        let of = |value| Request::read(&value).map(|r| r.command("set", "a.toml", "b.toml"));
+    fn a_request_is_the_command_that_it_shows() {
+        let asked = json!({"command": "identify", "options": {"delay": "fixed", "n1": 2, "n2": null, "seed": 3, "interpolated": false}});
+        let asked = line(asked).unwrap();
         assert_eq!(
-            of(json!({"action": "identify", "delay": "fixed", "n1": 2, "n2": null, "seed": 3}))
-                .unwrap(),
-            "host-fit identify set -o b.toml --delay fixed --n1 2 --seed 3"
+            asked.text(),
+            "host-fit identify 'my set' --delay=fixed --n1=2 --seed=3 --output=b.toml"
         );
+        assert!(asked.parse::<identify::Args>().is_ok());
+        let asked = json!({"command": "design", "model": 1, "options": {"target": -0.5, "least-air": true}});
+        let asked = line(asked).unwrap();
         assert_eq!(
-            of(json!({"action": "extend", "model": 1, "effect": "jet-lag"})).unwrap(),
-            "host-fit extend a.toml set --effect jet-lag -o b.toml"
+            asked.text(),
+            "host-fit design a.toml --least-air --target=-0.5 --output=b.toml"
         );
+        assert!(asked.parse::<design::Args>().is_ok());
+    }
+
+    #[test]
+    fn limits_and_messages_are_those_of_the_command_line() {
+        let asked = json!({"command": "identify", "options": {"n1": 0}});
+        let error = line(asked)
+            .unwrap()
+            .parse::<identify::Args>()
+            .unwrap_err()
+            .0;
+        assert!(
+            error.contains("'--n1") && error.contains("from 1 to 100") && !error.contains('\n'),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn nothing_names_a_file_or_leaves_its_option() {
         for wrong in [
-            json!({"action": "delete"}),
-            json!({"action": "identify", "n1": 0}),
-            json!({"action": "identify", "n1": 2, "output": "/etc/passwd"}),
-            json!({"action": "diagnose"}),
+            json!({"command": "delete"}),
+            json!({"command": "identify", "options": {"output": "/etc/passwd"}}),
+            json!({"command": "identify", "options": {"report": "/etc/passwd"}}),
+            json!({"command": "extend", "model": 1, "options": {"effect-file": "/etc/passwd"}}),
+            json!({"command": "design", "model": 1, "options": {"csv": "/etc/passwd"}}),
+            json!({"command": "import", "options": {"like": "/etc"}}),
+            json!({"command": "identify", "model": 1}),
+            json!({"command": "diagnose"}),
             json!([]),
         ] {
-            assert!(of(wrong.clone()).is_err(), "{wrong}");
+            assert!(Request::read(&wrong).is_err(), "{wrong}");
         }
+        // A value stays one, whatever it looks like.
+        let asked = json!({"command": "identify", "options": {"effect": ["--output=/etc/passwd"]}});
+        let asked = line(asked).unwrap();
+        assert!(
+            asked
+                .text()
+                .ends_with("--effect=--output=/etc/passwd --output=b.toml")
+        );
+        assert!(asked.parse::<identify::Args>().is_ok());
     }
 }

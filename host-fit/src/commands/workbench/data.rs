@@ -1,0 +1,132 @@
+//! The data set on the bench, and the files that one is made of.
+
+use std::path::{Path, PathBuf};
+
+use host_fit::data::import::Source;
+use host_fit::data::{DataSet, Record};
+use host_fit::excitation::Excitation;
+use host_fit::output::write_atomic;
+use serde_json::{Value, json};
+use workbench::Refusal;
+
+use crate::commands::words::role_name;
+
+/// A data set, and what its commands can tell at all.
+pub(super) struct Data {
+    /// As the user named it, for commands.
+    pub(super) path: PathBuf,
+    pub(super) set: DataSet,
+    remarks: Vec<String>,
+}
+
+impl Data {
+    pub(super) fn load(path: &Path) -> anyhow::Result<Self> {
+        let set = DataSet::load(path)?;
+        let shortest = set.records.iter().map(Record::len).min();
+        let longest_lag = 500.min(shortest.unwrap_or(4) / 4);
+        Ok(Self {
+            path: path.to_owned(),
+            remarks: Excitation::of(&set, longest_lag).remarks,
+            set,
+        })
+    }
+
+    pub(super) fn state(&self) -> Value {
+        let record =
+            |r: &Record| json!({"name": r.name, "use": role_name(r.role), "samples": r.len()});
+        json!({
+            "title": self.set.title.as_deref().unwrap_or("data set"),
+            "path": self.path.display().to_string(),
+            "hash": self.set.hash,
+            "period": self.set.sample_period_s,
+            "records": self.set.records.iter().map(record).collect::<Vec<_>>(),
+            "remarks": self.remarks,
+        })
+    }
+}
+
+/// The files that were uploaded into a project.
+pub(super) struct Uploads(PathBuf);
+
+impl Uploads {
+    pub(super) fn of(project: &Path) -> Self {
+        Self(project.join("uploads"))
+    }
+
+    /// Names of the files, sorted.
+    pub(super) fn names(&self) -> Vec<String> {
+        super::names_in(&self.0, "")
+    }
+
+    /// Where a file lies that was uploaded.
+    pub(super) fn path(&self, name: &str) -> Result<PathBuf, Refusal> {
+        match self.names().iter().any(|known| known == name) {
+            true => Ok(self.0.join(name)),
+            false => Err(Refusal(format!(
+                "no file `{name}` was uploaded; drop it first"
+            ))),
+        }
+    }
+
+    /// Keeps a file and tells what is in it; one that cannot be read is not kept.
+    pub(super) fn keep(&self, name: &str, bytes: &[u8]) -> Result<Value, Refusal> {
+        let plain = |c: char| c.is_alphanumeric() || "-_. +()".contains(c);
+        if name.is_empty() || name.len() > 120 || name.starts_with('.') || !name.chars().all(plain)
+        {
+            let why = "a file's name may have letters, digits, spaces and -_.+(); rename it";
+            return Err(Refusal(why.to_owned()));
+        }
+        std::fs::create_dir_all(&self.0)?;
+        let path = self.0.join(name);
+        write_atomic(&path, |out| out.write_all(bytes))?;
+        let told = self.inspect(name);
+        if told.is_err() {
+            std::fs::remove_file(path)?;
+        }
+        told
+    }
+
+    /// The variables of a file.
+    pub(super) fn inspect(&self, name: &str) -> Result<Value, Refusal> {
+        let source = Source::open(&self.path(name)?)?;
+        let variables = source.variables.iter();
+        let told =
+            variables.map(|v| json!({"name": v.name, "unit": v.unit, "samples": v.values.len()}));
+        Ok(json!({
+            "name": name,
+            "dialect": source.dialect,
+            "variables": told.collect::<Vec<_>>(),
+            "skipped": source.skipped,
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_upload_is_kept_where_it_belongs_or_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let uploads = Uploads::of(folder.path());
+        let csv = b"t,u,y\n0.0,0,0.1\n0.001,1,0.2\n";
+        for name in [
+            "../x.csv",
+            "/etc/x.csv",
+            "a/b.csv",
+            "a\\b.csv",
+            "..",
+            ".x.csv",
+            "",
+            "x\0.csv",
+        ] {
+            assert!(uploads.keep(name, csv).is_err(), "{name:?}");
+            assert!(uploads.path(name).is_err(), "{name:?}");
+        }
+        let told = uploads.keep("Messung 1.csv", csv).unwrap();
+        assert_eq!(told["variables"][1]["name"], "u");
+        assert!(uploads.keep("notes.csv", b"no table").is_err());
+        assert_eq!(uploads.names(), ["Messung 1.csv"]);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}

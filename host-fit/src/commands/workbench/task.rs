@@ -1,0 +1,323 @@
+//! A piece of work: what was asked for, as the command that it is, and what it leaves in the project.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use host_fit::model::Model;
+use host_fit::output::write_atomic;
+use host_fit::search::Snapshot;
+use host_fit::steps::{self, Finding, Onlooker, Terms};
+use serde_json::{Value, json};
+use workbench::{Refusal, Work};
+
+use super::bench::{Made, ModelBench, lock};
+use super::data::Data;
+use super::request::{Command, Line, Request};
+use crate::commands::words::Words;
+use crate::commands::{design, diagnose, discover, drawings, extend, identify, import, page};
+
+/// A piece of work that can be begun.
+pub(super) struct Task {
+    pub(super) line: Line,
+    /// The model that it starts from; 0 where it starts from none.
+    from: u32,
+    asked: Asked,
+}
+
+enum Asked {
+    Identify(Box<identify::Args>),
+    Diagnose(diagnose::Args),
+    Discover(discover::Args),
+    Extend(extend::Args),
+    Design(design::Args),
+    Import(Box<import::Args>),
+}
+
+/// The page, listening to a step.
+struct Page<'a>(&'a Work);
+
+impl Onlooker for Page<'_> {
+    fn begins(&self, what: &str) {
+        self.0.now(what);
+    }
+    fn now(&self, what: &str) {
+        self.0.now(what);
+    }
+    fn sees(&self, snapshot: &Snapshot) {
+        self.0.best(snapshot.evaluations, snapshot.best);
+    }
+    fn hears(&self, warning: &str) {
+        self.0.warning(warning);
+    }
+    fn interrupt(&self) -> &AtomicBool {
+        self.0.cancel()
+    }
+}
+
+#[allow(clippy::needless_pass_by_value)]
+fn told(error: anyhow::Error) -> Refusal {
+    Refusal(format!("{error:#}"))
+}
+
+impl ModelBench {
+    /// Reads a request: whether it can be begun, and as which command.
+    pub(super) fn prepare(&self, request: &Value) -> Result<Task, Refusal> {
+        let request = Request::read(request).map_err(Refusal)?;
+        let command = request.command;
+        let from = request.model.unwrap_or_default();
+        let files: Vec<PathBuf> = match command {
+            Command::Identify => vec![self.data()?.path.clone()],
+            Command::Design => vec![self.path(from)?],
+            Command::Diagnose | Command::Discover | Command::Extend => {
+                vec![self.path(from)?, self.data()?.path.clone()]
+            }
+            Command::Import => {
+                let each = request.files.iter().map(|name| self.uploads.path(name));
+                each.collect::<Result<_, _>>()?
+            }
+        };
+        let to = match command {
+            Command::Import => self.folder.join(super::IMPORTED),
+            _ => self.folder.join(lock(&self.project).next_file()),
+        };
+        let line = Line::new(command, &files, request.options());
+        let line = match command {
+            Command::Identify | Command::Extend | Command::Import => line.file("output", &to),
+            Command::Design => line.file("output", &to).file("csv", &loop_of(&to)),
+            Command::Discover => {
+                let report = self.beside("discovery", from, "html");
+                line.file("output", &to).file("report", &report)
+            }
+            Command::Diagnose => line
+                .file("report", &self.beside("diagnosis", from, "html"))
+                .file("experiment", &self.beside("experiment", from, "csv")),
+        };
+        let (line, asked) = match command {
+            Command::Identify => {
+                let asked = Box::new(line.parse()?);
+                (line, Asked::Identify(asked))
+            }
+            Command::Diagnose => {
+                // What the model has is not tried again.
+                let model = Model::load(&self.path(from)?)?;
+                let line = self.offer(line, |name| {
+                    model.effect_names().iter().all(|own| own != name)
+                });
+                let asked = line.parse()?;
+                (line, Asked::Diagnose(asked))
+            }
+            Command::Discover => {
+                let asked = line.parse()?;
+                (line, Asked::Discover(asked))
+            }
+            Command::Extend => {
+                let asked: extend::Args = line.parse()?;
+                let line = self.offer(line, |name| asked.effects().iter().any(|own| own == name));
+                let asked = line.parse()?;
+                (line, Asked::Extend(asked))
+            }
+            Command::Design => {
+                let asked = line.parse()?;
+                (line, Asked::Design(asked))
+            }
+            Command::Import => {
+                let asked = Box::new(line.parse()?);
+                (line, Asked::Import(asked))
+            }
+        };
+        Ok(Task { line, from, asked })
+    }
+
+    /// Adds the user's own effects with these names to a command.
+    fn offer(&self, line: Line, wanted: impl Fn(&str) -> bool) -> Line {
+        let files = self.own.files().into_iter();
+        let files = files.filter(|file| {
+            let name = file.file_stem().unwrap_or_default();
+            wanted(&name.to_string_lossy())
+        });
+        files.fold(line, |line, file| line.file("effect-file", &file))
+    }
+}
+
+/// The CSV of the loop, beside the model that has the law.
+fn loop_of(model: &Path) -> PathBuf {
+    let stem = model.file_stem().unwrap_or_default().to_string_lossy();
+    model.with_file_name(format!("{}.csv", stem.replace("model", "loop")))
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Refusal> {
+    Ok(write_atomic(path, |out| out.write_all(text.as_bytes()))?)
+}
+
+impl Task {
+    /// Does it.
+    pub(super) fn run(&self, bench: &ModelBench, work: &Work) -> Result<(), Refusal> {
+        let page = Page(work);
+        match &self.asked {
+            Asked::Identify(args) => {
+                let request = args.request().map_err(told)?;
+                let found = steps::identify(&bench.data()?.set, &request, &page)?;
+                found.remarks.iter().for_each(|remark| work.warning(remark));
+                self.made(bench, &found.model, "identified", None)?;
+            }
+            Asked::Extend(args) => {
+                let mut model = self.model(bench)?;
+                args.define(&mut model).map_err(told)?;
+                let found = steps::extend(&model, &bench.data()?.set, args.effects(), &page)?;
+                let step = format!("+ {}", args.effects().join(" + "));
+                self.made(bench, &found.model, &step, Some(self.from))?;
+            }
+            Asked::Diagnose(args) => {
+                let (mut model, data) = (self.model(bench)?, bench.data()?);
+                args.define(&mut model).map_err(told)?;
+                let found = steps::diagnose(&model, &data.set, &args.options(), &page)?;
+                self.diagnosed(bench, &data, &model, &found, args)?;
+            }
+            Asked::Discover(args) => {
+                let (mut model, data) = (self.model(bench)?, bench.data()?);
+                let options = args.prepare(&mut model).map_err(told)?;
+                let found = steps::discover(&model, &data.set, &options, &page)?;
+                self.discovered(bench, &data, &model, &found)?;
+            }
+            Asked::Design(args) => {
+                page.begins("designing, and trying the law in the loop");
+                let tried = args.tried(&self.model(bench)?).map_err(told)?;
+                let id = self.made(
+                    bench,
+                    &tried.design.model,
+                    &args.goal_words(),
+                    Some(self.from),
+                )?;
+                let words = tried.words();
+                let mut picture = None;
+                if let Some(proof) = &tried.proof {
+                    let drawn = drawings::proof_picture(proof, args.tracks());
+                    write(&args.picture(), &drawn)?;
+                    write(&bench.beside("loop", id, "csv"), &proof.trace.to_csv())?;
+                    picture = Some(drawn);
+                }
+                let kept = json!({"words": words, "picture": picture});
+                write(&bench.beside("law", id, "json"), &kept.to_string())?;
+            }
+            Asked::Import(args) => {
+                page.begins("reading the files");
+                let found = args.import().map_err(told)?;
+                for file in &found.files {
+                    let remarks = file.remarks.iter();
+                    remarks.for_each(|remark| work.warning(&format!("{}: {remark}", file.name)));
+                }
+                bench.take(&found, &self.line.text())?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The model that it starts from.
+    fn model(&self, bench: &ModelBench) -> Result<Model, Refusal> {
+        Ok(bench.compared(self.from)?.model.clone())
+    }
+
+    /// Keeps the model that was made.
+    fn made(
+        &self,
+        bench: &ModelBench,
+        model: &Model,
+        step: &str,
+        from: Option<u32>,
+    ) -> Result<u32, Refusal> {
+        bench.keep(&Made {
+            model,
+            from,
+            step: step.to_owned(),
+            command: self.line.text(),
+        })
+    }
+
+    fn diagnosed(
+        &self,
+        bench: &ModelBench,
+        data: &Data,
+        given: &Model,
+        found: &Finding,
+        args: &diagnose::Args,
+    ) -> Result<(), Refusal> {
+        let report = page::finding(
+            given,
+            &data.set,
+            found,
+            args.options().seed,
+            &self.line.text(),
+        );
+        write(&bench.beside("diagnosis", self.from, "html"), &report)?;
+        let mut kept = serde_json::to_value(found)?;
+        let separation = found.diagnosis.separation.as_ref();
+        if let Some(separation) = separation {
+            let path = bench.beside("experiment", self.from, "csv");
+            separation.experiment.write_csv(&path)?;
+        }
+        if let Some(kept) = kept.as_object_mut() {
+            kept.insert("headline".to_owned(), found.headline.clone().into());
+            kept.insert("meaning".to_owned(), found.meaning.clone().into());
+            let picture = page::ranking_picture(&found.diagnosis);
+            kept.insert("picture".to_owned(), picture.into());
+            let experiment = separation.map(drawings::experiment_picture);
+            kept.insert("experiment_picture".to_owned(), experiment.into());
+        }
+        write(
+            &bench.beside("diagnosis", self.from, "json"),
+            &kept.to_string(),
+        )?;
+        Ok(lock(&bench.project).note(&self.line.text())?)
+    }
+
+    fn discovered(
+        &self,
+        bench: &ModelBench,
+        data: &Data,
+        given: &Model,
+        found: &Terms,
+    ) -> Result<(), Refusal> {
+        let terms = &found.discovery.terms;
+        let line = match terms.first() {
+            Some(first) => self
+                .line
+                .clone()
+                .file("effect-out", &bench.own.file(&first.effect)),
+            None => self.line.clone(),
+        };
+        let report = page::discovery(given, &data.set, found, &line.text());
+        write(&bench.beside("discovery", self.from, "html"), &report)?;
+        let told: Vec<Value> = terms
+            .iter()
+            .map(|term| {
+                json!({
+                    "effect": term.effect,
+                    "title": format!("{} by {}", term.changes, term.coordinate),
+                    "formula": term.formula,
+                    "is_formula": term.is_formula,
+                    "picture": page::term_picture(term),
+                    "file": term.file,
+                })
+            })
+            .collect();
+        let kept = json!({"headline": found.headline, "meaning": found.meaning, "terms": told});
+        write(
+            &bench.beside("discovery", self.from, "json"),
+            &kept.to_string(),
+        )?;
+        if terms.is_empty() {
+            return Ok(lock(&bench.project).note(&line.text())?);
+        }
+        for term in terms {
+            bench.own.keep(&term.file)?;
+        }
+        let names: Vec<&str> = terms.iter().map(|term| term.effect.as_str()).collect();
+        bench.keep(&Made {
+            model: &found.model,
+            from: Some(self.from),
+            step: format!("+ {}", names.join(" + ")),
+            command: line.text(),
+        })?;
+        Ok(())
+    }
+}

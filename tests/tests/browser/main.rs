@@ -1,0 +1,156 @@
+//! Report and workbench in a real browser. They need chromium and the packages of `host-fit/web`, so they run where those are:
+//! `cargo xtask browser`, which leaves pictures in `target/browser`.
+
+mod bench;
+mod files;
+mod report;
+mod speed;
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Instant;
+
+use scenarios::browser::{Browser, Page};
+use scenarios::program;
+use serde_json::Value;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Runs the program on files and options.
+#[track_caller]
+fn run(arguments: &[&dyn AsRef<std::ffi::OsStr>]) {
+    let output = Command::new(program())
+        .args(arguments.iter().map(|a| a.as_ref()))
+        .output()
+        .expect("the program starts");
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+}
+
+/// Evaluates an expression on a page.
+#[track_caller]
+fn act(b: &mut Browser, page: &Page, expression: &str) -> Value {
+    b.eval(page, expression).expect("an expression of the test")
+}
+
+/// Waits until an expression is true.
+#[track_caller]
+fn until(b: &mut Browser, page: &Page, seconds: u64, expression: &str) {
+    if let Err(error) = b.wait(page, expression, seconds) {
+        let said = b.eval(
+            page,
+            "document.getElementById('message')?.textContent ?? ''",
+        );
+        let _ = b.screenshot(page, &picture("failed.png"));
+        panic!("{error}; the page says {said:?}");
+    }
+}
+
+/// Takes a picture: artefacts of CI, to be looked at.
+#[track_caller]
+fn shoot(b: &mut Browser, page: &Page, name: &str) {
+    b.screenshot(page, &picture(name)).expect("a picture");
+}
+
+fn picture(name: &str) -> PathBuf {
+    let folder = program()
+        .parent()
+        .expect("target/release")
+        .join("../browser");
+    folder.join(name)
+}
+
+/// WCAG 2.1 A and AA, as far as a machine can tell.
+#[track_caller]
+fn accessible(b: &mut Browser, page: &Page) {
+    let path = root().join("host-fit/web/node_modules/axe-core/axe.min.js");
+    let axe = std::fs::read_to_string(path).expect("axe-core: run `cargo xtask pages`");
+    act(b, page, &format!("{axe};1"));
+    let found = act(
+        b,
+        page,
+        "axe.run(document, {runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa']}).then(r => r.violations.map(v => v.id + ': ' + v.nodes.length + ' ' + v.nodes[0].html.slice(0, 160) + ' ' + v.nodes[0].failureSummary))",
+    );
+    assert_eq!(found, Value::Array(Vec::new()), "{found:#}");
+}
+
+/// No page is wider than a phone.
+#[track_caller]
+fn fits(b: &mut Browser, page: &Page, width: f64) {
+    let wide = act(b, page, "document.documentElement.scrollWidth");
+    assert!(wide.as_f64() <= Some(width), "{wide} px wide on {width} px");
+}
+
+/// The workbench, serving; ends with this value, as abruptly as a power cut.
+struct Served {
+    child: Child,
+    address: String,
+    /// From the start to the address, s.
+    ready_s: f64,
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn serve(project: &Path, rest: &[&dyn AsRef<std::ffi::OsStr>]) -> Served {
+    let started = Instant::now();
+    let mut child = Command::new(program())
+        .args(["workbench", "--no-open", "--json", "--project"])
+        .arg(project)
+        .args(rest.iter().map(|a| a.as_ref()))
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut out = BufReader::new(child.stdout.take().expect("its output"));
+    let mut text = String::new();
+    while !text.trim_end().ends_with('}') {
+        assert!(out.read_line(&mut text).expect("a line") > 0, "{text}");
+    }
+    let told: Value = serde_json::from_str(&text).expect("one JSON document");
+    let address = told["address"].as_str().expect("an address").to_owned();
+    assert!(address.starts_with("http://127.0.0.1:"));
+    Served {
+        child,
+        address,
+        ready_s: started.elapsed().as_secs_f64(),
+    }
+}
+
+/// Nothing runs, and there are so many models.
+fn idle_with(models: usize) -> String {
+    format!(
+        "document.getElementById('work').hidden && document.querySelectorAll('.model').length === {models}"
+    )
+}
+
+/// A short identification, or one that never ends.
+fn identify(evaluations: u32) -> String {
+    format!(
+        "(() => {{ const f = document.getElementById('identify').elements; f.delay.value = 'fixed'; f.n1.value = 2; f.n2.value = 2; f['max-lag'].value = 150; f.evaluations.value = {evaluations}; f.n1.form.requestSubmit(); }})()"
+    )
+}
+
+/// Says how long a step took: the list of the issue.
+struct Steps(Instant);
+
+impl Steps {
+    fn new(test: &str) -> Self {
+        eprintln!("{test}");
+        Self(Instant::now())
+    }
+
+    fn done(&mut self, what: &str) {
+        eprintln!("  {:6.1} s  {what}", self.0.elapsed().as_secs_f64());
+        self.0 = Instant::now();
+    }
+}

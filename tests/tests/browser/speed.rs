@@ -1,0 +1,141 @@
+//! How fast pages are: the page's own times, on records as long as they get.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::time::Instant;
+
+use scenarios::browser::Browser;
+
+use super::{act, root, run, serve, until};
+
+/// A record of a flow that lags behind the valve, with noise that repeats.
+fn record(samples: usize, period: f64) -> String {
+    let mut csv = "t,u,y\n".to_owned();
+    let (mut y, mut noise) = (0.0, 1_u32);
+    for k in 0..samples {
+        let u = f64::from(u8::from(k / 250 % 3 == 1));
+        y += 0.01 * (u - y);
+        noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let scatter = 0.02 * (f64::from(noise) / f64::from(u32::MAX) - 0.5);
+        let _ = writeln!(csv, "{:.3},{u},{:.5}", k as f64 * period, y + scatter);
+    }
+    csv
+}
+
+fn set(folder: &Path, records: usize, samples: usize) {
+    std::fs::create_dir_all(folder).expect("a folder");
+    let mut manifest = "sample_period_s = 0.001\n".to_owned();
+    for r in 0..records {
+        let role = if r == 0 { "identify" } else { "validate" };
+        let _ = writeln!(
+            manifest,
+            "[[record]]\nname = \"r{r}\"\nfile = \"r{r}.csv\"\nuse = \"{role}\""
+        );
+        std::fs::write(folder.join(format!("r{r}.csv")), record(samples, 0.001)).expect("a record");
+    }
+    std::fs::write(folder.join("dataset.toml"), manifest).expect("a manifest");
+}
+
+#[test]
+#[ignore = "needs chromium: cargo xtask browser"]
+fn long_records_open_and_pan_smoothly() {
+    eprintln!("speed");
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut b = Browser::start().expect("chromium");
+
+    // Ten minutes at 1 kHz in the workbench.
+    let long = folder.path().join("long");
+    set(&long, 1, 600_000);
+    let served = serve(&folder.path().join("project"), &[&long]);
+    let started = Instant::now();
+    let page = b
+        .open(&served.address, (1100, 1000), false)
+        .expect("a page");
+    until(
+        &mut b,
+        &page,
+        60,
+        "document.querySelectorAll('.record canvas').length > 0",
+    );
+    let opened = started.elapsed().as_secs_f64();
+    eprintln!(
+        "  600 000 samples: server ready after {:.2} s, drawn {opened:.2} s after the page was asked for",
+        served.ready_s
+    );
+
+    // Eight records of 10 000 samples with three models.
+    let data = root().join("data/hidden-ramp");
+    let eight = folder.path().join("eight");
+    set(&eight, 8, 10_000);
+    let project = folder.path().join("models");
+    for (n, model) in ["table-2-state-dependent", "table-2-fixed", "table-4-fixed"]
+        .into_iter()
+        .enumerate()
+    {
+        let model = root().join(format!("data/paper/{model}.toml"));
+        let served = serve(&project, &[&eight, &"--model", &model]);
+        drop(served);
+        assert_eq!(
+            std::fs::read_dir(&project)
+                .expect("the project")
+                .filter(|f| f
+                    .as_ref()
+                    .is_ok_and(|f| f.file_name().to_string_lossy().starts_with("model-")))
+                .count(),
+            n + 1
+        );
+    }
+    let served = serve(&project, &[&eight]);
+    let page = b
+        .open(
+            &format!("{}#beside=1,2", served.address),
+            (1100, 1000),
+            false,
+        )
+        .expect("a page");
+    until(
+        &mut b,
+        &page,
+        60,
+        "hostFit.groups[0].payload.runs.length === 3",
+    );
+    act(
+        &mut b,
+        &page,
+        "document.querySelectorAll('.record')[3].scrollIntoView()",
+    );
+    until(
+        &mut b,
+        &page,
+        20,
+        "document.querySelectorAll('.record canvas').length >= 4",
+    );
+    let frames = act(
+        &mut b,
+        &page,
+        "(async () => { const v = hostFit.groups[0].view; const times = []; let last = performance.now(); for (let i = 0; i < 120; i++) { v.show(i * 0.03, 5 + i * 0.03); await new Promise(r => requestAnimationFrame(r)); const now = performance.now(); times.push(now - last); last = now; } times.sort((a, b) => a - b); return [times[60], times[114]]; })()",
+    );
+    let (median, slow) = (
+        frames[0].as_f64().expect("ms"),
+        frames[1].as_f64().expect("ms"),
+    );
+    eprintln!(
+        "  8 × 10 000 × 3: a frame takes {median:.1} ms in the middle, {slow:.1} ms at the slowest twentieth"
+    );
+    assert!(median < 33.4, "{median} ms a frame");
+
+    // A report of a comparison, opened from disk.
+    let page_file = folder.path().join("report.html");
+    run(&[
+        &"compare",
+        &root().join("data/paper/table-2-state-dependent.toml"),
+        &data,
+        &"--report",
+        &page_file,
+    ]);
+    let size = std::fs::metadata(&page_file).expect("the report").len();
+    eprintln!("  a report of 8 records weighs {:.2} MB", size as f64 / 1e6);
+    assert!(size < 5_000_000);
+    assert!(opened < 2.0, "600 000 samples took {opened} s");
+    assert_eq!(b.faults(), Vec::<String>::new());
+}

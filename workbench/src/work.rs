@@ -23,38 +23,32 @@ struct Shared {
 struct Running {
     name: String,
     now: String,
-    /// The best so far over the evaluations, of one search after the other.
-    searches: Vec<Vec<(usize, f64)>>,
+    /// The best so far over the evaluations of the search that runs.
+    best: Vec<(usize, f64)>,
 }
 
 impl Running {
-    /// Notes the best of a search; fewer evaluations than before are another search's. Its number.
-    fn note(&mut self, evaluations: usize, best: f64) -> usize {
+    /// Notes the best of a search; fewer evaluations than before are another search's.
+    fn note(&mut self, evaluations: usize, best: f64) {
         const KEPT: usize = 1000;
-        let last = self.searches.last().and_then(|search| search.last());
-        if last.is_none_or(|(before, _)| evaluations < *before) {
-            self.searches.push(Vec::new());
+        if self.best.last().is_some_and(|last| evaluations < last.0) {
+            self.best.clear();
         }
-        let number = self.searches.len().saturating_sub(1);
-        if let Some(search) = self.searches.last_mut() {
-            // Of a level stretch its two ends are enough.
-            let level = |(_, value): &(usize, f64)| *value == best;
-            if let [.., before, last] = search.as_slice()
-                && level(before)
-                && level(last)
-            {
-                search.pop();
-            }
-            search.push((evaluations, best));
-            if search.len() > KEPT {
-                let mut odd = false;
-                search.retain(|_| {
-                    odd = !odd;
-                    odd
-                });
-            }
+        // Of a level stretch its two ends are enough.
+        if let [.., before, last] = self.best.as_slice()
+            && before.1 == best
+            && last.1 == best
+        {
+            self.best.pop();
         }
-        number
+        self.best.push((evaluations, best));
+        if self.best.len() > KEPT {
+            let mut odd = false;
+            self.best.retain(|_| {
+                odd = !odd;
+                odd
+            });
+        }
     }
 }
 
@@ -94,13 +88,10 @@ impl Work {
         if !best.is_finite() {
             return;
         }
-        let number = match lock(&self.shared.running).as_mut() {
-            Some(running) => running.note(evaluations, best),
-            None => return,
-        };
-        self.tell(
-            &json!({"kind": "best", "search": number, "evaluations": evaluations, "best": best}),
-        );
+        if let Some(running) = lock(&self.shared.running).as_mut() {
+            running.note(evaluations, best);
+        }
+        self.tell(&json!({"kind": "best", "evaluations": evaluations, "best": best}));
     }
 
     /// Something to know.
@@ -121,7 +112,7 @@ impl Work {
     pub(crate) fn state(&self) -> Value {
         match lock(&self.shared.running).as_ref() {
             None => Value::Null,
-            Some(r) => json!({"name": r.name, "now": r.now, "searches": r.searches}),
+            Some(r) => json!({"name": r.name, "now": r.now, "best": r.best}),
         }
     }
 
@@ -134,7 +125,7 @@ impl Work {
         *running = Some(Running {
             name: name.to_owned(),
             now: String::new(),
-            searches: Vec::new(),
+            best: Vec::new(),
         });
         drop(running);
         self.shared.cancel.store(false, Ordering::Relaxed);
@@ -160,12 +151,14 @@ mod tests {
     fn a_second_search_has_a_curve_of_its_own() {
         let work = Work::new();
         assert!(work.begin("identifying"));
-        for (evaluations, best) in [(1, 3.0), (2, 2.0), (5, 2.0), (9, 2.0), (1, 4.0), (3, 1.0)] {
+        for (evaluations, best) in [(1, 3.0), (2, 2.0), (5, 2.0), (9, 2.0)] {
             work.best(evaluations, best);
         }
-        work.best(4, f64::INFINITY);
-        let searches = json!([[[1, 3.0], [2, 2.0], [9, 2.0]], [[1, 4.0], [3, 1.0]]]);
-        assert_eq!(work.state()["searches"], searches);
+        assert_eq!(work.state()["best"], json!([[1, 3.0], [2, 2.0], [9, 2.0]]));
+        for (evaluations, best) in [(1, 4.0), (3, 1.0), (4, f64::INFINITY)] {
+            work.best(evaluations, best);
+        }
+        assert_eq!(work.state()["best"], json!([[1, 4.0], [3, 1.0]]));
         work.end(None);
         assert!(work.state().is_null());
     }
@@ -178,7 +171,7 @@ mod tests {
             work.best(n, 1.0 / (n as f64 + 1.0));
         }
         let state = work.state();
-        let kept = state["searches"][0].as_array().unwrap();
+        let kept = state["best"].as_array().unwrap();
         assert!(kept.len() <= 1000 && kept.last().unwrap()[0] == 49_999);
     }
 }

@@ -146,9 +146,10 @@ function drawDiagnosis(s) {
     Object.entries(c.parameters).map(([name, p]) => `${name} ${significant(p.value, 3)} ${p.unit === "-" ? "" : p.unit} (${significant(p.low, 3)} to ${significant(p.high, 3)})`).join("; ") +
     (c.confounded_with.length ? `; or ${c.confounded_with.join(", ")}` : "");
   const has = s.model?.effects ?? [];
+  const missing = found.missing.filter((effect) => !has.includes(effect));
   const row = (/** @type {Candidate} */ c) => [
     c.effect,
-    `${significant(c.error_reduction_percent, 3)} %`,
+    `${c.error_reduction_percent.toFixed(1).replace("-", "−")} %`,
     !c.refitted ? "–" : c.p_value < 0.001 ? "< 0.001" : significant(c.p_value, 2),
     c.significant ? "yes" : "no",
     parameters(c),
@@ -156,6 +157,7 @@ function drawDiagnosis(s) {
   ];
   place("missing").replaceChildren(
     verdict(found.headline, found.meaning),
+    ...(missing.length ? [el("p", { class: "actions" }, does(s, `Add what is missing: ${missing.join(", ")}`, { command: "extend", model, options: { effect: missing } }, { class: "primary", id: "add-missing" }))] : []),
     ...(found.ranking.length ? [
       picture(found.picture),
       table(["effect", "error falls", "p", "counts", "parameters (95 % interval)", ""], found.ranking.map(row), (i) => i === 1 || i === 2),
@@ -207,7 +209,7 @@ function drawWork(s) {
   if (!s.work) return;
   place("work-name").textContent = s.work.name;
   place("work-now").textContent = s.work.now;
-  progress(s.work.searches);
+  progress(s.work.best);
 }
 
 /** Brings the curves of the current model, and of those beside it. */
@@ -247,9 +249,12 @@ function listen() {
       state.work.now = event.words;
       place("work-now").textContent = event.words;
     } else if (event.kind === "best" && state?.work) {
-      (state.work.searches[event.search] ??= []).push([event.evaluations, event.best]);
+      const { best } = state.work;
+      // Fewer evaluations than before are another search's.
+      if (event.evaluations < (best.at(-1)?.[0] ?? 0)) best.length = 0;
+      best.push([event.evaluations, event.best]);
       place("work-now").textContent = `${event.evaluations} evaluations, best ${significant(event.best)}`;
-      progress(state.work.searches);
+      progress(best);
     } else if (event.kind === "warning") {
       complain(event.words);
     } else if (event.kind === "ends") {

@@ -145,7 +145,7 @@ fn model(folder: &Path) -> std::path::PathBuf {
         &data,
         &"-o",
         &model,
-        &"--delay=fixed",
+        &"--delay=state-dependent",
         &"--n1=2",
         &"--n2=2",
         &"--max-lag=150",

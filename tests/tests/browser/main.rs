@@ -136,7 +136,7 @@ fn idle_with(models: usize) -> String {
 /// A short identification, or one that never ends.
 fn identify(evaluations: u32) -> String {
     format!(
-        "(() => {{ const f = document.getElementById('identify').elements; f.delay.value = 'fixed'; f.n1.value = 2; f.n2.value = 2; f['max-lag'].value = 150; f.evaluations.value = {evaluations}; f.n1.form.requestSubmit(); }})()"
+        "(() => {{ const f = document.getElementById('identify').elements; f.delay.value = 'state-dependent'; f.n1.value = 2; f.n2.value = 2; f['max-lag'].value = 150; f.evaluations.value = {evaluations}; f.n1.form.requestSubmit(); }})()"
     )
 }
 

@@ -17,7 +17,7 @@
  * @property {Diagnosis | null} diagnosis
  * @property {{headline: string, meaning: string, terms: Term[]} | null} discovery
  * @property {{words: string, picture: string | null} | null} law
- * @property {{name: string, now: string, searches: [number, number][][]} | null} work
+ * @property {{name: string, now: string, best: [number, number][]} | null} work
  */
 
 import { el, place } from "./dom.js";

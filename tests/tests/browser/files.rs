@@ -83,19 +83,14 @@ fn recordings_are_dropped_mapped_and_identified() {
             &format!("document.getElementById('uploads').textContent.includes('{name}')"),
         );
     }
-    // A command in volts without a threshold is no on/off command: one clear message.
-    let choose = "(() => { const f = document.getElementById('mapping').elements; f.t.value = [...f.t.options].find(o => o.value.startsWith('Zeit')).value; f.u.value = [...f.u.options].find(o => o.value.startsWith('Ventil')).value; f.y.value = [...f.y.options].find(o => o.value.startsWith('Reibung')).value; document.querySelector('[name=validate][value=c]').checked = true; })()";
+    // A command in volts is no on/off command: that is said, with the remedy.
+    let choose = "(() => { const f = document.getElementById('mapping').elements; f.t.value = 'Zeit'; f.u.value = 'Ventil'; f.y.value = 'Reibung'; document.querySelector('[name=validate][value=c]').checked = true; f.t.form.requestSubmit(); })()";
     act(&mut b, &page, choose);
-    act(
-        &mut b,
-        &page,
-        "document.getElementById('mapping').requestSubmit()",
-    );
     until(
         &mut b,
         &page,
         20,
-        "document.getElementById('work').hidden && /threshold/.test(document.getElementById('message').textContent)",
+        "document.querySelectorAll('.record').length === 3 && document.getElementById('message').textContent.includes('--u-threshold 2.5')",
     );
     shoot(&mut b, &page, "workbench-import.png");
     accessible(&mut b, &page);
@@ -108,13 +103,7 @@ fn recordings_are_dropped_mapped_and_identified() {
         &mut b,
         &page,
         20,
-        "document.querySelectorAll('.record').length === 3",
-    );
-    until(
-        &mut b,
-        &page,
-        20,
-        "document.getElementById('log').textContent.includes('host-fit import') && document.getElementById('log').textContent.includes('--u-threshold=2.5')",
+        "document.getElementById('work').hidden && document.getElementById('log').textContent.includes('--u-threshold=2.5') && hostFit.groups[0].charts[0].record.onOff",
     );
     steps.done("dropped and mapped");
     act(&mut b, &page, &identify(100));

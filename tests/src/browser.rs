@@ -145,6 +145,12 @@ impl Browser {
         for domain in ["Runtime.enable", "Log.enable", "Page.enable"] {
             self.on(&page, domain, &json!({}))?;
         }
+        // Time of the page's own thread: what others on the machine do does not count.
+        self.on(
+            &page,
+            "Performance.enable",
+            &json!({"timeDomain": "threadTicks"}),
+        )?;
         let size =
             json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false});
         self.on(&page, "Emulation.setDeviceMetricsOverride", &size)?;
@@ -171,6 +177,19 @@ impl Browser {
             bail!("{expression}: {}", thrown["exception"]["description"]);
         }
         Ok(found["result"]["value"].clone())
+    }
+
+    /// How long the page has worked so far, s of its own thread: script, style, layout, paint.
+    ///
+    /// # Errors
+    /// When the browser does not say.
+    pub fn worked(&mut self, page: &Page) -> Result<f64> {
+        let told = self.on(page, "Performance.getMetrics", &json!({}))?;
+        let metrics = told["metrics"].as_array().context("metrics")?;
+        let found = metrics.iter().find(|m| m["name"] == "TaskDuration");
+        found
+            .and_then(|m| m["value"].as_f64())
+            .context("the page's time")
     }
 
     /// Waits until an expression is true.

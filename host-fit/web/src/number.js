@@ -12,7 +12,10 @@ export function significant(value, digits = 4) {
 
 /** Tick labels with as many decimals as the step between them needs; never −0. @param {number[]} splits @param {number} step */
 export function ticks(splits, step) {
-  const decimals = Math.min(12, Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
+  let decimals = Math.min(12, Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
+  // A step of 2.5 or 0.25 has one digit more than its size says.
+  const shifted = step * 10 ** decimals;
+  if (Math.abs(shifted - Math.round(shifted)) > 1e-6 * shifted) decimals += 1;
   return splits.map((v) => {
     const exact = Math.abs(v) < step * 1e-6 ? 0 : v;
     const large = Math.abs(exact) >= 1e6 || decimals > 6;

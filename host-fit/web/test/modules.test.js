@@ -57,4 +57,6 @@ test("numbers have the digits that mean something", () => {
   assert.equal(significant(NaN), "–");
   assert.deepEqual(ticks([-0.2, -1.29e-5 * 1e-3, 0.2], 0.2), ["−0.2", "0.0", "0.2"]);
   assert.deepEqual(ticks([0, 50, 100], 50), ["0", "50", "100"]);
+  assert.deepEqual(ticks([0, 2.5, 5], 2.5), ["0.0", "2.5", "5.0"]);
+  assert.deepEqual(ticks([0, 0.25, 0.5], 0.25), ["0.00", "0.25", "0.50"]);
 });

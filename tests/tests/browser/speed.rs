@@ -110,19 +110,18 @@ fn long_records_open_and_pan_smoothly() {
         20,
         "document.querySelectorAll('.record canvas').length >= 4",
     );
+    let before = b.worked(&page).expect("its time");
     let frames = act(
         &mut b,
         &page,
-        "(async () => { const v = hostFit.groups[0].view; const times = []; let last = performance.now(); for (let i = 0; i < 120; i++) { v.show(i * 0.03, 5 + i * 0.03); await new Promise(r => requestAnimationFrame(r)); const now = performance.now(); times.push(now - last); last = now; } times.sort((a, b) => a - b); return [times[60], times[114]]; })()",
+        "(async () => { const v = hostFit.groups[0].view; const times = []; let last = performance.now(); for (let i = 0; i < 120; i++) { v.show(i * 0.03, 5 + i * 0.03); await new Promise(r => requestAnimationFrame(r)); const now = performance.now(); times.push(now - last); last = now; } return times.sort((a, b) => a - b)[60]; })()",
     );
-    let (median, slow) = (
-        frames[0].as_f64().expect("ms"),
-        frames[1].as_f64().expect("ms"),
-    );
+    let frame_ms = 1000.0 * (b.worked(&page).expect("its time") - before) / 120.0;
     eprintln!(
-        "  8 × 10 000 × 3: a frame takes {median:.1} ms in the middle, {slow:.1} ms at the slowest twentieth"
+        "  8 × 10 000 × 3, panned: {frame_ms:.1} ms of the page's thread in a frame; {:.1} ms by the clock, on this machine as busy as it is",
+        frames.as_f64().expect("ms")
     );
-    assert!(median < 33.4, "{median} ms a frame");
+    assert!(frame_ms < 33.3, "{frame_ms} ms");
 
     // A report of a comparison, opened from disk.
     let page_file = folder.path().join("report.html");

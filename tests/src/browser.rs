@@ -162,6 +162,14 @@ impl Browser {
         Ok(page)
     }
 
+    /// Closes a page.
+    ///
+    /// # Errors
+    /// When the browser does not.
+    pub fn close(&mut self, page: &Page) -> Result<()> {
+        self.on(page, "Page.close", &json!({})).map(|_| ())
+    }
+
     fn on(&mut self, page: &Page, method: &str, params: &Value) -> Result<Value> {
         self.call(Some(&page.session), method, params)
     }

@@ -113,6 +113,7 @@ fn recordings_are_dropped_mapped_and_identified() {
 
     // The project brings its data along.
     drop(served);
+    b.close(&page).expect("closed");
     b.faults();
     let served = serve(&project, &[]);
     let page = b.open(&served.address, SIZE, false).expect("a page");

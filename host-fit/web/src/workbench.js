@@ -22,8 +22,15 @@ const beside = new Set(/beside=([\d,]+)/.exec(location.hash)?.[1].split(",").map
 let group = null;
 let shown = "";
 
+/** Answers may come out of turn: the one that was asked for last counts. */
+let turn = 0;
+let wanted = "";
+
 async function refresh() {
-  state = await ask("/api/state");
+  const mine = ++turn;
+  const told = await ask("/api/state");
+  if (mine !== turn) return;
+  state = told;
   draw();
   await records();
 }
@@ -222,12 +229,14 @@ async function records() {
   const existing = state.models.map((m) => m.id);
   const models = [...[...beside].filter((id) => existing.includes(id) && id !== state?.current), ...(state.current ? [state.current] : [])].slice(-6);
   const key = JSON.stringify([models, state.data.hash]);
+  wanted = key;
   if (key === shown && group) {
     // The bars were drawn anew.
     group.rebind();
     return;
   }
   const payload = await ask(`/api/records?models=${models.join(",")}`);
+  if (key !== wanted) return;
   shown = key;
   section("records", true);
   group?.destroy();

@@ -152,7 +152,7 @@ fn router<B: Bench>(bench: B, rules: Guard) -> Router {
 /// Runs what may take a while without holding up the other requests.
 async fn aside<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, Refusal> + Send + 'static,
-) -> Result<T, Response> {
+) -> Result<T, Refused> {
     match tokio::task::spawn_blocking(work).await {
         Ok(Ok(value)) => Ok(value),
         Ok(Err(why)) => Err(refused(StatusCode::UNPROCESSABLE_ENTITY, &why.0)),
@@ -164,15 +164,24 @@ async fn aside<T: Send + 'static>(
     }
 }
 
-fn refused(status: StatusCode, why: &str) -> Response {
-    (status, axum::Json(json!({"error": why}))).into_response()
+/// Why a request was not answered, as the page hears it.
+struct Refused(StatusCode, String);
+
+impl IntoResponse for Refused {
+    fn into_response(self) -> Response {
+        (self.0, axum::Json(json!({"error": self.1}))).into_response()
+    }
+}
+
+fn refused(status: StatusCode, why: &str) -> Refused {
+    Refused(status, why.to_owned())
 }
 
 fn json_text(text: String) -> Response {
     ([(CONTENT_TYPE, "application/json")], text).into_response()
 }
 
-fn read(body: &Bytes) -> Result<Value, Response> {
+fn read(body: &Bytes) -> Result<Value, Refused> {
     serde_json::from_slice(body)
         .map_err(|e| refused(StatusCode::BAD_REQUEST, &format!("no JSON document: {e}")))
 }
@@ -181,7 +190,7 @@ async fn page<B: Bench>(State(shared): At<B>) -> Response {
     axum::response::Html(shared.bench.page()).into_response()
 }
 
-async fn state<B: Bench>(State(shared): At<B>) -> Result<Response, Response> {
+async fn state<B: Bench>(State(shared): At<B>) -> Result<Response, Refused> {
     let state = aside({
         let shared = shared.clone();
         move || Ok(shared.bench.state())
@@ -197,7 +206,7 @@ async fn state<B: Bench>(State(shared): At<B>) -> Result<Response, Response> {
 async fn records<B: Bench>(
     State(shared): At<B>,
     RawQuery(query): RawQuery,
-) -> Result<Response, Response> {
+) -> Result<Response, Refused> {
     const MOST: usize = 6;
     let query = query.unwrap_or_default();
     let list = query
@@ -217,7 +226,7 @@ async fn records<B: Bench>(
         .map(json_text)
 }
 
-async fn select<B: Bench>(State(shared): At<B>, body: Bytes) -> Result<Response, Response> {
+async fn select<B: Bench>(State(shared): At<B>, body: Bytes) -> Result<Response, Refused> {
     let request = read(&body)?;
     let model = request.get("model").and_then(Value::as_u64);
     let model = model
@@ -229,7 +238,7 @@ async fn select<B: Bench>(State(shared): At<B>, body: Bytes) -> Result<Response,
     Ok(json_text("{}".to_owned()))
 }
 
-async fn ask<B: Bench>(State(shared): At<B>, body: Bytes) -> Result<Response, Response> {
+async fn ask<B: Bench>(State(shared): At<B>, body: Bytes) -> Result<Response, Refused> {
     let question = read(&body)?;
     let answer = aside(move || shared.bench.ask(&question)).await?;
     Ok(axum::Json(answer).into_response())
@@ -239,14 +248,14 @@ async fn upload<B: Bench>(
     State(shared): At<B>,
     Path(name): Path<String>,
     body: Bytes,
-) -> Result<Response, Response> {
+) -> Result<Response, Refused> {
     let work = shared.work.clone();
     let told = aside(move || shared.bench.upload(&name, &body)).await?;
     work.tell(&json!({"kind": "changed"}));
     Ok(axum::Json(told).into_response())
 }
 
-async fn run<B: Bench>(State(shared): At<B>, body: Bytes) -> Result<Response, Response> {
+async fn run<B: Bench>(State(shared): At<B>, body: Bytes) -> Result<Response, Refused> {
     let request = read(&body)?;
     let name = shared
         .bench
@@ -283,7 +292,7 @@ async fn cancel<B: Bench>(State(shared): At<B>) -> Response {
 async fn file<B: Bench>(
     State(shared): At<B>,
     Path((kind, model)): Path<(String, String)>,
-) -> Result<Response, Response> {
+) -> Result<Response, Refused> {
     let model = model
         .parse()
         .map_err(|_| refused(StatusCode::BAD_REQUEST, "a model's number is needed"))?;

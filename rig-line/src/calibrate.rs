@@ -131,7 +131,8 @@ pub fn calibrate(
         let mut answers = |open: bool| shortest(&mut play, plan, period, steady, open, swing);
         (answers(true)?, answers(false)?)
     };
-    let envelope = plan.envelope_sigmas * sixty_four(&off).max(sixty_four(&on)) * per_count.abs();
+    let slow_noise = sixty_four(&off).max(sixty_four(&on));
+    let envelope = plan.envelope_sigmas * slow_noise * per_count.abs();
     Ok(RigFile {
         format_version: VERSION,
         sample_period_s: period,
@@ -143,6 +144,7 @@ pub fn calibrate(
             upper_rail_counts: FULL_SCALE - RAIL,
             stuck_after_samples: (STUCK.0 * equal).max(STUCK.1),
             noise_counts: Some([rounded(noise_off, 2), rounded(noise_on, 2)]),
+            slow_noise_counts: Some(rounded(slow_noise, 2)),
         },
         valve: ValveEntry {
             shortest_on_s: rounded(shortest_on, 6),

@@ -36,6 +36,8 @@ struct Ahead {
     left: u64,
     /// Hosts that live.
     hosts: u32,
+    /// Samples so far.
+    samples: u64,
 }
 
 /// A host that lives; time waits for it, and goes on when it has died.
@@ -64,6 +66,7 @@ impl Pace {
         let Ok(ahead) = ahead.lock() else { return };
         if let Ok(mut ahead) = changed.wait_while(ahead, |a| a.hosts > 0 && a.left == 0) {
             ahead.left = ahead.left.saturating_sub(1);
+            ahead.samples += 1;
         }
     }
 }
@@ -72,6 +75,11 @@ impl Presence {
     /// The host was there.
     pub fn touch(&self) {
         self.0.change(|ahead| ahead.left = AHEAD);
+    }
+
+    /// Samples that the board has taken.
+    pub(crate) fn samples(&self) -> u64 {
+        self.0.0.0.lock().map_or(u64::MAX, |ahead| ahead.samples)
     }
 }
 

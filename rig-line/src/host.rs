@@ -17,8 +17,8 @@ use crate::port::Port;
 const ATTEMPTS: u32 = 8;
 /// How long an answer may take.
 const ANSWER: Duration = Duration::from_millis(250);
-/// An emulated board may be slower than a real one by this factor.
-const SLOW: u32 = 20;
+/// An emulated board that takes no sample is waited for so long: what it runs on may be busy.
+const EMULATED: Duration = Duration::from_secs(600);
 /// The board hears of its host after so long, and after so many samples.
 const ALIVE: Duration = Duration::from_millis(100);
 const ALIVE_SAMPLES: usize = 48;
@@ -253,9 +253,8 @@ impl Host {
 
     /// Sends a request until its answer has come; samples that come meanwhile wait.
     fn answer(&mut self, asked: &'static str, frame: &[u8]) -> Result<Answer, LineError> {
-        // An emulated board has time of its own, and what it runs on may be busy.
-        let attempts = if self.presence.is_some() { SLOW } else { 1 } * ATTEMPTS;
-        for _ in 0..attempts {
+        let patience = self.patience(ATTEMPTS * ANSWER);
+        while !patience.is_over(self.presence.as_ref()) {
             self.port.send(frame)?;
             self.touch();
             let until = Instant::now() + ANSWER;
@@ -275,17 +274,16 @@ impl Host {
     /// # Errors
     /// [`LineError::Gone`].
     pub fn next(&mut self, patience: Duration) -> Result<Event, LineError> {
-        let slow = if self.presence.is_some() { SLOW } else { 1 };
-        let until = Instant::now() + slow * patience;
+        let patience = self.patience(patience);
         loop {
             if let Some(streamed) = self.waiting.pop_front() {
                 return Ok(Event::Samples(streamed));
             }
-            let left = until.saturating_duration_since(Instant::now());
-            if left.is_zero() {
+            if patience.is_over(self.presence.as_ref()) {
                 return Ok(Event::Silence);
             }
-            self.read(left.min(ALIVE))?;
+            let left = patience.until.saturating_duration_since(Instant::now());
+            self.read(left.clamp(Duration::from_millis(1), ALIVE))?;
             if self.unheard >= ALIVE_SAMPLES || self.alive_at.elapsed() >= ALIVE {
                 self.alive()?;
             }
@@ -305,6 +303,15 @@ impl Host {
         self.port.send(request.frame().bytes())?;
         self.touch();
         Ok(())
+    }
+
+    fn patience(&self, time: Duration) -> Patience {
+        let samples = u64::try_from(time.as_millis()).unwrap_or(u64::MAX);
+        Patience {
+            until: Instant::now() + time,
+            sample: self.presence.as_ref().map(|p| p.samples() + samples),
+            at_last: Instant::now() + EMULATED.max(time),
+        }
     }
 
     fn touch(&mut self) {
@@ -347,6 +354,25 @@ impl Host {
             }
         }
         Ok(replies)
+    }
+}
+
+/// How long something is waited for. An emulated board has a time of its own, its
+/// samples: a millisecond each is near enough.
+struct Patience {
+    until: Instant,
+    sample: Option<u64>,
+    at_last: Instant,
+}
+
+impl Patience {
+    fn is_over(&self, presence: Option<&Presence>) -> bool {
+        let now = Instant::now();
+        let sampled = match (presence, self.sample) {
+            (Some(presence), Some(sample)) => presence.samples() >= sample,
+            _ => true,
+        };
+        now >= self.until && (sampled || now >= self.at_last)
     }
 }
 

@@ -48,6 +48,9 @@ pub struct SensorEntry {
     /// Standard deviation of the noise, counts: off, and under steady blowing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise_counts: Option<[f64; 2]>,
+    /// What is left of it in averages over 64 samples, counts, the larger of both: `design --rig` weighs it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slow_noise_counts: Option<f64>,
 }
 
 /// The valve.
@@ -139,6 +142,13 @@ impl RigFile {
                     .into(),
             );
         }
+        if let Some(noise) = sensor.slow_noise_counts
+            && !(noise.is_finite() && noise >= 0.0)
+        {
+            return Err(format!(
+                "key `sensor.slow_noise_counts`: {noise} is no size of noise; calibrate anew"
+            ));
+        }
         if let Some(channel) = &self.channel {
             line("channel", channel.zero_counts, channel.per_count)?;
             rails(
@@ -222,6 +232,7 @@ mod tests {
                 upper_rail_counts: 4087.0,
                 stuck_after_samples: 60,
                 noise_counts: Some([47.0, 46.5]),
+                slow_noise_counts: Some(23.5),
             },
             valve: ValveEntry {
                 shortest_on_s: 0.012,

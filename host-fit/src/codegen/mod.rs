@@ -21,7 +21,7 @@ mod items;
 mod law;
 mod pieces;
 
-use crate::model::{Added, Delay, Footprint, Model};
+use crate::model::{Added, Delay, Footprint, Law, Model};
 use model_core::control::tracking::Unusable;
 use model_core::effect::Spec;
 use model_core::self_test;
@@ -196,6 +196,13 @@ fn header(model: &Model) -> TokenStream {
             training
                 .validate_fit_percent
                 .map_or(String::new(), |fit| format!(", {fit:.2} % held out"))
+        ));
+    }
+    let lost = model.law.as_ref().map_or(&[][..], Law::lost);
+    if !lost.is_empty() {
+        line(format!(
+            "- the law LOSES ATTACHMENT with {}",
+            lost.join(", ")
         ));
     }
     line(format!(

@@ -7,6 +7,7 @@ use host_fit::design::{MaximiseRequest, Proof, TrackRequest};
 use host_fit::model::Model;
 use host_fit::output::write_atomic;
 use host_fit::steps::{self, Design, DesignRequest};
+use rig_line::RigFile;
 use serde::Serialize;
 
 use super::average::{not_negative, positive};
@@ -19,7 +20,8 @@ use crate::plants::Plants;
 ///
 /// `--goal track` holds the friction at `--target`; `--goal maximise` finds the pulses that give the most friction for
 /// the air. The law is then tried in the loop: on the model, on the nearest physical plant, on that plant with every
-/// effect of the catalogue, and with wrong delays and gains, more noise and lost readings.
+/// effect of the catalogue, and with wrong delays and gains, more noise and lost readings. A law that loses attachment in
+/// one of these trials is not written unless `--force` says so; then the file names the trials.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The model.
@@ -61,6 +63,10 @@ pub(crate) struct Args {
     /// Horizon over which free on/off commands are searched as well, in seconds (maximising).
     #[arg(long, value_name = "S", value_parser = positive)]
     horizon: Option<f64>,
+    /// The rig, as `record --calibrate` measured it: the law weighs its sensor's noise and keeps its valve's shortest
+    /// times.
+    #[arg(long, value_name = "rig.toml")]
+    rig: Option<PathBuf>,
     /// Picture of the loop; by default beside the model file, ending in `-loop.svg`.
     #[arg(long, value_name = "FILE.svg")]
     picture: Option<PathBuf>,
@@ -70,6 +76,9 @@ pub(crate) struct Args {
     /// Write a report page: the law, the loop, every trial.
     #[arg(long, value_name = "out.html")]
     report: Option<PathBuf>,
+    /// Write the law even if a trial loses attachment; the file says in which.
+    #[arg(long)]
+    force: bool,
     /// Seed of the plants' effects and noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -99,6 +108,21 @@ pub(super) struct Tried {
     pub(super) not_tried: Vec<String>,
 }
 
+impl Tried {
+    /// Why the law must not be written, unless it is to be by `force`.
+    fn refused(&self, force: bool) -> Option<String> {
+        let lost = self.design.law.lost();
+        (!force && !lost.is_empty()).then(|| {
+            format!(
+                "the law was not written: it loses attachment with {}. Choose a target that is further inside of what can \
+                 be held, or find out whether the rig has that and `extend` the model; --force writes the law as it is, and \
+                 the file says so",
+                lost.join(", ")
+            )
+        })
+    }
+}
+
 impl Words for Tried {
     fn words(&self) -> String {
         let notes = self.not_tried.iter().map(|why| format!("note: {why}"));
@@ -109,21 +133,27 @@ impl Words for Tried {
 }
 
 impl Args {
-    fn request(&self) -> DesignRequest {
+    fn request(&self, rig: Option<&RigFile>) -> DesignRequest {
+        let at_least =
+            |asked: f64, of: fn(&RigFile) -> f64| rig.map_or(asked, |rig| asked.max(of(rig)));
         match self.goal {
             Goal::Track => DesignRequest::Track(TrackRequest {
                 // Asked for before.
                 target: self.target.unwrap_or(f64::NAN),
-                min_on_s: self.min_on,
-                min_off_s: self.min_off,
+                min_on_s: at_least(self.min_on, |rig| rig.valve.shortest_on_s),
+                min_off_s: at_least(self.min_off, |rig| rig.valve.shortest_off_s),
+                slow_noise: rig.and_then(|rig| {
+                    let counts = rig.sensor.slow_noise_counts?;
+                    Some(counts * rig.sensor.per_count.abs())
+                }),
                 switches_per_s: self.max_switches,
                 air: self.max_air,
                 ramp_per_s: self.ramp,
                 least_air: self.least_air,
             }),
             Goal::Maximise => DesignRequest::Maximise(MaximiseRequest {
-                min_on_s: self.min_on,
-                min_off_s: self.min_off,
+                min_on_s: at_least(self.min_on, |rig| rig.valve.shortest_on_s),
+                min_off_s: at_least(self.min_off, |rig| rig.valve.shortest_off_s),
                 air_price: self.air_price,
                 pulses: self.pulses.into(),
                 longest_period_s: 3.0,
@@ -137,15 +167,17 @@ impl Args {
         if self.tracks() && self.target.is_none() {
             bail!("--goal track needs --target Y, the friction to hold");
         }
-        let design = steps::design(model, &self.request())?;
+        let rig = self.rig.as_deref().map(RigFile::load).transpose()?;
+        let design = steps::design(model, &self.request(rig.as_ref()))?;
         // A law is worth having also where the simulator has no plant to try it on.
         let plants = Plants::of(model, self.seed);
         let proof = plants
             .as_ref()
             .ok()
             .map(|plants| steps::try_out(&design, plants.blown, &plants.nearest, &plants.others));
+        let lost = proof.as_ref().map(Proof::lost).unwrap_or_default();
         Ok(Tried {
-            design,
+            design: design.which_lost(lost),
             proof,
             not_tried: match plants {
                 Ok(plants) => plants.left_out,
@@ -190,6 +222,10 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let bar = console.progress(0, "{spinner} designing and trying in the loop {elapsed}");
     let tried = args.tried(&model)?;
     bar.finish_and_clear();
+    if let Some(refused) = tried.refused(args.force) {
+        console.show(&tried, &[], &[])?;
+        bail!("{refused}");
+    }
     let (picture, csv) = (args.picture(), args.csv.as_ref());
     let mut keys = vec![("model", args.output.as_path())];
     let mut written = vec![args.output.as_path()];

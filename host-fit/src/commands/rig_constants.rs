@@ -140,6 +140,7 @@ mod tests {
                 upper_rail_counts: 4087.0,
                 stuck_after_samples: 500,
                 noise_counts: None,
+                slow_noise_counts: None,
             },
             valve: ValveEntry {
                 shortest_on_s: 0.02,

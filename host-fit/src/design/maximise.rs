@@ -201,6 +201,7 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
                 pulses: best.train.pulses.clone(),
                 hold: search.hold,
                 air_price: request.air_price,
+                lost: Vec::new(),
             },
             mean: best.mean,
             mean_after_minutes: lasting.after,

@@ -75,6 +75,15 @@ pub struct Proof {
     pub compared_name: &'static str,
 }
 
+impl Proof {
+    /// The trials in which attachment was lost, by name.
+    #[must_use]
+    pub fn lost(&self) -> Vec<String> {
+        let lost = self.cases.iter().filter(|case| !case.kept);
+        lost.map(|case| case.name.clone()).collect()
+    }
+}
+
 fn figures<S: Serializer>(trace: &Trace, to: S) -> Result<S::Ok, S::Error> {
     Figures::of(trace, RULES.trial_from).serialize(to)
 }

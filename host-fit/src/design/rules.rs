@@ -24,18 +24,20 @@ rules! {
     swing: f64 = 1.2, "times the friction under steady blowing", "judgement";
     /// A pulse must be longer than its edge is held back by this to arrive in any case.
     sure_pulse: u32 = 3, "samples", "theory 3.2: k − h advances by 0 to 2 a sample";
-    /// The observer is so many times as fast as the flow: slower, the estimate is the model's alone; faster, it follows the
-    /// sensor's noise …
-    observer_speed: f64 = 2.0, "times the faster time constant", "chosen on the plants of docs/law.md";
+    /// The observer weighs the sensor's noise against a model that misses the flow by this: with less the estimate is the
+    /// model's alone; with more it follows the noise …
+    model_error: f64 = 0.005, "share of what can be reached", "chosen on plants other than those of docs/law.md";
+    /// … of this size, averaged over 64 samples, where the rig has not been measured …
+    usual_slow_noise: f64 = 0.025, "y", "a hot film: white 0.03, coloured 0.035 with 20 ms";
     /// … and corrects no more than this at once.
     observer_most: f64 = 0.1, "share of the residual", "judgement";
     /// The bias of the estimate follows so much of a residual in a delay: slow, so that neither noise nor a wrong delay
     /// turns corrections into an oscillation …
-    bias_in_a_delay: f64 = 0.03, "share of the residual", "chosen on the plants of docs/law.md";
+    bias_in_a_delay: f64 = 0.01, "share of the residual", "chosen on plants other than those of docs/law.md";
     /// … in a delay of at least this.
     bias_delay: u16 = 10, "samples", "judgement";
     /// The integral correction follows so much of an offset in a delay …
-    integral_in_a_delay: f64 = 0.04, "share of the offset", "judgement";
+    integral_in_a_delay: f64 = 0.012, "share of the offset", "chosen on plants other than those of docs/law.md";
     /// … of at least this.
     integral_delay: u16 = 20, "samples", "judgement";
     /// Corrections go no further than this.

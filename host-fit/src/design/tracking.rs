@@ -30,6 +30,8 @@ pub struct TrackRequest {
     /// Choose the switching rate that takes the least air on the model, instead of
     /// the fastest one, which ripples least.
     pub least_air: bool,
+    /// Standard deviation of the sensor's noise averaged over 64 samples, y; `None`: that of a usual hot film.
+    pub slow_noise: Option<f64>,
 }
 
 impl TrackRequest {
@@ -44,6 +46,7 @@ impl TrackRequest {
             air: None,
             ramp_per_s: None,
             least_air: false,
+            slow_noise: None,
         }
     }
 }
@@ -150,7 +153,11 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
 
     let lead = shortest.max(1);
     let range = reachable.high - reachable.low;
-    let observer = observer(&time_constants(model, natural.friction, blown.friction));
+    let observer = observer(
+        time_constants(model, natural.friction, blown.friction),
+        request.slow_noise.unwrap_or(RULES.usual_slow_noise),
+        range,
+    );
     let mut law = Track {
         reference: request.target,
         reachable: [reachable.low, reachable.high],
@@ -173,6 +180,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         correction_limit: RULES.correction * range,
         // A wild reading moves the estimate by the observer's share of the whole range.
         residual_limit: range,
+        lost: Vec::new(),
     };
     let duty_of = |law: &Track| {
         let tracking: Tracking<f64> = law.tracking();
@@ -224,10 +232,17 @@ fn equivalent_duty(model: &Model, reference: f64) -> f64 {
     (alpha * reference - model.constant) / gain
 }
 
-/// The share of each residual that corrects the estimate.
-fn observer(time_constants_s: &[f64; 2]) -> f64 {
-    let fastest = time_constants_s[0].min(time_constants_s[1]);
-    (RULES.observer_speed * SAMPLE_PERIOD_S / fastest).min(RULES.observer_most)
+/// The share of each residual that corrects the estimate: the stationary Kalman gain of a flow that forgets within its
+/// faster time constant τ and that the model misses by σ = `model_error` of the `range`. With
+/// q = 2σ²/τ, what pushes it away from the model, and S = 64 samples × (`slow_noise`)², the noise's density where
+/// it is slow, the estimate follows the sensor at √(1/τ² + q/S) − 1/τ per second.
+fn observer(time_constants_s: [f64; 2], slow_noise: f64, range: f64) -> f64 {
+    let tau = time_constants_s[0].min(time_constants_s[1]);
+    let pushed = 2.0 * (RULES.model_error * range).powi(2) / tau;
+    let density = 64.0 * SAMPLE_PERIOD_S * slow_noise.powi(2);
+    let rate = (tau.powi(-2) + pushed / density).sqrt() - 1.0 / tau;
+    // Without noise nothing is to be smoothed, and the rate is no number.
+    (rate * SAMPLE_PERIOD_S).min(RULES.observer_most)
 }
 
 /// `law` with no more than `rate` switches per second, for a flow that takes `duty`.

@@ -479,6 +479,7 @@ mod tests {
             integral_rate: 0.001,
             correction_limit: 0.3,
             residual_limit: 0.25,
+            lost: Vec::new(),
         };
         let mut model = example();
         model.law = Some(Law::Track(law.clone()));
@@ -495,6 +496,7 @@ mod tests {
             pulses: vec![(0, 100)],
             hold: HoldTimes { on: 10, off: 10 },
             air_price: 0.0,
+            lost: vec!["twice the noise".into()],
         }));
         let read = Model::from_toml(&model.to_toml(), "m").expect("own file");
         assert_eq!(read, model);

@@ -61,6 +61,9 @@ pub struct Track {
     pub correction_limit: f64,
     /// Limit of a residual, y.
     pub residual_limit: f64,
+    /// Trials of the law in which attachment was lost: it was written all the same.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lost: Vec<String>,
 }
 
 /// A pulse train; times in samples.
@@ -76,6 +79,9 @@ pub struct Maximise {
     pub hold: HoldTimes,
     /// Price of steady blowing, y, for which it is the best.
     pub air_price: f64,
+    /// Trials of the law in which attachment was lost: it was written all the same.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lost: Vec<String>,
 }
 
 impl Track {
@@ -122,6 +128,25 @@ impl Maximise {
 }
 
 impl Law {
+    /// Trials in which attachment was lost, by name.
+    #[must_use]
+    pub fn lost(&self) -> &[String] {
+        match self {
+            Self::Track(law) => &law.lost,
+            Self::Maximise(law) => &law.lost,
+        }
+    }
+
+    /// The same law, which says in which trials attachment was lost.
+    #[must_use]
+    pub fn which_lost(mut self, trials: Vec<String>) -> Self {
+        match &mut self {
+            Self::Track(law) => law.lost = trials,
+            Self::Maximise(law) => law.lost = trials,
+        }
+        self
+    }
+
     /// The key that makes no sense and why, if one does.
     pub(super) fn fault(&self) -> Option<(String, String)> {
         let fault = |key: &str, problem: &str| Some((format!("law.{key}"), problem.to_owned()));

@@ -42,6 +42,22 @@ pub enum DesignOutcome {
     Maximise(Optimum),
 }
 
+impl Design {
+    /// The same design, whose law says in which trials attachment was lost.
+    #[must_use]
+    pub fn which_lost(self, trials: Vec<String>) -> Self {
+        let law = self.law.which_lost(trials);
+        Self {
+            model: Model {
+                law: Some(law.clone()),
+                ..self.model
+            },
+            law,
+            outcome: self.outcome,
+        }
+    }
+}
+
 /// Designs the law that `request` asks for and puts it into the model.
 ///
 /// ```

@@ -5,7 +5,7 @@ use closed_loop::{
     Controller, Figures, FirstOrder, Gains, OpenLoop, PulseWidth, Relay, TrackingController, run,
 };
 use firmware_sim::bench::{Disturbed, Lost};
-use firmware_sim::instrument::{Converter, Noise};
+use firmware_sim::instrument::{Converter, Noise, NoiseSignal};
 use firmware_sim::plant::{BasePlant, FlowDelay, PlantSpec, Rig};
 use host_fit::design::{TrackRequest, track};
 use host_fit::model::{Delay, Model, Track};
@@ -29,6 +29,8 @@ type Run = fn(&Bench, f64) -> Option<Figures>;
 struct Bench {
     base: BasePlant,
     model: Model,
+    /// Of the sensor, as a calibration measures it.
+    slow_noise: f64,
     seed: u64,
 }
 
@@ -65,7 +67,12 @@ impl Bench {
             ),
             ..Model::default()
         };
-        Self { base, model, seed }
+        Self {
+            base,
+            model,
+            slow_noise: slow_noise(seed),
+            seed,
+        }
     }
 
     /// The figures of a run towards `reference`, judged against `goal`.
@@ -113,6 +120,7 @@ impl Bench {
         let request = TrackRequest {
             switches_per_s,
             least_air,
+            slow_noise: Some(self.slow_noise),
             ..TrackRequest::holding(target)
         };
         track(&self.model, &request).ok().map(|design| design.law)
@@ -195,6 +203,19 @@ impl Bench {
             delay_s,
         })
     }
+}
+
+/// What two seconds of a sensor at rest say of its noise in averages over 64 samples, as `record --calibrate` does.
+fn slow_noise(seed: u64) -> f64 {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    // Another noise than that of the runs.
+    rng.set_stream(9);
+    let mut noise = NoiseSignal::new(Noise::HOT_FILM, rng);
+    let means: Vec<f64> = (0..31)
+        .map(|_| (0..64).map(|_| noise.sample()).sum::<f64>() / 64.0)
+        .collect();
+    let mean = means.iter().sum::<f64>() / 31.0;
+    (means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / 30.0).sqrt()
 }
 
 /// Means over plants.

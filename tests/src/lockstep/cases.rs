@@ -144,13 +144,9 @@ fn slightly_negative(base: &Model) -> Model {
 /// `model` with a law that holds half its friction.
 fn designed(mut model: Model) -> Result<Model> {
     let request = TrackRequest {
-        target: 0.5,
         min_on_s: 0.02,
         min_off_s: 0.02,
-        switches_per_s: None,
-        air: None,
-        ramp_per_s: None,
-        least_air: false,
+        ..TrackRequest::holding(0.5)
     };
     model.law = Some(Law::Track(track(&model, &request)?.law));
     Ok(model)

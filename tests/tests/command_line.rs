@@ -393,6 +393,8 @@ fn a_law_is_designed_for_a_model_with_an_effect_of_ones_own() {
         &controlled,
         p("--target"),
         p("0.6"),
+        // Whatever the trials say: here it is about what they are made with.
+        p("--force"),
     ]);
     let notes = design["not_tried"].to_string();
     assert!(notes.contains("without supply-line-ringing"), "{notes}");
@@ -406,6 +408,44 @@ fn a_law_is_designed_for_a_model_with_an_effect_of_ones_own() {
     let names = model.effect_names();
     assert_eq!(names, ["supply-line-ringing", "state-dependent-delay"]);
     assert!(model.law.is_some());
+}
+
+/// At half the friction an unknown King's law costs attachment (docs/law.md): no file, unless it is forced, and then
+/// file and constants say so.
+#[test]
+fn a_law_that_loses_attachment_is_written_only_by_force() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    let (model, controlled, constants) = (path("m.toml"), path("c.toml"), path("c.rs"));
+    let mut paper = Model::load(&data("paper/table-2-state-dependent.toml")).expect("the model");
+    paper.convention = LagConvention::OneStep;
+    paper.save(&model).expect("saved");
+    let mut arguments = vec![
+        p("design"),
+        &model,
+        p("-o"),
+        &controlled,
+        p("--target"),
+        p("0.5"),
+    ];
+    let output = run(&arguments);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    assert!(
+        error.contains("hot-film-nonlinearity") && error.contains("--force"),
+        "{error}"
+    );
+    assert!(String::from_utf8_lossy(&output.stdout).contains("LOST"));
+    assert!(!controlled.exists());
+    arguments.push(p("--force"));
+    let design = json(&arguments);
+    let lost = design["law"]["lost"].as_array().expect("trials");
+    let written = Model::load(&controlled).expect("the model with its law");
+    let named = written.law.expect("a law");
+    assert!(!lost.is_empty() && named.lost().len() == lost.len());
+    json(&[p("codegen"), &controlled, p("-o"), &constants]);
+    let text = std::fs::read_to_string(&constants).expect("constants");
+    assert!(text.contains("LOSES ATTACHMENT with hot-film-nonlinearity"));
 }
 
 #[test]

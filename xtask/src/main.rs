@@ -13,6 +13,7 @@ mod firmware;
 mod identified;
 mod line_faults;
 mod new_effect;
+mod nucleo;
 mod pages;
 mod pil;
 mod setup;
@@ -40,6 +41,7 @@ const TASKS: &[Task] = &[
     campaigns::TERMS,
     identified::TASK,
     new_effect::TASK,
+    nucleo::TASK,
     pages::TASK,
     pil::TASK,
     setup::TASK,

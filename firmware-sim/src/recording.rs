@@ -8,8 +8,8 @@ use recordings::{DataError, DataSet, Record, Use};
 use thiserror::Error;
 
 use crate::command::{Command, LEAD_SAMPLES};
-use crate::family::{Nuisances, Units};
 use crate::instrument::{Instrument, InstrumentError};
+use crate::nuisance::Nuisances;
 use crate::plant::{
     Beyond, Effect, EffectError, Fault, FreeStream, PlantError, PlantSpec, Rig, SAMPLE_PERIOD_S,
     ShowsWith,
@@ -37,6 +37,20 @@ pub enum RigError {
     /// Two effects want the same part of the rig.
     #[error("`{0}` and `{1}` exclude each other; hide one of them")]
     Exclusive(&'static str, &'static str),
+}
+
+/// In which units the rig is written down: the same samples, other numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Units {
+    /// Recorded times are the rig's times this factor.
+    pub time: f64,
+    /// Recorded y are the rig's y times this factor.
+    pub y: f64,
+}
+
+impl Units {
+    /// Seconds and friction gain, as simulated.
+    pub const OWN: Self = Self { time: 1.0, y: 1.0 };
 }
 
 /// A data set and what is really behind it.

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use crate::import::ImportProblem;
+use crate::import::problem::ImportProblem;
 
 /// Where in the user's data a fault lies: every part that is known is printed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -4,7 +4,6 @@
 //! A [`RigPlan`] is drawn from a seed and determines its data set bit for bit.
 
 mod draw;
-mod nuisance;
 mod truth;
 mod weight;
 
@@ -18,7 +17,8 @@ use crate::plant::{Effect, Parameter, PlantSpec};
 use crate::recording::{Recorded, RigError, Session, with_levels};
 use crate::stream::{Stream, stream};
 
-pub use nuisance::{Nuisance, Nuisances};
+pub use crate::nuisance::{Nuisance, Nuisances};
+pub use crate::recording::Units;
 
 /// The kind of flow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -110,20 +110,6 @@ impl NoiseKind {
     pub fn of(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
-}
-
-/// In which units the rig is written down: the same samples, other numbers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Units {
-    /// Recorded times are the rig's times this factor.
-    pub time: f64,
-    /// Recorded y are the rig's y times this factor.
-    pub y: f64,
-}
-
-impl Units {
-    /// Seconds and friction gain, as simulated.
-    pub const OWN: Self = Self { time: 1.0, y: 1.0 };
 }
 
 /// Flows that are drawn before the one on which the effects weigh most is taken.

@@ -4,8 +4,6 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
-use super::effects::{EdgeDependentDelay, Physics, StateDependentDelay};
-
 /// A property of the base plant that no rig can have.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error("the base plant's `{property}` is {value}; it must be {requirement}")]
@@ -55,15 +53,6 @@ pub enum FlowDelay {
 }
 
 impl FlowDelay {
-    /// The effect of the catalogue that it is, or is nearest to; none for a delay that is always the same.
-    pub fn effect(self) -> Option<&'static str> {
-        match self {
-            Self::Fixed { .. } => None,
-            Self::StateDependent { .. } | Self::Clamped { .. } => Some(StateDependentDelay::NAME),
-            Self::EdgeDependent { .. } => Some(EdgeDependentDelay::NAME),
-        }
-    }
-
     /// The delay at mean friction `mean` (s), of both edges on average where they differ; reversed flow is
     /// no more separated than none.
     pub fn at(self, mean: f64) -> f64 {

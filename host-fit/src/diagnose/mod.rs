@@ -18,10 +18,9 @@ pub use alternatives::Separation;
 pub use estimate::ParameterEstimate;
 pub(crate) use estimate::estimates;
 pub use memory::Memory;
-pub use outcome::{Diagnosis, NotTried, Ranked, Rung};
+pub use outcome::{Diagnosis, NotTried, Ranked, Rung, Verdict};
 pub use ranking::{FLOW_LAG, FLOW_MEMORY};
 pub use rules::{RULES, Rules};
-pub use verdict::Verdict;
 
 use crate::data::Record;
 use crate::model::{Model, Start};

@@ -1,11 +1,34 @@
 //! What a diagnosis hands over.
 
-use super::{Memory, ParameterEstimate, Separation, Verdict};
+use super::{Memory, ParameterEstimate, Separation};
 use crate::model::Model;
 use crate::residual::NoiseSource;
-use crate::terms::{HeldOut, HeldOutBy, Judge, Units};
+use crate::terms::{HeldOut, HeldOutBy, Hypothesis, Judge, Units};
+use model_core::effect::Spec;
 use serde::Serialize;
 use std::collections::BTreeMap;
+
+/// What a diagnosis says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// The held-out error is at the repeat scatter.
+    NothingMissing,
+    /// One effect or several account for most of the misfit.
+    EffectMissing,
+    /// Effects describe part of the misfit without being proven: stand-ins.
+    PartlyExplained,
+    /// A repeatable misfit that the catalogue does not explain.
+    Unexplained,
+}
+
+/// What is said, and of which hypothesis.
+pub(super) struct Conclusion {
+    pub(super) verdict: Verdict,
+    /// The model that is handed over, inner units.
+    pub(super) model: Hypothesis,
+    pub(super) effects: Vec<&'static Spec>,
+}
 
 /// Held-out error after adding effects.
 #[derive(Clone, Debug, PartialEq, Serialize)]

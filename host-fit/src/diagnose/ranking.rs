@@ -4,7 +4,7 @@
 use super::{NotTried, RULES, Ranked, estimates};
 use crate::model::Model;
 use crate::terms::{
-    Candidate, HeldOut, Hypothesis, Judge, Judged, Screen, Search, Term, Units, decoys,
+    Candidate, HeldOut, Hypothesis, Judge, Judged, Screen, Search, Table, Term, Units, decoys,
     last_of_both, p_value,
 };
 use model_core::effect::Spec;
@@ -44,7 +44,7 @@ pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) 
     let Some(screen) = Screen::new(search.judge, model) else {
         return Vec::new();
     };
-    let table = screen.table(&search.known, true);
+    let table = Table::of(&screen, &search.known, true);
     // The best of each kind, in the order of what they promise.
     let mut best: Vec<(String, &Candidate)> = Vec::new();
     for candidate in &table.candidates {
@@ -101,7 +101,7 @@ pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) 
 fn refitted(
     search: &Search<'_>,
     screen: &Screen<'_>,
-    table: &crate::terms::Table,
+    table: &Table,
     context: &Hypothesis,
     candidate: &Candidate,
 ) -> Option<Judged> {

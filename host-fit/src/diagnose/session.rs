@@ -1,8 +1,8 @@
 //! A diagnosis in the making: from what the search found to what is handed over.
 
 use super::memory::memory;
+use super::outcome::Conclusion;
 use super::ranking::{not_tried, ranked, rivals};
-use super::verdict::Conclusion;
 use super::{DiagnoseError, Diagnosis, Options, RULES, Rung, Verdict, estimates};
 use crate::model::Model;
 use crate::terms::{Found, HeldOut, Hypothesis, Judge, Search, Term, Units, p_value};

@@ -1,37 +1,15 @@
 //! Whether anything is missing, and whether it has earned to be named.
 
 use super::memory::memory;
+use super::outcome::Conclusion;
 use super::ranking::not_tried;
 use super::session::Session;
-use super::{Diagnosis, RULES, Rung};
+use super::{Diagnosis, RULES, Rung, Verdict};
 use crate::model::Model;
 use crate::residual::{FailureCoordinate, NoiseSource, examine};
-use crate::terms::{Found, HeldOut, Hypothesis, Judged, Screen, Term, p_value};
+use crate::terms::{Found, HeldOut, Hypothesis, Judged, Screen, Table, Term, p_value};
 use model_core::effect::Spec;
-use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// What a diagnosis says.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// The held-out error is at the repeat scatter.
-    NothingMissing,
-    /// One effect or several account for most of the misfit.
-    EffectMissing,
-    /// Effects describe part of the misfit without being proven: stand-ins.
-    PartlyExplained,
-    /// A repeatable misfit that the catalogue does not explain.
-    Unexplained,
-}
-
-/// What is said, and of which hypothesis.
-pub(super) struct Conclusion {
-    pub(super) verdict: Verdict,
-    /// The model that is handed over, inner units.
-    pub(super) model: Hypothesis,
-    pub(super) effects: Vec<&'static Spec>,
-}
 
 impl Session<'_> {
     /// The answer for a given model that is at the noise floor already, unless a
@@ -51,7 +29,11 @@ impl Session<'_> {
             return None;
         }
         let screen = Screen::new(judge, given_inside)?;
-        let table = screen.table(&self.search.known, over > crate::terms::RULES.at_the_floor);
+        let table = Table::of(
+            &screen,
+            &self.search.known,
+            over > crate::terms::RULES.at_the_floor,
+        );
         let promised = table
             .candidates
             .iter()

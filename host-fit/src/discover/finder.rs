@@ -1,62 +1,17 @@
 //! From screened curves to a term, and from its curve to a formula.
 
 use super::formula::FORMS;
-use super::outcome::{Alike, CurvePoint, Smallest, coordinate_words};
+use super::outcome::{Alike, Found, Smallest, coordinate_words};
 use super::place::Entry;
 use super::screening::{Context, Screened, reference};
 use super::term::{Shape, Term};
 use super::{Options, RULES};
 use crate::fit::{Fit, FitOptions, fit};
 use crate::model::Model;
-use crate::terms::{HeldOut, Hypothesis, Judged, Screen, Search, Units, p_value};
+use crate::terms::{HeldOut, Hypothesis, Judged, Screen, Search, Table, Units, p_value};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
-
-/// A term in the model that it was found for.
-#[derive(Clone)]
-pub(super) struct Found {
-    /// As it is handed over: a formula, or the curve.
-    pub(super) term: Term,
-    /// Its curve, as fitted.
-    curve: Term,
-    /// Standard errors of the curve's values.
-    errors: Vec<f64>,
-    /// The model with it.
-    pub(super) with: Hypothesis,
-    /// The same base without it, refitted.
-    without: Judged,
-    pub(super) p: f64,
-    /// Share of the excess that the curve takes …
-    pub(super) taken: f64,
-    /// … and that the formula does.
-    pub(super) formula_taken: f64,
-    pub(super) resembles: Vec<String>,
-    pub(super) alike: Vec<Alike>,
-}
-
-impl Found {
-    /// The curve with its band, in the user's units.
-    pub(super) fn curve(&self, units: &Units) -> Vec<CurvePoint> {
-        let outer = self.curve.out(units);
-        let scale = outer.entry.scale(units);
-        let Shape::Points { x, g, .. } = &outer.shape else {
-            return Vec::new();
-        };
-        let points = x.iter().zip(g).zip(&self.errors);
-        points
-            .map(|((x, g), error)| {
-                let half = 1.96 * error * scale;
-                CurvePoint {
-                    x: *x,
-                    low: g - half,
-                    value: *g,
-                    high: g + half,
-                }
-            })
-            .collect()
-    }
-}
 
 /// What a round found, and what it looked at.
 pub(super) struct Round {
@@ -278,14 +233,14 @@ impl Finder<'_> {
 
     /// Effects of the catalogue that change the free run along `direction`.
     fn resembling(&self, screen: &Screen<'_>, direction: &[f64]) -> Vec<String> {
-        let table = screen.table(&self.search.known, true);
+        let table = Table::of(&screen, &self.search.known, true);
         let mut names: Vec<String> = Vec::new();
         for candidate in &table.candidates {
             let Some(spec) = candidate.term.effect() else {
                 continue;
             };
             let forgotten = self.options.without.iter().any(|name| name == spec.name);
-            let alike = screen.likeness(&table, candidate, direction) > RULES.resembles;
+            let alike = table.likeness(&screen, candidate, direction) > RULES.resembles;
             if alike && !forgotten && !names.iter().any(|name| name == spec.name) {
                 names.push(spec.name.to_owned());
             }

@@ -1,13 +1,12 @@
 //! What a discovery hands over.
 
-use super::finder::Found;
 use super::place::{Entry, Place};
 use super::term::{Shape, Term};
 use crate::diagnose::{ParameterEstimate, Rung};
 use crate::fit::Fit;
 use crate::model::Model;
 use crate::residual::NoiseSource;
-use crate::terms::{HeldOutBy, Units};
+use crate::terms::{HeldOutBy, Hypothesis, Judged, Units};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -103,6 +102,51 @@ pub struct Discovery {
     pub looked_at: usize,
     /// The model with the terms.
     pub model: Model,
+}
+
+/// A term in the model that it was found for.
+#[derive(Clone)]
+pub(super) struct Found {
+    /// As it is handed over: a formula, or the curve.
+    pub(super) term: Term,
+    /// Its curve, as fitted.
+    pub(super) curve: Term,
+    /// Standard errors of the curve's values.
+    pub(super) errors: Vec<f64>,
+    /// The model with it.
+    pub(super) with: Hypothesis,
+    /// The same base without it, refitted.
+    pub(super) without: Judged,
+    pub(super) p: f64,
+    /// Share of the excess that the curve takes …
+    pub(super) taken: f64,
+    /// … and that the formula does.
+    pub(super) formula_taken: f64,
+    pub(super) resembles: Vec<String>,
+    pub(super) alike: Vec<Alike>,
+}
+
+impl Found {
+    /// The curve with its band, in the user's units.
+    pub(super) fn curve(&self, units: &Units) -> Vec<CurvePoint> {
+        let outer = self.curve.out(units);
+        let scale = outer.entry.scale(units);
+        let Shape::Points { x, g, .. } = &outer.shape else {
+            return Vec::new();
+        };
+        let points = x.iter().zip(g).zip(&self.errors);
+        points
+            .map(|((x, g), error)| {
+                let half = 1.96 * error * scale;
+                CurvePoint {
+                    x: *x,
+                    low: g - half,
+                    value: *g,
+                    high: g + half,
+                }
+            })
+            .collect()
+    }
 }
 
 /// A found term as it is told; `written` is it as handed over, in the user's units.

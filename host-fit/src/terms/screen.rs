@@ -13,7 +13,6 @@
 
 use super::RULES;
 use super::judge::Judge;
-use super::table::{Candidate, Table};
 use super::term::Term;
 use crate::data::Record;
 use crate::fit::{channel_reference, sensitivities};
@@ -281,17 +280,6 @@ impl<'a> Screen<'a> {
             held_out: 1.0 - held_out,
             direction,
         })
-    }
-
-    /// Correlation of what a candidate changes with a direction, where it is learned.
-    pub(crate) fn likeness(&self, table: &Table, candidate: &Candidate, direction: &[f64]) -> f64 {
-        let own = candidate.columns.iter().map(|i| &table.columns[*i]);
-        let along = own.map(|column| {
-            let (column, direction) = (&column[..self.learned], &direction[..self.learned]);
-            let size = (dot(column, column) * dot(direction, direction)).sqrt();
-            dot(column, direction).abs() / size.max(f64::MIN_POSITIVE)
-        });
-        along.fold(0.0, f64::max)
     }
 
     /// Whether an effect cannot be tried here, and why.

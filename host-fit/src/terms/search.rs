@@ -6,7 +6,7 @@ use super::grid::longest_lag;
 use super::judge::{Judge, Judged};
 use super::proposal::Proposal;
 use super::screen::Screen;
-use super::table::has_jet_effect;
+use super::table::{Table, has_jet_effect};
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, Known, fit, lean_base, settle_fixed_delay};
 use crate::model::{Model, Start};
@@ -262,7 +262,7 @@ impl Search<'_> {
         };
         let present = count_effects(&hypothesis.terms);
         let effects = effects && present < self.most_effects;
-        let table = screen.table(&self.known, effects);
+        let table = Table::of(&screen, &self.known, effects);
         let (mut with, mut without) = (0, 0);
         let mut met = Vec::new();
         let mut kept = Vec::new();

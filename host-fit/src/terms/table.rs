@@ -5,6 +5,7 @@ use super::grid::{grid, longest_lag};
 use super::screen::Screen;
 use super::term::Term;
 use crate::fit::{Known, channel_reference, sensitivities};
+use crate::linalg::dot;
 use crate::model::{Model, Start};
 use model_core::effect::{Place, Sign, Spec};
 use model_core::effects::{LEVEL_RATE, SLOW_WAKE, ZERO_OFFSET};
@@ -32,6 +33,40 @@ pub struct Table {
     /// The candidates, the best held-out share first.
     pub candidates: Vec<Candidate>,
     pub(super) columns: Vec<Vec<f64>>,
+}
+
+impl Table {
+    /// Everything that could be added to the screen's model: lags and the zero, and effects if wanted.
+    #[must_use]
+    pub fn of(screen: &Screen, known: &Known, effects: bool) -> Self {
+        let mut columns = Vec::new();
+        let mut candidates = screen.base_candidates(&mut columns);
+        if effects {
+            candidates.extend(screen.effect_candidates(known, &mut columns));
+        }
+        candidates.sort_by(|a, b| b.held_out.total_cmp(&a.held_out));
+        Self {
+            candidates,
+            columns,
+        }
+    }
+
+    /// Correlation of what a candidate changes with a direction, where it is learned.
+    pub(crate) fn likeness(
+        &self,
+        screen: &Screen,
+        candidate: &Candidate,
+        direction: &[f64],
+    ) -> f64 {
+        let learned = screen.learned;
+        let own = candidate.columns.iter().map(|i| &self.columns[*i]);
+        let along = own.map(|column| {
+            let (column, direction) = (&column[..learned], &direction[..learned]);
+            let size = (dot(column, column) * dot(direction, direction)).sqrt();
+            dot(column, direction).abs() / size.max(f64::MIN_POSITIVE)
+        });
+        along.fold(0.0, f64::max)
+    }
 }
 
 impl Screen<'_> {
@@ -317,21 +352,6 @@ impl Screen<'_> {
             }
         }
         kept
-    }
-
-    /// Everything that could be added: lags and the zero, and effects if wanted.
-    #[must_use]
-    pub fn table(&self, known: &Known, effects: bool) -> Table {
-        let mut columns = Vec::new();
-        let mut candidates = self.base_candidates(&mut columns);
-        if effects {
-            candidates.extend(self.effect_candidates(known, &mut columns));
-        }
-        candidates.sort_by(|a, b| b.held_out.total_cmp(&a.held_out));
-        Table {
-            candidates,
-            columns,
-        }
     }
 }
 

@@ -7,7 +7,7 @@ mod delimited;
 mod mapping;
 mod mat;
 mod npy;
-mod problem;
+pub(crate) mod problem;
 mod source;
 
 pub use mapping::Mapping;

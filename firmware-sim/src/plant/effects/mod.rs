@@ -397,6 +397,17 @@ pub(super) fn signed(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
     if rng.random_bool(0.5) { size } else { -size }
 }
 
+impl FlowDelay {
+    /// The effect of the catalogue that it is, or is nearest to; none for a delay that is always the same.
+    pub fn effect(self) -> Option<&'static str> {
+        match self {
+            Self::Fixed { .. } => None,
+            Self::StateDependent { .. } | Self::Clamped { .. } => Some(StateDependentDelay::NAME),
+            Self::EdgeDependent { .. } => Some(EdgeDependentDelay::NAME),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

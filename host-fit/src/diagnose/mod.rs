@@ -117,15 +117,19 @@ pub fn diagnose(
         return Err(DiagnoseError::Interrupted);
     }
     let root_errors = root.judged.held_out.clone();
-    let mut found = search.run(root);
-    // The given structure may hold what terms that are added one by one do not reach.
+    let origin = root.clone();
+    let second = || search.second_root(&given_inside, &origin);
+    let mut found = search.run(root, second);
+    // A structure that is not made of the search's terms may still hold what they do
+    // not reach one by one.
     let reached = found.best.judged.rmse();
     if (judge.over_noise(reached) > RULES.floor_margin
         || reached > (1.0 - RULES.worthwhile) * as_given.rmse())
+        && !found.set_out_twice()
         && let Ok(judged) = judge.refitted(&given_inside)
         && judged.rmse() < root_errors.rmse()
     {
-        let from_given = search.run(Hypothesis::new(judged));
+        let from_given = search.run(Hypothesis::new(judged), || None);
         if from_given.best.judged.rmse() < (1.0 - RULES.worthwhile) * reached {
             found = from_given;
         }

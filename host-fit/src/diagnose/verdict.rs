@@ -40,7 +40,7 @@ impl Session<'_> {
             .filter(|candidate| candidate.term.effect().is_some())
             .map(|candidate| 1.0 - (1.0 - candidate.held_out).max(0.0).sqrt())
             .fold(0.0, f64::max);
-        if promised > RULES.promising {
+        if promised > RULES.promising || self.imitated(given_inside, as_given) {
             return None;
         }
         Some(Diagnosis {
@@ -61,6 +61,23 @@ impl Session<'_> {
             separation: None,
             model: given.clone(),
             base: given.clone(),
+        })
+    }
+
+    /// Whether an effect in the place of something that the given base has does better
+    /// than that, or as well with fewer parameters: what a base may have without a name
+    /// imitates some effects well enough to bring them to the noise floor.
+    fn imitated(&self, given: &Model, as_given: &HeldOut) -> bool {
+        Term::UNNAMED.iter().any(|stand_in| {
+            let without = stand_in.taken_from(given, given);
+            without != *given
+                && self.search.in_place_of(&without).is_some_and(|other| {
+                    let ratio = other.held_out.rmse() / as_given.rmse();
+                    let p = p_value(as_given, &other.held_out);
+                    let better = ratio < 1.0 - RULES.alike && p < RULES.level;
+                    let leaner = ratio < 1.0 + RULES.alike && other.term.cost() < stand_in.cost();
+                    better || leaner
+                })
         })
     }
 

@@ -73,7 +73,10 @@ impl Finder<'_> {
         let leading = finished.iter().take(RULES.settled).cloned();
         let settled: Vec<(Term, Hypothesis)> = leading
             .map(|(term, hypothesis)| {
-                let best = self.search.run(Hypothesis::new(hypothesis.judged)).best;
+                let best = self
+                    .search
+                    .run(Hypothesis::new(hypothesis.judged), || None)
+                    .best;
                 (term, best)
             })
             .collect();
@@ -233,14 +236,14 @@ impl Finder<'_> {
 
     /// Effects of the catalogue that change the free run along `direction`.
     fn resembling(&self, screen: &Screen<'_>, direction: &[f64]) -> Vec<String> {
-        let table = Table::of(&screen, &self.search.known, true);
+        let table = Table::of(screen, &self.search.known, true);
         let mut names: Vec<String> = Vec::new();
         for candidate in &table.candidates {
             let Some(spec) = candidate.term.effect() else {
                 continue;
             };
             let forgotten = self.options.without.iter().any(|name| name == spec.name);
-            let alike = table.likeness(&screen, candidate, direction) > RULES.resembles;
+            let alike = table.likeness(screen, candidate, direction) > RULES.resembles;
             if alike && !forgotten && !names.iter().any(|name| name == spec.name) {
                 names.push(spec.name.to_owned());
             }

@@ -121,7 +121,7 @@ pub fn discover(
         return Err(DiagnoseError::Interrupted);
     }
     let mut bases = vec![root.clone()];
-    bases.push(search.run(root).best);
+    bases.push(search.run(root, || None).best);
     if let Ok(judged) = judge.refitted(&bench.given) {
         bases.push(Hypothesis::new(judged));
     }

@@ -77,7 +77,7 @@ pub fn base_model(
     let Some((_, root)) = best else {
         return refused.map(Err);
     };
-    let found = search.run(root);
+    let found = search.run(root, || None);
     let judged = if always {
         found.best.judged
     } else {

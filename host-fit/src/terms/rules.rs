@@ -28,6 +28,10 @@ rules! {
     without_effects: usize = 2, "", "the same rigs";
     /// Of what was refitted for a few steps, how many are followed to the end.
     finished: usize = 4, "", "the same rigs";
+    /// A given structure of more terms than this is no place to set out from.
+    most_given: usize = 6, "terms", "judgement: each has to be tried without at the end";
+    /// Effects that are tried in the place of a term that has no name.
+    in_its_place: usize = 3, "", "judgement: the truth leads the screening or is next to the leader";
     /// Steps that every proposal is followed for.
     brief: usize = 6, "iterations", "fewer leave thresholds where they were";
     /// Level of the tests.

@@ -1,7 +1,7 @@
 //! One search over lags, the sensor's zero and effects.
 
 use super::RULES;
-use super::evidence::p_value;
+use super::evidence::{HeldOut, p_value};
 use super::grid::longest_lag;
 use super::judge::{Judge, Judged};
 use super::proposal::Proposal;
@@ -26,6 +26,8 @@ pub struct Hypothesis {
     pub judged: Judged,
     /// Whether further terms were screened for it.
     expanded: bool,
+    /// Whether it descends from the given structure, and not from the leanest one.
+    from_given: bool,
 }
 
 impl Hypothesis {
@@ -36,6 +38,7 @@ impl Hypothesis {
             terms: Vec::new(),
             judged,
             expanded: false,
+            from_given: false,
         }
     }
 
@@ -86,6 +89,21 @@ pub struct Found {
     pub all: Vec<Hypothesis>,
     /// Alternatives that were looked at in full refits.
     pub tried: usize,
+}
+
+impl Found {
+    /// Whether the given structure was a second place to set out from.
+    #[must_use]
+    pub fn set_out_twice(&self) -> bool {
+        self.all.iter().any(|hypothesis| hypothesis.from_given)
+    }
+}
+
+/// An effect added to a model, followed for a few steps.
+pub(crate) struct InPlace {
+    pub(crate) term: Term,
+    pub(crate) held_out: HeldOut,
+    fit: Fit,
 }
 
 /// The search and what it works on.
@@ -155,13 +173,38 @@ impl Search<'_> {
         Ok(Hypothesis::new(judged))
     }
 
-    /// From `root`, round by round, until nothing that is left is worth its price.
+    /// The structure of `given`, refitted, as terms on top of `root`: a second place to
+    /// set out from. `None` where it is not made of such terms, or of too many.
     #[must_use]
-    pub fn run(&self, root: Hypothesis) -> Found {
+    pub fn second_root(&self, given: &Model, root: &Hypothesis) -> Option<Hypothesis> {
+        let mut model = given.clone();
+        model.delay_between_samples();
+        model.start = root.judged.model().start;
+        let terms = Term::all_of(&model, root.judged.model())?;
+        let judged = (!terms.is_empty() && terms.len() <= RULES.most_given)
+            .then(|| self.judge.refitted(&model).ok())??;
+        Some(Hypothesis {
+            terms,
+            from_given: true,
+            ..Hypothesis::new(judged)
+        })
+    }
+
+    /// From `root`, and from the `second` one where the first step did not reach the
+    /// floor, round by round, until nothing that is left is worth its price.
+    #[must_use]
+    pub fn run(&self, root: Hypothesis, second: impl FnOnce() -> Option<Hypothesis>) -> Found {
         let mut all = vec![root];
+        let mut second = Some(second);
         let mut tried = Vec::new();
         let mut stalled = 0;
         for round in 1..=RULES.rounds {
+            if round > 1
+                && self.over(&all[best(&all, |_| true)]) > RULES.at_the_floor
+                && let Some(second) = second.take()
+            {
+                all.extend(second());
+            }
             let chosen = self.chosen(&all);
             if chosen.is_empty() || self.interrupted() {
                 break;
@@ -205,6 +248,7 @@ impl Search<'_> {
         let end = best(&all, |_| true);
         let bare_end = best(&all, Hypothesis::is_bare);
         let found = self.pruned(all[end].clone(), &root);
+        let found = self.renamed(found, &root);
         let bare = if bare_end == end {
             found.clone()
         } else {
@@ -223,6 +267,7 @@ impl Search<'_> {
     fn chosen(&self, all: &[Hypothesis]) -> Vec<(usize, bool)> {
         let (end, bare) = (best(all, |_| true), best(all, Hypothesis::is_bare));
         let settled = all[end].expanded;
+        let open = |i: &usize| !all[*i].expanded;
         // Once the best has nothing to gain, only a base that was searched less hard
         // can still say something.
         let bare_is_done = bare == end
@@ -234,15 +279,24 @@ impl Search<'_> {
         let mut chosen = Vec::new();
         if !settled {
             chosen.push((end, self.effects));
-            let rival = (0..all.len())
-                .filter(|i| !all[*i].expanded && *i != end)
-                .min_by(|a, b| all[*a].score().total_cmp(&all[*b].score()));
+            let rival = leading(all, |i| open(i) && *i != end);
             if let Some(rival) = rival
                 && self.over(&all[end]) > RULES.near_the_floor
                 && all[rival].score() < all[end].score() + RULES.rival.ln()
             {
                 chosen.push((rival, self.effects));
             }
+        }
+        // Two lines of descent, until the one that is behind has become the dearer.
+        let line = all[end].from_given;
+        let other = leading(all, |i| all[*i].from_given != line);
+        if let Some(other) = other.filter(open)
+            && self.over(&all[end]) > RULES.at_the_floor
+            && all[other].score() < all[end].score() + RULES.rival.ln()
+            && all[other].cost() < all[end].cost() + RULES.head_start
+            && !chosen.iter().any(|(index, _)| *index == other)
+        {
+            chosen.push((other, self.effects));
         }
         if !bare_is_done && !chosen.iter().any(|(index, _)| *index == bare) {
             chosen.push((bare, false));
@@ -319,7 +373,12 @@ impl Search<'_> {
             .map(|(at, fit)| {
                 let (index, proposal) = &pool[at];
                 let terms = [all[*index].terms.clone(), proposal.terms.clone()].concat();
-                self.finish(terms, fit)
+                let from_given = all[*index].from_given;
+                let finished = self.finish(terms, fit)?;
+                Some(Hypothesis {
+                    from_given,
+                    ..finished
+                })
             })
             .collect();
         finished.into_iter().flatten().collect()
@@ -356,7 +415,12 @@ impl Search<'_> {
         }
         let graded = |term: &Term| term.with_grading(least.model.grading);
         let terms = leader.terms.iter().map(graded).collect();
-        self.finish(terms, least)
+        let from_given = leader.from_given;
+        let finished = self.finish(terms, least)?;
+        Some(Hypothesis {
+            from_given,
+            ..finished
+        })
     }
 
     /// The fit of a proposal from where the screening puts it.
@@ -421,8 +485,7 @@ impl Search<'_> {
         let judged = self.judge.judged_from(fitted).ok()?;
         Some(Hypothesis {
             terms,
-            judged,
-            expanded: false,
+            ..Hypothesis::new(judged)
         })
     }
 
@@ -494,7 +557,63 @@ impl Search<'_> {
             terms,
             judged: self.judge.refitted(&model).ok()?,
             expanded: true,
+            from_given: hypothesis.from_given,
         })
+    }
+
+    /// The single effect that does best on a model that a term was taken from.
+    pub(crate) fn in_place_of(&self, without: &Model) -> Option<InPlace> {
+        let judged = self.judge.refitted(without).ok()?;
+        let model = judged.model();
+        let screen = Screen::new(self.judge, model)?;
+        let table = Table::of(&screen, &self.known, true);
+        let effects = table
+            .candidates
+            .iter()
+            .filter(|c| c.term.effect().is_some());
+        let leading: Vec<_> = effects.take(RULES.in_its_place).collect();
+        let tried = leading.into_par_iter().filter_map(|candidate| {
+            let proposal = screen.alone(&table, candidate)?;
+            let fit = self.set_out(model, &proposal, RULES.brief)?;
+            let held_out = self.judge.held_out(|_| &fit.model).ok()?;
+            let term = proposal.terms.into_iter().next()?;
+            Some(InPlace {
+                term,
+                held_out,
+                fit,
+            })
+        });
+        let tried: Vec<InPlace> = tried.collect();
+        let score = |other: &InPlace| score(other.held_out.rmse(), other.term.cost());
+        tried
+            .into_iter()
+            .min_by(|a, b| score(a).total_cmp(&score(b)))
+    }
+
+    /// A hypothesis with an effect in the place of a term without a name, if it does
+    /// better so: such terms imitate effects, and a search that took one first does not
+    /// come back.
+    fn renamed(&self, mut hypothesis: Hypothesis, root: &Hypothesis) -> Hypothesis {
+        for unnamed in Term::UNNAMED {
+            let is_it = |term: &Term| term.name() == unnamed.name();
+            let room = self.effects && count_effects(&hypothesis.terms) < self.most_effects;
+            let Some(index) = hypothesis.terms.iter().position(is_it) else {
+                continue;
+            };
+            if !room || self.interrupted() {
+                break;
+            }
+            let without = unnamed.taken_from(hypothesis.judged.model(), root.judged.model());
+            let other = self.in_place_of(&without).and_then(|other| {
+                let mut terms = hypothesis.terms.clone();
+                terms[index] = other.term;
+                self.finish(terms, other.fit)
+            });
+            if let Some(other) = other.filter(|other| other.score() < hypothesis.score()) {
+                hypothesis = self.pruned(other, root);
+            }
+        }
+        hypothesis
     }
 
     /// Drops what the other terms make needless.
@@ -555,8 +674,12 @@ fn count_effects(terms: &[Term]) -> usize {
 
 /// The index of the best hypothesis that is `wanted`; the root is always wanted.
 fn best(all: &[Hypothesis], wanted: impl Fn(&Hypothesis) -> bool) -> usize {
+    leading(all, |i| wanted(&all[*i])).unwrap_or(0)
+}
+
+/// The index of the best hypothesis among those that are `wanted` by their index.
+fn leading(all: &[Hypothesis], wanted: impl Fn(&usize) -> bool) -> Option<usize> {
     (0..all.len())
-        .filter(|i| wanted(&all[*i]))
+        .filter(wanted)
         .min_by(|a, b| all[*a].score().total_cmp(&all[*b].score()))
-        .unwrap_or(0)
 }

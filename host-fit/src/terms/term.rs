@@ -37,6 +37,54 @@ pub enum Term {
 }
 
 impl Term {
+    /// What a base may have without its being a missing effect, and what imitates some
+    /// effects; their values are the search's.
+    pub(crate) const UNNAMED: [Self; 3] = [Self::LevelRate, Self::Wake(0.0), Self::Inertia(0.0)];
+
+    /// The terms that make `model` of the structure of `lean`; `None` where it is built
+    /// otherwise.
+    pub(super) fn all_of(model: &Model, lean: &Model) -> Option<Vec<Self>> {
+        let has = |lags: &[u16], lag: u16| lags.contains(&lag);
+        let mut terms = Vec::new();
+        if has(&model.state_lags, BEFORE) {
+            terms.push(Self::Inertia(0.0));
+        }
+        let mut lags = [&model.state_lags[..], &model.product_lags].concat();
+        lags.sort_unstable();
+        lags.dedup();
+        lags.retain(|lag| *lag != NEWEST && *lag != BEFORE);
+        terms.extend(lags.into_iter().map(|lag| {
+            match (has(&model.state_lags, lag), has(&model.product_lags, lag)) {
+                (true, true) => Self::Memory(lag),
+                (true, false) => Self::State(lag),
+                _ => Self::Product(lag),
+            }
+        }));
+        for added in &model.effects {
+            match added.name.as_str() {
+                name if name == LEVEL_RATE.name => terms.push(Self::LevelRate),
+                name if name == SLOW_WAKE.name => terms.push(Self::Wake(added.parameters[0])),
+                name if name == ZERO_OFFSET.name => terms.push(Self::Offset),
+                _ => {}
+            }
+        }
+        let bare = terms
+            .iter()
+            .fold(model.clone(), |model, term| term.taken_from(&model, lean));
+        let frame = |model: &Model| {
+            let names: Vec<String> = model.effects.iter().map(|e| e.name.clone()).collect();
+            let lags = (model.state_lags.clone(), model.product_lags.clone());
+            (
+                model.convention,
+                model.averaging,
+                model.b.len(),
+                lags,
+                names,
+            )
+        };
+        (frame(&bare) == frame(lean)).then_some(terms)
+    }
+
     /// The effect, if it is one.
     #[must_use]
     pub fn effect(&self) -> Option<&'static Spec> {
@@ -386,6 +434,30 @@ mod tests {
         assert!(close(&again.b, &model.b), "{:?}", again.b);
         assert!(close(&again.c, &model.c), "{:?}", again.c);
         assert_eq!(again.delay, model.delay);
+    }
+
+    #[test]
+    fn a_model_is_taken_apart_into_the_terms_that_made_it() {
+        let lean = base();
+        let terms = [
+            Term::Inertia(8.0),
+            Term::Memory(200),
+            Term::State(230),
+            Term::Product(260),
+            Term::LevelRate,
+            Term::Offset,
+        ];
+        let model = terms
+            .iter()
+            .fold(lean.clone(), |m, term| term.added_to(&m, &[0.01]));
+        let found = Term::all_of(&model, &lean).unwrap();
+        let names = |terms: &[Term]| terms.iter().map(Term::name).collect::<Vec<_>>();
+        assert_eq!(names(&found), names(&terms));
+        let other = Model {
+            product_lags: vec![3],
+            ..lean.clone()
+        };
+        assert!(Term::all_of(&other, &lean).is_none());
     }
 
     /// y behind a lag of 8 samples is what the two lags give, sample by sample.

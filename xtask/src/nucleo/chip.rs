@@ -15,9 +15,12 @@ pub(super) const GPIOC: u32 = 0x4002_0800;
 pub(super) const RCC: u32 = 0x4002_3800;
 pub(super) const FLASH: u32 = 0x4002_3C00;
 
-/// Each peripheral with its length in bytes, and the register and bit of RCC
-/// that give it its clock; the others have one always.
-pub(super) const BLOCKS: [(&str, u32, u32, Option<(u32, u32)>); 9] = [
+/// Register and bit of RCC that give a peripheral its clock.
+type Clock = (u32, u32);
+
+/// Each peripheral with its address, its length in bytes and its clock; those
+/// without have one always.
+pub(super) const BLOCKS: [(&str, u32, u32, Option<Clock>); 9] = [
     ("TIM2", TIM2, 0x54, Some((RCC + 0x40, 0))),
     ("IWDG", IWDG, 0x10, None),
     ("USART2", USART2, 0x1C, Some((RCC + 0x40, 17))),

@@ -236,10 +236,10 @@ fn valve(chip: &Chip) -> Result<String> {
         output < clock,
         "the valve was not shut before anything was waited for"
     );
-    let raised = chip.written.iter().any(|w| {
-        w.address == GPIOB + 0x18 && w.value >> 10 & 1 == 1
-            || w.address == GPIOB + 0x14 && w.value >> 10 & 1 == 1
-    });
+    let raised = chip
+        .written
+        .iter()
+        .any(|w| [GPIOB + 0x14, GPIOB + 0x18].contains(&w.address) && w.value >> 10 & 1 == 1);
     ensure!(!raised, "PB10 was high during the start");
     Ok("low, then an output, before the clock is waited for".into())
 }

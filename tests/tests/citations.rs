@@ -15,7 +15,9 @@ fn files() -> Vec<(PathBuf, String)> {
         for entry in std::fs::read_dir(&folder).expect("a folder") {
             let path = entry.expect("an entry").path();
             let name = path.file_name().unwrap_or_default().to_string_lossy();
-            if path.is_dir() && !name.starts_with('.') && !matches!(&*name, "target" | "out") {
+            // What is built and what others wrote is not ours.
+            let ours = !matches!(&*name, "target" | "out" | "node_modules");
+            if path.is_dir() && !name.starts_with('.') && ours {
                 folders.push(path);
             } else if [".rs", ".md", ".py"].iter().any(|end| name.ends_with(end)) {
                 let text = std::fs::read_to_string(&path).expect("text");

@@ -1,9 +1,10 @@
 //! The firmware's own desk, controller and law in a thread, with a simple rig.
 
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU16, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 use firmware::controller::Reading;
 use firmware::link::desk::Desk;
@@ -13,6 +14,9 @@ use model_core::{Input, step};
 use rig_line::emulator::Pace;
 use rig_line::{Bad, Host, LineError, Port};
 use wire::Outbox;
+
+/// How long the board's line waits for a host that does not read.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// What can be done to the board while it runs.
 #[derive(Clone, Default)]
@@ -103,6 +107,7 @@ fn run(hands: &Hands, mut line: UnixStream) {
         open: false,
     };
     let mut k = 0_u64;
+    let mut told = Told::default();
     'start: loop {
         let mut controller = on_board::controller();
         let mut desk = Desk::new(on_board::BOARD);
@@ -170,7 +175,35 @@ fn run(hands: &Hands, mut line: UnixStream) {
                 out.push(byte);
                 tenths -= 10;
             }
-            let _ = line.write(&out);
+            told.write(&mut line, &out);
+        }
+    }
+}
+
+/// The board's end of the line. A host that is kept waiting for a processor is not
+/// one that has stopped reading: its line waits, as no wire would overflow by that.
+#[derive(Default)]
+struct Told {
+    /// Nobody reads any more; found out once, so that the board's time goes on.
+    in_vain: bool,
+}
+
+impl Told {
+    fn write(&mut self, line: &mut UnixStream, mut bytes: &[u8]) {
+        let asked = Instant::now();
+        while !bytes.is_empty() {
+            match line.write(bytes) {
+                Ok(count) => {
+                    bytes = &bytes[count..];
+                    self.in_vain = false;
+                }
+                Err(error) if error.kind() != ErrorKind::WouldBlock => return,
+                Err(_) if self.in_vain => return,
+                Err(_) => {
+                    self.in_vain = asked.elapsed() > PATIENCE;
+                    std::thread::sleep(Duration::from_micros(200));
+                }
+            }
         }
     }
 }

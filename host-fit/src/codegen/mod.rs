@@ -22,7 +22,7 @@ mod law;
 mod pieces;
 
 use crate::model::{Added, Delay, Footprint, Law, Model};
-use model_core::control::tracking::Unusable;
+use model_core::control::Unusable;
 use model_core::effect::Spec;
 use model_core::self_test;
 use proc_macro2::{Literal, TokenStream};

@@ -6,13 +6,12 @@ use anyhow::{Context, bail};
 use host_fit::design::{MaximiseRequest, Proof, TrackRequest};
 use host_fit::model::Model;
 use host_fit::output::write_atomic;
-use host_fit::steps::{self, Design, DesignRequest};
+use host_fit::steps::{self, DesignRequest};
 use rig_line::RigFile;
-use serde::Serialize;
 
 use super::average::{not_negative, positive};
 use super::drawings::proof_picture;
-use super::words::Words;
+use super::tried::Tried;
 use super::{Console, page};
 use crate::plants::Plants;
 
@@ -94,41 +93,6 @@ fn share(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if (0.0..=1.0).contains(&x) => Ok(x),
         _ => Err("a number from 0 to 1 is needed".into()),
-    }
-}
-
-/// A law and how it did on the simulated plants.
-#[derive(Serialize)]
-pub(super) struct Tried {
-    #[serde(flatten)]
-    pub(super) design: Design,
-    #[serde(flatten)]
-    pub(super) proof: Option<Proof>,
-    /// What the plants are without, one sentence each.
-    pub(super) not_tried: Vec<String>,
-}
-
-impl Tried {
-    /// Why the law must not be written, unless it is to be by `force`.
-    fn refused(&self, force: bool) -> Option<String> {
-        let lost = self.design.law.lost();
-        (!force && !lost.is_empty()).then(|| {
-            format!(
-                "the law was not written: it loses attachment with {}. Choose a target that is further inside of what can \
-                 be held, or find out whether the rig has that and `extend` the model; --force writes the law as it is, and \
-                 the file says so",
-                lost.join(", ")
-            )
-        })
-    }
-}
-
-impl Words for Tried {
-    fn words(&self) -> String {
-        let notes = self.not_tried.iter().map(|why| format!("note: {why}"));
-        let told = std::iter::once(self.design.words()).chain(notes);
-        let told = told.chain(self.proof.as_ref().map(Words::words));
-        told.collect::<Vec<_>>().join("\n")
     }
 }
 

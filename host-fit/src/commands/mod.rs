@@ -34,6 +34,7 @@ pub(crate) mod record;
 mod rig_constants;
 pub(crate) mod rules;
 pub(crate) mod simulate;
+mod tried;
 pub(crate) mod watch;
 mod words;
 pub(crate) mod workbench;

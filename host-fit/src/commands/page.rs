@@ -12,8 +12,8 @@ use host_fit::picture::{
 use host_fit::residual::Failures;
 use host_fit::steps::{Comparison, Extension, Finding, Identification, Terms};
 
-use super::design::Tried;
 use super::drawings::{ladder_picture, proof_picture};
+use super::tried::Tried;
 use super::words::{Words, describe, ladder_rows, ranking_rows, role_name, score_rows, short};
 
 /// The page of a comparison, made by `command`.

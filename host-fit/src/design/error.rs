@@ -3,7 +3,7 @@
 use crate::model::{Model, Start};
 use closed_loop::SAMPLE_PERIOD_S;
 use model_core::control::Unreachable;
-use model_core::control::tracking::Unusable;
+use model_core::control::Unusable;
 use thiserror::Error;
 
 /// Why no law was designed.

@@ -2,7 +2,7 @@
 //! predictions made a delay ago, low-pass filtered, is added to those made now
 //! (Smith's correction), and a slow integral removes what remains.
 
-use crate::control::tracking::Tracking;
+use crate::control::constants::Tracking;
 use crate::history::{DelayLine, Memory, Past};
 use crate::real::Real;
 

@@ -1,7 +1,8 @@
 //! Golden runs of the laws: whether a board decides what the host decided.
 
+use crate::control::constants::Tracking;
 use crate::control::pulses::{Played, Pulses};
-use crate::control::tracking::{Tracking, TrackingState};
+use crate::control::tracking::TrackingState;
 use crate::effect::Effect;
 use crate::history::Memory;
 use crate::model::{Parts, StateOf};

@@ -7,6 +7,7 @@
 
 pub mod ahead;
 pub mod budget;
+mod constants;
 mod correction;
 pub mod golden;
 pub mod hold;
@@ -15,7 +16,8 @@ pub mod reference;
 pub mod tracking;
 
 pub use budget::{Air, Switches};
+pub use constants::{Tracking, Unusable};
 pub use hold::{Hold, HoldTimes};
 pub use pulses::{PulseTrain, Pulses};
 pub use reference::{Reachable, Unreachable};
-pub use tracking::{Decision, Measurement, Tracking, TrackingState};
+pub use tracking::{Decision, Measurement, TrackingState};

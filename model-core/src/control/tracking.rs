@@ -15,81 +15,19 @@
 
 use crate::checks::look_ahead;
 use crate::control::ahead::{self, Foreknown};
-use crate::control::budget::{Budget, Purse};
+use crate::control::budget::Purse;
+use crate::control::constants::{Tracking, Unusable};
 use crate::control::correction::{Correction, limited};
-use crate::control::hold::{Hold, HoldTimes};
-use crate::control::reference::{Reachable, Unreachable, ramp};
+use crate::control::hold::Hold;
+use crate::control::reference::{Unreachable, ramp};
 use crate::effect::Effect;
 use crate::history::Memory;
 use crate::model::{Input, Parts, StateOf, observe};
 use crate::real::Real;
-use core::fmt;
 
 /// A reading of the sensor; `None` (or a number that is not finite) where there
 /// is none.
 pub type Measurement<T> = Option<T>;
-
-/// The constants of the law. All times in samples.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tracking<T> {
-    /// y*, the friction to hold, of the flow itself (before sensor effects).
-    pub reference: T,
-    /// What can be held.
-    pub reachable: Reachable<T>,
-    /// Fastest change of the reference, y per sample; 0 follows steps as steps.
-    pub slope: T,
-    /// Shortest on and off times.
-    pub hold: HoldTimes,
-    /// Limits on switching and air.
-    pub budget: Budget,
-    /// How far ahead predictions are judged, at least 1 and at most the shortest delay.
-    pub lead: u16,
-    /// From an opening command to half the jet strength (valve, edge delays).
-    pub opening: u16,
-    /// From a closing command to half the jet strength.
-    pub closing: u16,
-    /// Share of each residual that corrects the estimate, 0–1: 0 trusts the
-    /// model alone, 1 the sensor alone.
-    pub observer: T,
-    /// Share of each prediction error that enters its average, 0–1 per sample.
-    pub bias_rate: T,
-    /// Integral action, 1 per sample.
-    pub integral_rate: T,
-    /// Neither bias nor integral corrects more than this, y.
-    pub correction_limit: T,
-    /// A residual counts as no more than this, y: one bad reading does no harm.
-    pub residual_limit: T,
-}
-
-/// A constant of the law that makes no sense.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Unusable {
-    /// A share or rate is not within 0–1, or a limit is negative or not finite.
-    Constant(&'static str),
-    /// The look-ahead memory has fewer samples than the delay, valve and half a
-    /// hold time together.
-    LookAhead,
-    /// Tracking needs the full model; an averaged model (eq. 15) does not see
-    /// single switches.
-    AveragedModel,
-}
-
-impl fmt::Display for Unusable {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Constant(name) => write!(f, "`{name}` of the tracking law is out of range"),
-            Self::LookAhead => f.write_str(
-                "the look-ahead memory is shorter than delay, valve and half a hold time; enlarge it",
-            ),
-            Self::AveragedModel => f.write_str(
-                "the tracking law needs a full model; identify without averaging",
-            ),
-        }
-    }
-}
-
-impl core::error::Error for Unusable {}
 
 /// What the law remembers: the model's state `S` and look-ahead memory for `A` samples.
 #[derive(Clone, Copy, Debug)]
@@ -344,6 +282,9 @@ struct Look<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::budget::Budget;
+    use crate::control::hold::HoldTimes;
+    use crate::control::reference::Reachable;
     use crate::history::Past;
     use crate::paper::table_two;
     use crate::recursion::LagConvention;

@@ -7,6 +7,7 @@ mod delimited;
 mod mapping;
 mod mat;
 mod npy;
+mod open;
 pub(crate) mod problem;
 mod source;
 

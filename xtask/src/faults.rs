@@ -90,7 +90,10 @@ fn dialogue(line: &mut Line) -> Result<()> {
     line.until("status", |answer| answer.starts_with("disarmed"))?;
     for (injection, reason) in INJECTED {
         line.until("arm", |answer| answer.starts_with("armed"))?;
-        line.until("status", |answer| answer.contains("valve=1"))?;
+        // The flow is held. Before that, a stuck sensor is seen by its residual first.
+        line.until("status", |answer| {
+            answer.contains("valve=1") && friction(answer).is_some_and(|y| y > 0.4)
+        })?;
         line.send(injection)?;
         let answer = line.until("status", latched(reason))?;
         println!("{injection}: {answer}");
@@ -110,6 +113,12 @@ fn dialogue(line: &mut Line) -> Result<()> {
     line.send("9")?;
     line.until("arm", |answer| answer.starts_with("armed"))?;
     Ok(())
+}
+
+/// The friction in a line of status.
+fn friction(answer: &str) -> Option<f32> {
+    let y = answer.split(' ').find_map(|word| word.strip_prefix("y="))?;
+    y.parse().ok()
 }
 
 fn latched(reason: &str) -> impl Fn(&str) -> bool {

@@ -48,6 +48,8 @@ struct Played {
     state: model::IdentifiedState,
     open: bool,
     illness: u8,
+    /// The last reading before the sensor was stuck.
+    held: f32,
     flicker: bool,
 }
 
@@ -61,10 +63,13 @@ impl Sensor for Played {
         self.flicker = !self.flicker;
         let noise = if self.flicker { 1.0 } else { 0.0 };
         let healthy = SETTINGS.calibration.counts(y) + noise;
+        if self.illness != b'3' {
+            self.held = healthy;
+        }
         match self.illness {
             b'1' => f32::NAN,
             b'2' => 4095.0,
-            b'3' => 1000.0,
+            b'3' => self.held,
             b'4' => 3900.0 + noise,
             _ => healthy,
         }
@@ -121,6 +126,7 @@ fn main() -> ! {
         state: model::state(&identified),
         open: false,
         illness: b'0',
+        held: 0.0,
         flicker: false,
     };
     let samples = Samples(core::cell::Cell::new(0));

@@ -71,13 +71,17 @@ impl Session<'_> {
         Term::UNNAMED.iter().any(|stand_in| {
             let without = stand_in.taken_from(given, given);
             without != *given
-                && self.search.in_place_of(&without).is_some_and(|other| {
-                    let ratio = other.held_out.rmse() / as_given.rmse();
-                    let p = p_value(as_given, &other.held_out);
-                    let better = ratio < 1.0 - RULES.alike && p < RULES.level;
-                    let leaner = ratio < 1.0 + RULES.alike && other.term.cost() < stand_in.cost();
-                    better || leaner
-                })
+                && self
+                    .search
+                    .in_place_of(stand_in, &without, |term| term.effect().is_some())
+                    .is_some_and(|other| {
+                        let ratio = other.held_out.rmse() / as_given.rmse();
+                        let p = p_value(as_given, &other.held_out);
+                        let better = ratio < 1.0 - RULES.alike && p < RULES.level;
+                        let leaner =
+                            ratio < 1.0 + RULES.alike && other.term.cost() < stand_in.cost();
+                        better || leaner
+                    })
         })
     }
 

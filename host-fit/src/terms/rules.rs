@@ -30,8 +30,10 @@ rules! {
     finished: usize = 4, "", "the same rigs";
     /// A given structure of more terms than this is no place to set out from.
     most_given: usize = 6, "terms", "judgement: each has to be tried without at the end";
-    /// Effects that are tried in the place of a term that has no name.
+    /// Effects that are tried in the place of another term.
     in_its_place: usize = 3, "", "judgement: the truth leads the screening or is next to the leader";
+    /// A base that is worse by no more than this, its parameters paid for, takes the place of a second name.
+    as_well: f64 = 0.01, "share of the rms error", "a lag of the film and a second lag of the flow are one model where the delay is fixed, and the second costs a parameter more";
     /// Steps that every proposal is followed for.
     brief: usize = 6, "iterations", "fewer leave thresholds where they were";
     /// Level of the tests.

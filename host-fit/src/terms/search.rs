@@ -248,7 +248,7 @@ impl Search<'_> {
         let end = best(&all, |_| true);
         let bare_end = best(&all, Hypothesis::is_bare);
         let found = self.pruned(all[end].clone(), &root);
-        let found = self.renamed(found, &root);
+        let found = self.exchanged(found, &root);
         let bare = if bare_end == end {
             found.clone()
         } else {
@@ -561,17 +561,34 @@ impl Search<'_> {
         })
     }
 
-    /// The single effect that does best on a model that a term was taken from.
-    pub(crate) fn in_place_of(&self, without: &Model) -> Option<InPlace> {
+    /// The single term of those `wanted` that does best in the place of one that was taken
+    /// out, on the model without it: one of each kind, and of the leading effects.
+    pub(crate) fn in_place_of(
+        &self,
+        taken: &Term,
+        without: &Model,
+        wanted: impl Fn(&Term) -> bool,
+    ) -> Option<InPlace> {
         let judged = self.judge.refitted(without).ok()?;
         let model = judged.model();
         let screen = Screen::new(self.judge, model)?;
         let table = Table::of(&screen, &self.known, true);
-        let effects = table
+        let kind = |term: &Term| term.with_lag(0).name();
+        let (mut met, mut effects) = (vec![kind(taken)], 0);
+        let leading: Vec<_> = table
             .candidates
             .iter()
-            .filter(|c| c.term.effect().is_some());
-        let leading: Vec<_> = effects.take(RULES.in_its_place).collect();
+            .filter(|candidate| {
+                let kind = kind(&candidate.term);
+                if met.contains(&kind) || !wanted(&candidate.term) {
+                    return false;
+                }
+                met.push(kind);
+                let is_effect = candidate.term.effect().is_some();
+                effects += usize::from(is_effect);
+                !is_effect || effects <= RULES.in_its_place
+            })
+            .collect();
         let tried = leading.into_par_iter().filter_map(|candidate| {
             let proposal = screen.alone(&table, candidate)?;
             let fit = self.set_out(model, &proposal, RULES.brief)?;
@@ -590,26 +607,41 @@ impl Search<'_> {
             .min_by(|a, b| score(a).total_cmp(&score(b)))
     }
 
-    /// A hypothesis with an effect in the place of a term without a name, if it does
-    /// better so: such terms imitate effects, and a search that took one first does not
-    /// come back.
-    fn renamed(&self, mut hypothesis: Hypothesis, root: &Hypothesis) -> Hypothesis {
-        for unnamed in Term::UNNAMED {
-            let is_it = |term: &Term| term.name() == unnamed.name();
-            let room = self.effects && count_effects(&hypothesis.terms) < self.most_effects;
-            let Some(index) = hypothesis.terms.iter().position(is_it) else {
-                continue;
-            };
-            if !room || self.interrupted() {
-                break;
-            }
-            let without = unnamed.taken_from(hypothesis.judged.model(), root.judged.model());
-            let other = self.in_place_of(&without).and_then(|other| {
+    /// A hypothesis with other terms in the place of its own, one by one, if it does
+    /// better so: terms of the base imitate effects and effects imitate those, and a
+    /// search that took the wrong one first does not come back.
+    fn exchanged(&self, mut hypothesis: Hypothesis, root: &Hypothesis) -> Hypothesis {
+        let mut done: Vec<String> = Vec::new();
+        while let Some(index) = hypothesis
+            .terms
+            .iter()
+            .position(|term| !done.contains(&term.name()))
+            && self.effects
+            && !self.interrupted()
+        {
+            let term = &hypothesis.terms[index];
+            done.push(term.name());
+            let effects = count_effects(&hypothesis.terms);
+            let others = effects - count_effects(std::slice::from_ref(term));
+            let room = others < self.most_effects;
+            let wanted = |other: &Term| room || other.effect().is_none();
+            let without = term.taken_from(hypothesis.judged.model(), root.judged.model());
+            let other = self.in_place_of(term, &without, wanted).and_then(|other| {
+                done.push(other.term.name());
                 let mut terms = hypothesis.terms.clone();
                 terms[index] = other.term;
                 self.finish(terms, other.fit)
             });
-            if let Some(other) = other.filter(|other| other.score() < hypothesis.score()) {
+            let Some(other) = other else { continue };
+            // A further name says something only if no base does as well.
+            let needless = effects > 1 && count_effects(&other.terms) < effects;
+            let within = if needless { RULES.as_well } else { 0.0 };
+            if other.score() < hypothesis.score() + within {
+                let from_given = hypothesis.from_given;
+                let other = Hypothesis {
+                    from_given,
+                    ..other
+                };
                 hypothesis = self.pruned(other, root);
             }
         }

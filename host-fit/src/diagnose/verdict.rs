@@ -74,7 +74,8 @@ impl Session<'_> {
                 && self
                     .search
                     .in_place_of(stand_in, &without, |term| term.effect().is_some())
-                    .is_some_and(|other| {
+                    .iter()
+                    .any(|other| {
                         let ratio = other.held_out.rmse() / as_given.rmse();
                         let p = p_value(as_given, &other.held_out);
                         let better = ratio < 1.0 - RULES.alike && p < RULES.level;

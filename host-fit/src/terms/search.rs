@@ -561,17 +561,21 @@ impl Search<'_> {
         })
     }
 
-    /// The single term of those `wanted` that does best in the place of one that was taken
-    /// out, on the model without it: one of each kind, and of the leading effects.
+    /// Single terms in the place of one that was taken out, on the model without it, the
+    /// best first: of those `wanted` one of each kind, and of effects the leading ones.
     pub(crate) fn in_place_of(
         &self,
         taken: &Term,
         without: &Model,
         wanted: impl Fn(&Term) -> bool,
-    ) -> Option<InPlace> {
-        let judged = self.judge.refitted(without).ok()?;
+    ) -> Vec<InPlace> {
+        let Ok(judged) = self.judge.refitted(without) else {
+            return Vec::new();
+        };
         let model = judged.model();
-        let screen = Screen::new(self.judge, model)?;
+        let Some(screen) = Screen::new(self.judge, model) else {
+            return Vec::new();
+        };
         let table = Table::of(&screen, &self.known, true);
         let kind = |term: &Term| term.with_lag(0).name();
         let (mut met, mut effects) = (vec![kind(taken)], 0);
@@ -600,17 +604,20 @@ impl Search<'_> {
                 fit,
             })
         });
-        let tried: Vec<InPlace> = tried.collect();
+        let mut tried: Vec<InPlace> = tried.collect();
         let score = |other: &InPlace| score(other.held_out.rmse(), other.term.cost());
+        tried.sort_by(|a, b| score(a).total_cmp(&score(b)));
         tried
-            .into_iter()
-            .min_by(|a, b| score(a).total_cmp(&score(b)))
     }
 
     /// A hypothesis with other terms in the place of its own, one by one, if it does
     /// better so: terms of the base imitate effects and effects imitate those, and a
     /// search that took the wrong one first does not come back.
     fn exchanged(&self, mut hypothesis: Hypothesis, root: &Hypothesis) -> Hypothesis {
+        if let [Term::Effect { .. }] = hypothesis.terms[..] {
+            // The first round compared all that could stand in its place.
+            return hypothesis;
+        }
         let mut done: Vec<String> = Vec::new();
         while let Some(index) = hypothesis
             .terms
@@ -626,7 +633,8 @@ impl Search<'_> {
             let room = others < self.most_effects;
             let wanted = |other: &Term| room || other.effect().is_none();
             let without = term.taken_from(hypothesis.judged.model(), root.judged.model());
-            let other = self.in_place_of(term, &without, wanted).and_then(|other| {
+            let best = self.in_place_of(term, &without, wanted).into_iter().next();
+            let other = best.and_then(|other| {
                 done.push(other.term.name());
                 let mut terms = hypothesis.terms.clone();
                 terms[index] = other.term;

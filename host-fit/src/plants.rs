@@ -8,7 +8,8 @@ use firmware_sim::bench::{Disturbed, Lost};
 use firmware_sim::instrument::{Converter, Noise};
 use firmware_sim::plant::{BasePlant, Effect, FlowDelay, FreeStream, PlantSpec, RateLaw, Rig};
 use host_fit::design::{CaseGroup, DesignError, RULES, Trial, steady, time_constants};
-use host_fit::model::{Delay, Model, TransportLaw};
+use host_fit::model::{Added, Delay, Model, TransportLaw};
+use model_core::effects::NUISANCES;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -81,7 +82,16 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
         rate_law: RateLaw::default(),
     };
     let (mut effects, mut left_out) = (Vec::new(), Vec::new());
-    for added in &model.effects {
+    let is_nuisance = |added: &&Added| NUISANCES.iter().any(|spec| spec.name == added.name);
+    let (nuisances, physical): (Vec<_>, Vec<_>) = model.effects.iter().partition(is_nuisance);
+    if !nuisances.is_empty() {
+        let names: Vec<&str> = nuisances.iter().map(|added| added.name.as_str()).collect();
+        left_out.push(format!(
+            "tried on plants without {}: their flow is of first order, and their sensor's zero is at 0",
+            names.join(", ")
+        ));
+    }
+    for added in physical {
         match physical_effect(&added.name, &added.parameters) {
             Ok(effect) => effects.push(effect),
             Err(error) => left_out.push(format!(

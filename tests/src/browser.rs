@@ -45,6 +45,8 @@ impl Browser {
                 "--headless=new",
                 "--no-sandbox",
                 "--disable-gpu",
+                // Containers have little of it.
+                "--disable-dev-shm-usage",
                 "--no-first-run",
             ])
             .args([

@@ -6,11 +6,16 @@ use anyhow::{Result, bail};
 
 pub(crate) const TASK: Task = Task {
     name: "browser",
-    does: "tests report and workbench in chromium; leaves pictures in target/browser",
+    does: "tests report and workbench in chromium; leaves pictures in target/browser; --bless takes them as looked at",
     run: browser,
 };
 
-pub(crate) fn browser(_arguments: &[String]) -> Result<()> {
+pub(crate) fn browser(arguments: &[String]) -> Result<()> {
+    let bless = match arguments {
+        [] => false,
+        [only] if only == "--bless" => true,
+        _ => bail!("browser takes --bless and nothing else"),
+    };
     if !exists("chromium") {
         bail!("chromium is missing; run `cargo xtask setup`");
     }
@@ -26,7 +31,7 @@ pub(crate) fn browser(_arguments: &[String]) -> Result<()> {
     }
     // The tests run the program as it is now.
     run(&mut cargo(&["build", "--release", "--package=host-fit"]))?;
-    run(&mut cargo(&[
+    let mut tests = cargo(&[
         "test",
         "--release",
         "--package=scenarios",
@@ -35,5 +40,9 @@ pub(crate) fn browser(_arguments: &[String]) -> Result<()> {
         "--ignored",
         "--nocapture",
         "--test-threads=1",
-    ]))
+    ]);
+    if bless {
+        tests.env("BLESS", "1");
+    }
+    run(&mut tests)
 }

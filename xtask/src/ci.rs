@@ -52,6 +52,7 @@ const STEPS: &[Step] = &[
     ("set-up", || crate::setup::setup(&[])),
     // What a report carries is what the sources give.
     ("pages", || crate::pages::pages(&["--check".to_owned()])),
+    ("browser", || crate::browser::browser(&[])),
     ("no_std", || {
         TARGETS
             .iter()

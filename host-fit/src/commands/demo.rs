@@ -17,7 +17,9 @@ use model_core::control::HoldTimes;
 
 use super::Console;
 use super::drawings::{LoopPicture, ladder_picture, loop_picture};
-use super::page::{command_line, provenance, report_finding, report_runs, report_scores};
+use super::page::{
+    command_line, provenance, report_climb, report_finding, report_runs, report_scores,
+};
 use super::words::{aligned, ladder_table};
 
 /// Show the whole way on bundled data: identify, compare, find the missing effect, add it, generate constants, close
@@ -193,11 +195,7 @@ fn hidden_effect(
     })?;
     report.section("With what was missing");
     report_scores(report, &finding.scores);
-    let runs = [("before", &finding.runs_before), ("after", &finding.runs)];
-    let shown = runs
-        .iter()
-        .filter_map(|(name, runs)| Some((*name, runs.as_deref()?)));
-    report_runs(report, &set.records, &shown.collect::<Vec<_>>(), None);
+    report_climb(report, &set.records, &finding, None);
     finding.model.save(&out.join("hidden-after.toml"))?;
     provenance(report, &set, 0, &command_line());
     let words = format!("{headline}. {meaning}");

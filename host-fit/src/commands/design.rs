@@ -164,6 +164,11 @@ impl Args {
         self.goal == Goal::Track
     }
 
+    /// Whether a law goes into the file even if a trial loses attachment.
+    pub(super) fn force(&self) -> bool {
+        self.force
+    }
+
     /// Where the picture of the loop goes.
     pub(super) fn picture(&self) -> PathBuf {
         self.picture.clone().unwrap_or_else(|| {

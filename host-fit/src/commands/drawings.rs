@@ -71,28 +71,46 @@ pub(crate) fn experiment_picture(separation: &Separation) -> String {
         y: None,
         channels: Vec::new(),
     };
-    let expected = separation.models.iter().filter_map(|model| {
+    let named = separation.effects.len() == separation.models.len();
+    let numbered = separation.models.iter().enumerate();
+    let expected = numbered.filter_map(|(index, model)| {
         let y = model.run_free(&signals).ok()?;
-        Some((model.effect_names().join(" + "), y))
+        // What stands for an effect may be a lag, which is none of a model's effects.
+        let label = match separation.effects.get(index).filter(|_| named) {
+            Some(effect) => effect.clone(),
+            None => model.effect_names().join(" + "),
+        };
+        Some((label, y))
     });
     let expected: Vec<(String, Vec<f64>)> = expected.collect();
     let runs: Vec<LoopRun<'_>> = expected
         .iter()
-        .map(|(label, y)| LoopRun {
+        .enumerate()
+        .map(|(index, (label, y))| LoopRun {
             label,
             y,
-            u: &experiment.u,
+            // All of them get the same command.
+            u: if index == 0 { &experiment.u } else { &[] },
             air: &[],
         })
         .collect();
+    let apart = |k: &usize| {
+        let values = expected.iter().filter_map(|(_, y)| y.get(*k));
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| {
+            (low.min(*y), high.max(*y))
+        });
+        high - low
+    };
+    let most = (0..experiment.u.len()).max_by(|a, b| apart(a).total_cmp(&apart(b)));
+    let most_s = most.unwrap_or_default() as f64 * experiment.sample_period_s;
     closed_loop(&ClosedLoop {
-        title: "What each of the models expects",
+        title: "What each of the models expects, where they differ most",
         y_label: "friction gain y",
         air_label: "",
         sample_period_s: experiment.sample_period_s,
         reference: &[],
         runs: &runs,
-        window_s: None,
+        window_s: Some(((most_s - 0.5).max(0.0), most_s + 0.5)),
     })
 }
 

@@ -3,7 +3,7 @@
 use host_fit::data::{DataSet, Record};
 use host_fit::diagnose::{Diagnosis, Verdict};
 use host_fit::discover::FoundTerm;
-use host_fit::indicators::Scores;
+use host_fit::indicators::{Scores, score};
 use host_fit::model::Model;
 use host_fit::picture::{
     BandPoint, Candidate, Column, CurvePlot, KeyNumber, Living, Ranking, Report, Stretches, Tone,
@@ -137,19 +137,12 @@ pub(crate) fn finding(
         report.section("The model with what was missing");
         report.paragraph(&describe(&found.model));
         report_scores(&mut report, &found.scores);
-        let mut all: Vec<(&str, &[Vec<f64>])> = Vec::new();
-        if let Some(before) = &found.runs_before {
-            all.push(("as given", before));
-        }
-        // The ladder's steps, as curves.
-        if let Some(base) = &found.runs_base
-            && !found.diagnosis.missing.is_empty()
-        {
-            all.push(("refitted without effects", base));
-        }
-        all.push(("with what was missing", runs));
-        let lit = Some((failures, samples.as_slice()));
-        report_runs(&mut report, &records, &all, lit);
+        report_climb(
+            &mut report,
+            &records,
+            found,
+            Some((failures, samples.as_slice())),
+        );
     }
     provenance(&mut report, set, seed, command);
     report.html()
@@ -255,6 +248,51 @@ pub(crate) fn report_runs(
     lit: Option<(&Failures, &[Vec<Stretches>])>,
 ) {
     report.living(&living(records, runs, lit));
+}
+
+/// Measurement and free runs of a diagnosis, record by record: the model as given, the one that it ends in, and, once they are
+/// switched on, the steps of the ladder between them.
+pub(crate) fn report_climb(
+    report: &mut Report,
+    records: &[Record],
+    found: &Finding,
+    lit: Option<(&Failures, &[Vec<Stretches>])>,
+) {
+    let (ladder, last) = (&found.diagnosis.ladder, &found.diagnosis.model);
+    let steps: Vec<(&str, Vec<Vec<f64>>)> = ladder
+        .iter()
+        .skip(1)
+        .filter_map(|rung| {
+            let model = rung.model.as_ref().filter(|model| *model != last)?;
+            let (_, runs) = score(model, records).ok()?;
+            Some((rung.step.as_str(), runs))
+        })
+        .collect();
+    let skipped = steps.len().saturating_sub(most_steps(records));
+    let mut runs: Vec<(&str, &[Vec<f64>])> = Vec::new();
+    let before = found.runs_before.as_deref();
+    runs.extend(before.map(|before| ("as given", before)));
+    let first = runs.len();
+    let shown = steps[skipped..].iter();
+    runs.extend(shown.map(|(step, runs)| (*step, runs.as_slice())));
+    let between = first..runs.len();
+    if let Some(after) = &found.runs {
+        let label = match found.diagnosis.missing.is_empty() {
+            true => "as diagnosed",
+            false => "with what was missing",
+        };
+        runs.push((label, after));
+    }
+    let mut living = living(records, &runs, lit);
+    living.off(between);
+    report.living(&living);
+}
+
+/// How many steps of a ladder a page can carry as curves: it is to weigh less than 5 MB, and six lines can be told apart.
+fn most_steps(records: &[Record]) -> usize {
+    const SAMPLES: usize = 320_000;
+    let samples: usize = records.iter().map(Record::len).sum();
+    (SAMPLES / samples.max(1)).min(4)
 }
 
 /// The numbers of [`report_runs`].

@@ -101,7 +101,14 @@ pub fn diagnose(
     };
     progress("the model as given");
     let as_given = judge.held_out(|_| &given_inside)?;
-    let first = session.rung(&as_given, &[], "the model as given");
+    let first = Rung::of(
+        &judge,
+        &session.units,
+        &as_given,
+        &[],
+        "the model as given",
+        Some(given.clone()),
+    );
     if let Some(diagnosis) = session.nothing_at_once(given, &given_inside, &as_given, &first) {
         return Ok(diagnosis);
     }
@@ -116,7 +123,6 @@ pub fn diagnose(
     if interrupt.load(Ordering::Relaxed) {
         return Err(DiagnoseError::Interrupted);
     }
-    let root_errors = root.judged.held_out.clone();
     let origin = root.clone();
     let second = || search.second_root(&given_inside, &origin);
     let mut found = search.run(root, second);
@@ -127,7 +133,7 @@ pub fn diagnose(
         || reached > (1.0 - RULES.worthwhile) * as_given.rmse())
         && !found.set_out_twice()
         && let Ok(judged) = judge.refitted(&given_inside)
-        && judged.rmse() < root_errors.rmse()
+        && judged.rmse() < origin.judged.rmse()
     {
         let from_given = search.run(Hypothesis::new(judged), || None);
         if from_given.best.judged.rmse() < (1.0 - RULES.worthwhile) * reached {
@@ -137,7 +143,7 @@ pub fn diagnose(
     let restarted_s = restarted.map(|samples| samples as f64 * given.sample_period_s);
     Ok(session.conclude(
         found,
-        [first, session.rung(&root_errors, &[], step)],
+        [first, session.rung(&origin.judged, &[], step)],
         &as_given,
         restarted_s,
     ))

@@ -43,6 +43,10 @@ pub struct Rung {
     pub noise_rmse: Option<f64>,
     /// What was done to get here, in words.
     pub step: String,
+    /// The model that stands here, fitted to everything that may be learned from; none on the way to a discovery, where
+    /// the terms have no names yet.
+    #[serde(skip)]
+    pub model: Option<Model>,
 }
 
 impl Rung {
@@ -53,6 +57,7 @@ impl Rung {
         held_out: &HeldOut,
         effects: &[String],
         step: &str,
+        model: Option<Model>,
     ) -> Self {
         let measured = judge.noise_source == NoiseSource::Measured;
         Self {
@@ -61,6 +66,7 @@ impl Rung {
             validate_fit_percent: 100.0 * (1.0 - judge.unexplained_share(held_out).sqrt()),
             noise_rmse: measured.then(|| judge.noise_rmse() * units.y),
             step: step.to_owned(),
+            model,
         }
     }
 }

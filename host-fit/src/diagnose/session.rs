@@ -5,7 +5,7 @@ use super::outcome::Conclusion;
 use super::ranking::{not_tried, ranked, rivals};
 use super::{DiagnoseError, Diagnosis, Options, RULES, Rung, Verdict, estimates};
 use crate::model::Model;
-use crate::terms::{Found, HeldOut, Hypothesis, Judge, Search, Term, Units, p_value};
+use crate::terms::{Found, HeldOut, Hypothesis, Judge, Judged, Search, Term, Units, p_value};
 use model_core::effect::Spec;
 use std::collections::BTreeMap;
 
@@ -21,8 +21,11 @@ impl Session<'_> {
         self.search.judge
     }
 
-    pub(super) fn rung(&self, held_out: &HeldOut, effects: &[String], step: &str) -> Rung {
-        Rung::of(self.judge(), &self.units, held_out, effects, step)
+    /// The step of the ladder on which `judged` stands.
+    pub(super) fn rung(&self, judged: &Judged, effects: &[String], step: &str) -> Rung {
+        let (judge, units) = (self.judge(), &self.units);
+        let model = units.model_out(&judge.final_fit(judged).model);
+        Rung::of(judge, units, &judged.held_out, effects, step, Some(model))
     }
 
     /// Decoys' shifts, as fractions of a record.
@@ -96,7 +99,7 @@ impl Session<'_> {
         let mut ladder = first.to_vec();
         if !context.terms.is_empty() {
             let step = format!("with {}", context.words());
-            ladder.push(self.rung(&context.judged.held_out, &[], &step));
+            ladder.push(self.rung(&context.judged, &[], &step));
         }
         ladder.extend(self.rungs(&last, &order, &found.root));
         let sets = self.sets(&last, &order, &others, &found.root);
@@ -173,7 +176,7 @@ impl Session<'_> {
         for count in (1..=order.len()).rev() {
             let names: Vec<String> = order[..count].iter().map(|s| s.name.to_owned()).collect();
             let step = format!("with {}", order[count - 1].name);
-            rungs.push(self.rung(&current.judged.held_out, &names, &step));
+            rungs.push(self.rung(&current.judged, &names, &step));
             if count > 1 {
                 let of = |t: &Term| t.effect().is_some_and(|s| s.name == order[count - 1].name);
                 let without = current.terms.iter().position(of);

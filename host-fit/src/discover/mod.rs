@@ -110,11 +110,12 @@ pub fn discover(
     };
     let rung = |hypothesis: &Hypothesis, terms: &[String], step: &str| {
         let held_out = &hypothesis.judged.held_out;
-        Rung::of(judge, units, held_out, terms, step)
+        Rung::of(judge, units, held_out, terms, step, None)
     };
     progress("the model as given");
     let as_given = judge.held_out(|_| &bench.given)?;
-    let mut ladder = vec![Rung::of(judge, units, &as_given, &[], "the model as given")];
+    let given_rung = Rung::of(judge, units, &as_given, &[], "the model as given", None);
+    let mut ladder = vec![given_rung];
     progress("the base");
     let root = search.root(&bench.given, bench.mid_run)?;
     if interrupt.load(Ordering::Relaxed) {

@@ -28,5 +28,5 @@ pub use error::IdentifyError;
 pub use options::{IdentifyOptions, Objective};
 pub use refinement::Refinement;
 pub use rules::{RULES, Rules};
-pub use run::{Identified, identify};
+pub use run::{Identified, Watcher, identify};
 pub use structure::{ExponentialDelay, InputDelay, Structure};

@@ -1,6 +1,7 @@
 //! One identification, from records to a model.
 
 use model_core::effects::StateDependentDelay;
+use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
@@ -18,7 +19,7 @@ use super::regression::Regression;
 use super::structure::{InputDelay, Series};
 use crate::data::{Record, Use};
 use crate::model::{Delay, Model, Training};
-use crate::search::{Progress, StopReason};
+use crate::search::{Point, Progress, Snapshot, StopReason};
 use model_core::average::WINDOW;
 
 /// Result of an identification.
@@ -50,6 +51,42 @@ pub struct Identified {
     pub pole_on: f64,
 }
 
+/// Who watches an identification: the numbers of its search, and the model behind them.
+pub trait Watcher: Progress {
+    /// The model that is best so far, after each report. It is made when it is asked for, in the search's own time.
+    fn model(&self, _best: &dyn Fn() -> Option<Model>) {}
+}
+
+/// Nobody watches.
+impl Watcher for () {}
+
+/// Shows the best point of a search as a model.
+struct Shown<'a> {
+    to: &'a dyn Watcher,
+    series: &'a [Series<'a>],
+    records: &'a [&'a Record],
+    options: &'a IdentifyOptions,
+    /// The search has the other one for itself; made once somebody looks.
+    regression: OnceLock<Regression>,
+}
+
+impl Progress for Shown<'_> {
+    fn report(&self, snapshot: &Snapshot) {
+        self.to.report(snapshot);
+    }
+
+    fn best(&self, point: &Point) {
+        self.to.model(&|| {
+            let make = || Regression::new(self.series, &self.options.structure);
+            let regression = self.regression.get_or_init(make);
+            let delays = regression.layout.delays(point);
+            let (solution, squares) = regression.normal(&delays).solve();
+            let norm = squares.sqrt();
+            Some(model(&delays, &solution, self.records, self.options, norm))
+        });
+    }
+}
+
 /// Identifies a model from the identify records of `data`; validate records only
 /// judge the refinement.
 ///
@@ -58,7 +95,7 @@ pub struct Identified {
 pub fn identify(
     data: &[Record],
     options: &IdentifyOptions,
-    progress: &dyn Progress,
+    watcher: &dyn Watcher,
     interrupt: &AtomicBool,
 ) -> Result<Identified, IdentifyError> {
     let started = Instant::now();
@@ -69,7 +106,14 @@ pub fn identify(
         .map(|r| Series { u: &r.u, y: &r.y })
         .collect();
     let regression = Regression::new(&series, &options.structure);
-    let (regression, report) = search(regression, options, progress, interrupt);
+    let shown = Shown {
+        to: watcher,
+        series: &series,
+        records: &records,
+        options,
+        regression: OnceLock::new(),
+    };
+    let (regression, report) = search(regression, options, &shown, interrupt);
     let Some(best) = report.best else {
         return Err(IdentifyError::NoResult { stop: report.stop });
     };
@@ -161,7 +205,7 @@ mod tests {
     use super::super::refinement::epsilon;
     use super::super::structure::Structure;
     use super::*;
-    use crate::search::{PollKind, Settings, Snapshot};
+    use crate::search::{PollKind, Settings};
     use model_core::recursion::LagConvention;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -367,6 +411,7 @@ mod tests {
                 self.0.store(snapshot.evaluations > 3, Ordering::Relaxed);
             }
         }
+        impl Watcher for StopAfter<'_> {}
         let flag = AtomicBool::new(false);
         let watch = StopAfter(&flag, AtomicUsize::new(0));
         let options = options(Objective::OneStep, InputDelay::Fixed { delays: None });

@@ -41,6 +41,9 @@ pub struct Living {
     records: Vec<LivingRecord>,
     /// Names of the models.
     runs: Vec<String>,
+    /// Runs that are not shown until they are asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    off: Vec<usize>,
     coordinates: Vec<Coordinate>,
 }
 
@@ -111,8 +114,15 @@ impl Living {
             label: label.to_owned(),
             records: records.iter().enumerate().map(record).collect(),
             runs: runs.iter().map(|(name, _)| (*name).to_owned()).collect(),
+            off: Vec::new(),
             coordinates: Vec::new(),
         }
+    }
+
+    /// These runs are not shown until they are asked for.
+    pub fn off(&mut self, runs: impl IntoIterator<Item = usize>) -> &mut Self {
+        self.off.extend(runs);
+        self
     }
 
     /// Adds a coordinate of "where it fails": which bin each sample is in, per record. In the order of the picture's panels.
@@ -141,7 +151,9 @@ impl Living {
     }
 }
 
-fn packed(values: &[f64]) -> String {
+/// Samples as a page's script takes them: single precision, base64.
+#[must_use]
+pub fn packed(values: &[f64]) -> String {
     let bytes: Vec<u8> = values
         .iter()
         .flat_map(|v| (*v as f32).to_le_bytes())

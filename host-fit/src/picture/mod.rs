@@ -32,7 +32,7 @@ pub use curve::{BandPoint, CurvePlot, curve};
 pub use delay_law::{DelayEdge, DelayLawPlot, LawPoint, MeasuredDelay, delay_law};
 pub use format::significant;
 pub use ladder::{Ladder, LadderRecord, LadderStep, ladder};
-pub use living::{Living, Stretches};
+pub use living::{Living, Stretches, packed};
 pub use overlay::{LabelledRun, Overlay, overlay};
 pub use ranking::{Candidate, Ranking, ranking};
 pub use report::{Column, KeyNumber, Report, Tone, workbench_page};

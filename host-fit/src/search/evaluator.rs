@@ -33,6 +33,8 @@ pub struct Snapshot {
 pub trait Progress: Sync {
     /// Called after each block of evaluations and each improvement, on the searching thread.
     fn report(&self, snapshot: &Snapshot);
+    /// The point that is best so far, called after each report of one.
+    fn best(&self, _point: &Point) {}
 }
 
 /// No progress wanted.
@@ -263,6 +265,9 @@ impl<'a, P: Problem> Evaluator<'a, P> {
             budget: self.budget,
             best: self.best.as_ref().map_or(f64::INFINITY, |b| b.value),
         });
+        if let Some(best) = &self.best {
+            self.progress.best(&best.point);
+        }
         Ok(found)
     }
 }

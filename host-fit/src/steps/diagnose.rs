@@ -34,8 +34,6 @@ pub struct Finding {
     pub scores: Scores,
     /// The free run of the given model over each record, y; none if it diverges.
     pub runs_before: Option<Vec<Vec<f64>>>,
-    /// The free run of the model refitted without the effects that were added, the rung before them; none if it diverges.
-    pub runs_base: Option<Vec<Vec<f64>>>,
     /// The free run of the final model over each record, y; none if it diverges.
     pub runs: Option<Vec<Vec<f64>>>,
     /// What a term that no catalogue has would do; looked for where the catalogue explains too little.
@@ -158,7 +156,6 @@ pub fn diagnose(
         other => other?,
     };
     let runs_before = score(model, &records).ok().map(|(_, runs)| runs);
-    let runs_base = score(&diagnosis.base, &records).ok().map(|(_, runs)| runs);
     let (scores, runs) = match score(&diagnosis.model, &records) {
         Ok((scores, runs)) => (scores, Some(runs)),
         Err(_) => (score_new(&diagnosis.model, &records)?.0, None),
@@ -181,7 +178,6 @@ pub fn diagnose(
         unstable,
         scores,
         runs_before,
-        runs_base,
         runs,
         beyond,
         detectable,

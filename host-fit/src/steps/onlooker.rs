@@ -2,6 +2,8 @@
 
 use std::sync::atomic::AtomicBool;
 
+use crate::identify::Watcher;
+use crate::model::Model;
 use crate::search::{Progress, Snapshot};
 
 /// Someone who watches a step at work, and may ask it to end. The unit type `()` watches nothing and never asks.
@@ -12,6 +14,8 @@ pub trait Onlooker: Sync {
     fn now(&self, _what: &str) {}
     /// How far a search has come.
     fn sees(&self, _snapshot: &Snapshot) {}
+    /// The model that the search has found so far. It is made when it is asked for, and the search waits meanwhile.
+    fn finds(&self, _best: &dyn Fn() -> Option<Model>) {}
     /// The piece of work is over.
     fn ends(&self) {}
     /// Something to know before a long computation, not after it.
@@ -34,6 +38,12 @@ pub(super) struct Searching<'a>(pub(super) &'a dyn Onlooker);
 impl Progress for Searching<'_> {
     fn report(&self, snapshot: &Snapshot) {
         self.0.sees(snapshot);
+    }
+}
+
+impl Watcher for Searching<'_> {
+    fn model(&self, best: &dyn Fn() -> Option<Model>) {
+        self.0.finds(best);
     }
 }
 

@@ -3,7 +3,7 @@
 import uPlot from "uplot";
 import { significant, ticks } from "./number.js";
 import { stretches } from "./data.js";
-import { Pyramid, grid, places, thinned } from "./thin.js";
+import { Pyramid, grid, outline, places, thinned } from "./thin.js";
 import { figureButtons } from "./save.js";
 
 const HEIGHT = 300;
@@ -116,10 +116,25 @@ export class Chart {
 
   /** @param {"range" | "off" | "lit"} what */
   changed(what) {
+    if (what === "off") {
+      this.renew();
+      return;
+    }
     this.stale = true;
-    if (!this.visible || this.plots.length === 0) return;
-    if (what === "off") this.rebuild();
-    else this.draw();
+    if (this.visible && this.plots.length > 0) this.draw();
+  }
+
+  /** Other curves are to be drawn: at once, or when it is looked at. */
+  renew() {
+    this.destroyPlots();
+    if (this.visible) this.build();
+  }
+
+  /** The run of what a search has found so far. @param {Float32Array | null} run */
+  searched(run) {
+    if (!run && !this.best) return;
+    this.best = run && new Pyramid(run);
+    this.renew();
   }
 
   /** @param {string} key */
@@ -135,40 +150,35 @@ export class Chart {
     const main = [];
     /** @type {Layer[]} */
     const rest = [];
-    const band = (/** @type {Layer[]} */ to, /** @type {Pyramid | null} */ low, /** @type {Pyramid | null} */ high) => {
-      if (!low || !high || !this.on("scatter")) return false;
-      to.push({ label: "high", data: high, stroke: colour("--floor"), width: 0.5 });
-      to.push({ label: "low", data: low, stroke: colour("--floor"), width: 0.5 });
-      return true;
-    };
-    const bands = [band(main, made.low, made.high), band(rest, made.floorLow, made.floorHigh)];
+    const band = (/** @type {Pyramid | null} */ low, /** @type {Pyramid | null} */ high) =>
+      low && high && this.on("scatter") ? { low, high } : null;
+    const bands = [band(made.low, made.high), band(made.floorLow, made.floorHigh)];
     if (this.on("measured")) main.push({ label: "measured", data: made.y, stroke: colour("--ink"), width: 1.5 });
+    const style = (/** @type {number} */ i) => ({ stroke: colour(`--s${i % 6}`), width: 1.5, dash: DASHES[i % DASHES.length] });
     made.runs.forEach((run, i) => {
       if (!run || !this.on(`run${i}`)) return;
-      const style = { stroke: colour(`--s${i % 6}`), width: 1.5, dash: DASHES[i % DASHES.length] };
-      main.push({ label: this.payload.runs[i], data: run, ...style });
+      main.push({ label: this.payload.runs[i], data: run, ...style(i) });
       const residual = made.residuals[i];
-      if (residual) rest.push({ label: `y − ${this.payload.runs[i]}`, data: residual, ...style, width: 1.2 });
+      if (residual) rest.push({ label: `y − ${this.payload.runs[i]}`, data: residual, ...style(i), width: 1.2 });
     });
+    if (this.best && this.on("search")) main.push({ label: "best so far", data: this.best, ...style(made.runs.length) });
     return { main, rest, bands };
   }
 
-  rebuild() {
+  destroyPlots() {
     this.plots.forEach((plot) => plot.destroy());
     this.plots = [];
-    this.build();
   }
 
   destroy() {
     this.visible = false;
     this.sized.disconnect();
-    this.plots.forEach((plot) => plot.destroy());
-    this.plots = [];
+    this.destroyPlots();
   }
 
   restyle() {
     colours.clear();
-    if (this.plots.length) this.rebuild();
+    this.renew();
   }
 
   build() {
@@ -189,7 +199,7 @@ export class Chart {
 
   /**
    * @param {HTMLElement} target @param {number} width @param {number} height
-   * @param {ReturnType<Chart["layers"]>["main"]} layers @param {boolean} band
+   * @param {ReturnType<Chart["layers"]>["main"]} layers @param {ReturnType<Chart["layers"]>["bands"][0]} band
    * @param {string} label @param {"y" | "r"} kind @param {boolean} foot whether the time stands below
    */
   plot(target, width, height, layers, band, label, kind, foot) {
@@ -203,7 +213,7 @@ export class Chart {
     const options = {
       width,
       height,
-      padding: [10, 12, foot ? 0 : 4, 0],
+      padding: [10, 18, foot ? 0 : 4, 0],
       legend: { show: false },
       cursor: { points: { show: false }, drag: { x: true, y: false, setScale: false }, y: false },
       scales: {
@@ -215,9 +225,9 @@ export class Chart {
         { ...axis, values, space: kind === "r" ? 28 : 36, label, labelSize: 20, size: narrow ? 50 : 58 },
       ],
       series: [{}, ...layers.map((layer) => ({ label: layer.label, stroke: layer.stroke, width: layer.width, dash: layer.dash, points: { show: false }, spanGaps: false }))],
-      bands: band ? [{ series: [1, 2], fill: colour("--band") }] : [],
       hooks: {
         drawClear: [(u) => this.under(u)],
+        drawAxes: [(u) => this.band(u, band)],
         draw: [(u) => this.over(u, kind)],
         setSelect: [
           (u) => {
@@ -297,19 +307,61 @@ export class Chart {
   /** @param {uPlot[]} plots */
   fill(plots) {
     const { record, view } = this;
-    const from = Math.max(0, Math.floor(view.from / record.period) - 1);
-    const to = Math.min(record.n, Math.ceil(view.to / record.period) + 2);
-    const columns = Math.max(100, Math.round((plots[0]?.bbox.width ?? 800) / devicePixelRatio));
-    const on = grid(from, to, columns);
+    const on = this.gridOf(plots[0]);
     const times = places(on).map((k) => k * record.period);
     for (const plot of plots) {
       const layers = this.layersOf?.get(plot) ?? [];
       const data = [times, ...layers.map((/** @type {{data: Pyramid}} */ layer) => thinned(layer.data, on))];
+      layers.forEach((/** @type {{width: number, dash?: number[]}} */ layer, /** @type {number} */ i) => {
+        // Hairlines without dashes are drawn several times as fast: they do while the view moves.
+        const light = { width: Math.min(1, layer.width), dash: undefined };
+        Object.assign(plot.series[i + 1], view.moving ? light : { width: layer.width, dash: layer.dash });
+      });
       plot.batch(() => {
         plot.setData(/** @type {uPlot.AlignedData} */ (data), false);
         plot.setScale("x", { min: view.from, max: view.to });
       });
     }
+  }
+
+  /** The samples that are drawn of what is in view. @param {uPlot | undefined} plot */
+  gridOf(plot) {
+    const { record, view } = this;
+    const from = Math.max(0, Math.floor(view.from / record.period) - 1);
+    const to = Math.min(record.n, Math.ceil(view.to / record.period) + 2);
+    const columns = (plot?.bbox.width ?? 800) / devicePixelRatio;
+    return grid(from, to, Math.max(100, Math.round(view.moving ? columns / 2 : columns)));
+  }
+
+  /** The scatter, behind the curves: by hand, because uPlot cuts its bands out with a path, which is slow. @param {uPlot} u @param {{low: Pyramid, high: Pyramid} | null} band */
+  band(u, band) {
+    if (!band) return;
+    const { ctx, bbox } = u;
+    const on = this.gridOf(u);
+    const low = outline(band.low, on, "low");
+    const high = outline(band.high, on, "high");
+    const x = places(on).map((k) => u.valToPos(k * this.record.period, "x", true));
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    ctx.beginPath();
+    const there = (/** @type {number} */ i) => low[i] !== null && high[i] !== null;
+    for (let start = 0; start < x.length; start++) {
+      if (!there(start)) continue;
+      let end = start;
+      while (end < x.length && there(end)) end++;
+      for (let i = start; i < end; i++) ctx.lineTo(x[i], u.valToPos(/** @type {number} */ (high[i]), "y", true));
+      for (let i = end - 1; i >= start; i--) ctx.lineTo(x[i], u.valToPos(/** @type {number} */ (low[i]), "y", true));
+      ctx.closePath();
+      start = end;
+    }
+    ctx.fillStyle = colour("--band");
+    ctx.fill();
+    ctx.strokeStyle = colour("--floor");
+    ctx.lineWidth = 0.5 * devicePixelRatio;
+    ctx.stroke();
+    ctx.restore();
   }
 
   resize() {
@@ -320,7 +372,7 @@ export class Chart {
       return;
     }
     if (this.plots[0].width === width) return;
-    this.rebuild();
+    this.renew();
   }
 
   /** The lit samples, behind the curves: a tint, and a bar at the top for whoever does not see the tint. @param {uPlot} u */

@@ -24,6 +24,7 @@
  * @property {string} label of the axis of y
  * @property {PackedRecord[]} records
  * @property {string[]} runs names of the models
+ * @property {number[]=} off runs that are not shown at first
  * @property {Coordinate[]} coordinates
  *
  * @typedef {object} Series

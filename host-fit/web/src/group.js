@@ -2,7 +2,7 @@
 
 import { Bars } from "./bars.js";
 import { Chart } from "./chart.js";
-import { unpack } from "./data.js";
+import { floats, unpack } from "./data.js";
 import { significant } from "./number.js";
 import { View } from "./view.js";
 
@@ -13,7 +13,7 @@ export class Group {
     this.payload = payload;
     const longest = Math.max(...payload.records.map((r) => r.n * r.period));
     const finest = Math.max(...payload.records.map((r) => 8 * r.period));
-    this.view = new View(element.id, longest, finest);
+    this.view = new View(element.id, longest, finest, payload.off?.map((i) => `run${i}`));
     element.append(this.toolbar());
     this.charts = payload.records.map((packed, index) => {
       const chart = new Chart(unpack(packed), index, payload, this.view);
@@ -72,21 +72,35 @@ export class Group {
       ...this.payload.runs.map((name, i) => [`run${i}`, name, `run s${i % 6}`]),
       ...(this.payload.runs.length > 0 ? [["residuals", "y − model", "residuals"]] : []),
     ];
-    for (const [key, name, kind] of names) {
-      const label = document.createElement("label");
-      const box = document.createElement("input");
-      box.type = "checkbox";
-      box.checked = !this.view.off.has(key);
-      box.addEventListener("change", () => this.view.turn(key, box.checked));
-      const swatch = document.createElement("i");
-      swatch.className = `swatch ${kind}`;
-      label.append(box, swatch, name);
-      switches.append(label);
-    }
+    switches.append(...names.map(([key, name, kind]) => this.toggle(key, name, kind)));
+    this.switches = switches;
     this.clear = button("clear the lit samples", "clear the lit samples (Escape)", () => this.view.light(null));
     this.clear.hidden = true;
     bar.append(moves, this.stretch, switches, this.clear);
     return bar;
+  }
+
+  /** A box that shows a curve or hides it. @param {string} key @param {string} name @param {string} kind */
+  toggle(key, name, kind) {
+    const label = document.createElement("label");
+    const box = document.createElement("input");
+    box.type = "checkbox";
+    box.checked = !this.view.off.has(key);
+    box.addEventListener("change", () => this.view.turn(key, box.checked));
+    const swatch = document.createElement("i");
+    swatch.className = `swatch ${kind}`;
+    label.append(box, swatch, name);
+    return label;
+  }
+
+  /** The run of what a search has found so far, per record; none once it is over. @param {string[] | null} runs */
+  search(runs) {
+    if (!runs) this.searching?.remove();
+    else if (!this.searching?.isConnected) {
+      this.searching = this.toggle("search", "best so far", `run s${this.payload.runs.length % 6}`);
+      this.switches?.append(this.searching);
+    }
+    this.charts.forEach((chart, i) => chart.searched(runs && runs[i] ? floats(runs[i]) : null));
   }
 
   /** @param {"range" | "off" | "lit"} what */

@@ -102,6 +102,23 @@ export function thinned(series, on) {
   return out;
 }
 
+/**
+ * The lower or the upper edge of a series on a grid, gaps as null; at the places of [`thinned`] values.
+ * @param {Pyramid} series @param {ReturnType<typeof grid>} on @param {"low" | "high"} edge
+ * @returns {(number | null)[]}
+ */
+export function outline(series, on, edge) {
+  if (on.all) return thinned(series, on);
+  const columns = on.at.length - 1;
+  const out = new Array(2 * columns);
+  for (let c = 0; c < columns; c++) {
+    const [least, most] = series.extremes(on.at[c], on.at[c + 1]);
+    const v = edge === "low" ? least : most;
+    out[2 * c] = out[2 * c + 1] = Number.isFinite(v) ? v : null;
+  }
+  return out;
+}
+
 /** The places of [`thinned`] values, in samples. @param {ReturnType<typeof grid>} on @returns {number[]} */
 export function places(on) {
   if (on.all) return Array.from(on.at);

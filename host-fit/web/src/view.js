@@ -5,17 +5,22 @@
  */
 
 export class View {
-  /** @param {string} id of the group @param {number} length of the longest record, s @param {number} finest s */
-  constructor(id, length, finest) {
+  /**
+   * @param {string} id of the group @param {number} length of the longest record, s @param {number} finest s
+   * @param {string[]=} off what is switched off at first
+   */
+  constructor(id, length, finest, off = []) {
     this.id = id;
     this.length = length;
     this.finest = finest;
     this.from = 0;
     this.to = length;
-    /** @type {Set<string>} */
-    this.off = new Set();
+    this.first = off.join();
+    this.off = new Set(off);
     /** @type {Lit} */
     this.lit = null;
+    /** Whether the stretch in view was changed just now: what is drawn may be drawn lightly. */
+    this.moving = false;
     /** @type {((what: "range" | "off" | "lit") => void)[]} */
     this.listeners = [];
     this.restore();
@@ -25,7 +30,15 @@ export class View {
   tell(what) {
     for (const listener of this.listeners) listener(what);
     clearTimeout(this.later);
-    this.later = setTimeout(() => this.keep(), 150);
+    this.later = setTimeout(() => this.rest(), 150);
+  }
+
+  /** Nothing was changed for a moment. */
+  rest() {
+    this.keep();
+    if (!this.moving) return;
+    this.moving = false;
+    for (const listener of this.listeners) listener("range");
   }
 
   /** Shows from..to, at least a few samples, at most everything. @param {number} from @param {number} to */
@@ -36,6 +49,7 @@ export class View {
     if (!Number.isFinite(start)) return;
     this.from = start;
     this.to = start + width;
+    this.moving = true;
     this.tell("range");
   }
 
@@ -74,7 +88,7 @@ export class View {
     const words = [];
     const digits = (/** @type {number} */ v) => String(Number(v.toFixed(6)));
     if (this.from > 0 || this.to < this.length) words.push(`${this.id}.t=${digits(this.from)}..${digits(this.to)}`);
-    if (this.off.size > 0) words.push(`${this.id}.off=${[...this.off].map(encodeURIComponent).join(",")}`);
+    if ([...this.off].join() !== this.first) words.push(`${this.id}.off=${[...this.off].map(encodeURIComponent).join(",")}`);
     if (this.lit) words.push(`${this.id}.bar=${this.lit.coordinate}:${this.lit.bin}`);
     return words;
   }
@@ -95,7 +109,8 @@ export class View {
         const [from, to] = value.split("..").map(Number);
         if (to > from) this.show(from, to);
       } else if (key === `${this.id}.off`) {
-        for (const name of value.split(",")) {
+        this.off.clear();
+        for (const name of value.split(",").filter((name) => name !== "")) {
           try {
             this.off.add(decodeURIComponent(name));
           } catch {

@@ -73,7 +73,7 @@ function drawData(s) {
   }
   place("data").replaceChildren(
     el("p", {}, `${data.records.length} records at ${significant(1000 * data.period, 3)} ms: `,
-      data.records.map((r) => `${r.name} (${r.use}, ${significant(r.samples * data.period, 3)} s)`).join(", ")),
+      data.records.map((r) => `${r.name} (${r.use}, ${significant(r.samples * data.period, 3)}\u00a0s)`).join(", ")),
     ...(data.remarks.length ? [el("p", {}, "What the commands can tell:"), el("ul", {}, ...data.remarks.map((r) => el("li", {}, r)))] : [el("p", {}, "The commands can tell a model of this kind.")]),
   );
 }
@@ -213,7 +213,11 @@ function drawWork(s) {
   for (const b of document.querySelectorAll("#identify button")) b.toggleAttribute("disabled", s.work !== null);
   place("work").hidden = s.work === null;
   clear();
-  if (!s.work) return;
+  if (!s.work) {
+    seen = "";
+    group?.search(null);
+    return;
+  }
   place("work-name").textContent = s.work.name;
   place("work-now").textContent = s.work.now;
   progress(s.work.best);
@@ -245,6 +249,24 @@ async function records() {
   Object.assign(globalThis, { hostFit: { groups: [group] } });
 }
 
+/** What the search has found so far, over the records: asked for while it runs, at most once a second. */
+let seen = "";
+let asking = false;
+async function glimpse() {
+  if (asking) return;
+  asking = true;
+  try {
+    const best = await ask("/api/ask", { best: seen });
+    if (best.runs && state?.work) {
+      seen = String(best.evaluations);
+      group?.search(best.runs);
+    }
+    await new Promise((later) => setTimeout(later, 1000));
+  } finally {
+    asking = false;
+  }
+}
+
 function listen() {
   const events = new EventSource(`/api/events?token=${token}`);
   events.onopen = () => {
@@ -264,6 +286,7 @@ function listen() {
       best.push([event.evaluations, event.best]);
       place("work-now").textContent = `${event.evaluations} evaluations, best ${significant(event.best)}`;
       progress(best);
+      void glimpse().catch(() => {});
     } else if (event.kind === "warning") {
       complain(event.words);
     } else if (event.kind === "ends") {

@@ -4,7 +4,10 @@ use std::process::Command;
 
 use scenarios::browser::Browser;
 
-use super::{Steps, accessible, act, fits, identify, idle_with, root, run, serve, shoot, until};
+use super::{
+    Steps, accessible, act, fits, identify, identify_for_long, idle_with, root, run, serve, shoot,
+    until,
+};
 
 const CURRENT: &str = "document.querySelector('.model.current')?.textContent";
 
@@ -43,7 +46,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     steps.done("identified");
 
     // Cancelled: the best so far is a model, too. The curve of its progress runs forwards.
-    act(&mut b, &page, &identify(1_000_000));
+    act(&mut b, &page, &identify_for_long());
     until(
         &mut b,
         &page,
@@ -55,6 +58,20 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
         &page,
         60,
         "document.querySelector('#curve canvas') !== null",
+    );
+    // What it has found so far is seen over the records, and changes.
+    let drawn = "hostFit.groups[0].charts.filter(c => c.best).length === 8 && document.querySelector('.switches').textContent.includes('best so far')";
+    until(&mut b, &page, 60, drawn);
+    act(
+        &mut b,
+        &page,
+        "document.getElementById('records-section').scrollIntoView()",
+    );
+    until(
+        &mut b,
+        &page,
+        20,
+        "hostFit.groups[0].charts.some(c => c.plots[0]?.series.some(s => s.label === 'best so far'))",
     );
     shoot(&mut b, &page, "workbench-progress.png");
     assert!(
@@ -70,6 +87,12 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     );
     act(&mut b, &page, "document.getElementById('cancel').click()");
     until(&mut b, &page, 300, &idle_with(2));
+    until(
+        &mut b,
+        &page,
+        20,
+        "!document.querySelector('.switches').textContent.includes('best so far')",
+    );
     steps.done("cancelled");
     act(
         &mut b,
@@ -79,7 +102,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     until(&mut b, &page, 20, &format!("{CURRENT}.startsWith('1.')"));
 
     // Killed while it works; another start on the folder has everything.
-    act(&mut b, &page, &identify(1_000_000));
+    act(&mut b, &page, &identify_for_long());
     until(&mut b, &page, 20, "!document.getElementById('work').hidden");
     drop(served);
     until(
@@ -244,6 +267,37 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
         |page| page.starts_with("<!doctype html>") && page.contains("host-fit compare")
     ));
     steps.done("downloaded, compiled");
+
+    // The diagnosis as a page: the ladder's steps lie on the curves once they are switched on.
+    let diagnosis = format!("file://{}", project.join("diagnosis-1.html").display());
+    let report = b.open(&diagnosis, size, false).expect("a page");
+    let drawn = "hostFit.groups[0].charts.filter(c => c.plots[0]?.series.some(s => s.label === 'refitted with the fewest lags')).length";
+    act(
+        &mut b,
+        &report,
+        "document.querySelectorAll('.record')[6].scrollIntoView()",
+    );
+    until(
+        &mut b,
+        &report,
+        20,
+        "document.querySelectorAll('.record')[6].querySelectorAll('canvas').length === 2",
+    );
+    assert_eq!(act(&mut b, &report, drawn), 0);
+    act(
+        &mut b,
+        &report,
+        "[...document.querySelectorAll('.switches label')].find(l => l.textContent === 'refitted with the fewest lags').querySelector('input:not(:checked)').click()",
+    );
+    until(
+        &mut b,
+        &report,
+        20,
+        &format!("{drawn} > 0 && location.hash.includes('g1.off=')"),
+    );
+    accessible(&mut b, &report);
+    shoot(&mut b, &report, "report-ladder.png");
+    steps.done("the ladder on the curves");
 
     let phone = b.open(&served.address, (390, 840), false).expect("a page");
     until(

@@ -3,8 +3,10 @@
 
 mod bench;
 mod files;
+mod pictures;
 mod report;
 mod speed;
+mod terms;
 
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -14,6 +16,8 @@ use std::time::Instant;
 use scenarios::browser::{Browser, Page};
 use scenarios::program;
 use serde_json::Value;
+
+use pictures::shoot;
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
@@ -39,10 +43,11 @@ fn act(b: &mut Browser, page: &Page, expression: &str) -> Value {
     b.eval(page, expression).expect("an expression of the test")
 }
 
-/// Waits until an expression is true.
+/// Waits until an expression is true; so many seconds are plenty on a machine that has nothing else to do.
 #[track_caller]
 fn until(b: &mut Browser, page: &Page, seconds: u64, expression: &str) {
-    if let Err(error) = b.wait(page, expression, seconds) {
+    const BUSY: u64 = 3;
+    if let Err(error) = b.wait(page, expression, BUSY * seconds) {
         let said = b.eval(
             page,
             "document.getElementById('message')?.textContent ?? ''",
@@ -52,12 +57,7 @@ fn until(b: &mut Browser, page: &Page, seconds: u64, expression: &str) {
     }
 }
 
-/// Takes a picture: artefacts of CI, to be looked at.
-#[track_caller]
-fn shoot(b: &mut Browser, page: &Page, name: &str) {
-    b.screenshot(page, &picture(name)).expect("a picture");
-}
-
+/// Where a picture lies that is to be looked at.
 fn picture(name: &str) -> PathBuf {
     let folder = program()
         .parent()
@@ -133,10 +133,43 @@ fn idle_with(models: usize) -> String {
     )
 }
 
-/// A short identification, or one that never ends.
+/// Pans the records of a page, all that is in sight redrawn in each frame: milliseconds of the page's own thread in a frame, and
+/// what a frame takes by the clock of this machine as busy as it is.
+fn panned(b: &mut Browser, page: &Page) -> f64 {
+    const FRAMES: u32 = 120;
+    let before = b.worked(page).expect("its time");
+    let frame = act(
+        b,
+        page,
+        &format!(
+            "(async () => {{ const v = hostFit.groups[0].view; const times = []; let last = performance.now(); for (let i = 0; i < {FRAMES}; i++) {{ v.show(i * 0.03, 5 + i * 0.03); await new Promise(r => requestAnimationFrame(r)); const now = performance.now(); times.push(now - last); last = now; }} return times.sort((a, b) => a - b)[{FRAMES} / 2]; }})()"
+        ),
+    );
+    let worked = b.worked(page).expect("its time") - before;
+    let (own, clock) = (
+        1000.0 * worked / f64::from(FRAMES),
+        frame.as_f64().expect("ms"),
+    );
+    eprintln!("  panned: {own:.1} ms of the page's thread in a frame; {clock:.1} ms by the clock");
+    own
+}
+
+/// The time of a page's thread in a frame that no machine, however busy, may pass, ms: 30 frames a second are 33.
+const SLOWEST_FRAME: f64 = 80.0;
+
+/// A short identification.
 fn identify(evaluations: u32) -> String {
+    identify_lags(2, 150, evaluations)
+}
+
+/// An identification that takes longer than anybody waits.
+fn identify_for_long() -> String {
+    identify_lags(10, 500, 1_000_000)
+}
+
+fn identify_lags(lags: u32, longest: u32, evaluations: u32) -> String {
     format!(
-        "(() => {{ const f = document.getElementById('identify').elements; f.delay.value = 'state-dependent'; f.n1.value = 2; f.n2.value = 2; f['max-lag'].value = 150; f.evaluations.value = {evaluations}; f.n1.form.requestSubmit(); }})()"
+        "(() => {{ const f = document.getElementById('identify').elements; f.delay.value = 'state-dependent'; f.n1.value = {lags}; f.n2.value = {lags}; f['max-lag'].value = {longest}; f.evaluations.value = {evaluations}; f.n1.form.requestSubmit(); }})()"
     )
 }
 

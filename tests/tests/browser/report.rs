@@ -2,7 +2,7 @@
 
 use scenarios::browser::Browser;
 
-use super::{accessible, act, fits, root, run, shoot, until};
+use super::{SLOWEST_FRAME, accessible, act, fits, panned, root, run, shoot, until};
 
 #[test]
 #[ignore = "needs chromium: cargo xtask browser"]
@@ -109,13 +109,7 @@ fn a_report_is_looked_along() {
     assert!(svg.starts_with("<svg") && drawn > 8, "{drawn} paths");
     assert!(!svg.contains("undefined") && !svg.contains("NaN"));
 
-    // Pans smoothly: the page's own frame times, all that is in sight redrawn in each.
-    let frames = act(
-        &mut b,
-        &page,
-        "(async () => { const v = hostFit.groups[0].view; const times = []; let last = performance.now(); for (let i = 0; i < 60; i++) { v.show(i * 0.05, 5 + i * 0.05); await new Promise(r => requestAnimationFrame(r)); const now = performance.now(); times.push(now - last); last = now; } return times.sort((a, b) => a - b)[30]; })()",
-    );
-    eprintln!("median frame {:.1} ms", frames.as_f64().unwrap_or(f64::NAN));
+    assert!(panned(&mut b, &page) < SLOWEST_FRAME);
     assert_eq!(b.faults(), Vec::<String>::new());
 
     let dark = b.open(&address, (1100, 1000), true).expect("a page");

@@ -4,8 +4,9 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use host_fit::indicators::score;
 use host_fit::model::Model;
-use host_fit::picture::{Ladder, LadderStep, ladder, workbench_page};
+use host_fit::picture::{Ladder, LadderStep, ladder, packed, workbench_page};
 use host_fit::steps::{self, Comparison, ImportedSet};
 use serde_json::{Value, json};
 use workbench::{Bench, Download, Node, Project, Refusal, Work};
@@ -25,6 +26,8 @@ pub(super) struct ModelBench {
     data: Mutex<Option<Arc<Data>>>,
     /// Free runs and failures by model.
     compared: Mutex<HashMap<u32, Arc<Compared>>>,
+    /// The free run of what a search has found so far: after so many evaluations, per record.
+    best: Mutex<Option<(usize, Vec<Vec<f64>>)>>,
 }
 
 /// A model with its free runs, or with what is said where they diverge.
@@ -69,6 +72,7 @@ impl ModelBench {
             own: OwnEffects::of(folder),
             data: Mutex::new(data.map(Arc::new)),
             compared: Mutex::default(),
+            best: Mutex::default(),
         })
     }
 
@@ -138,6 +142,31 @@ impl ModelBench {
         };
         lock(&self.compared).insert(id, Arc::new(compared));
         Ok(id)
+    }
+
+    /// Lets the page see what a search has found so far.
+    pub(super) fn show_best(&self, model: &Model, evaluations: usize) {
+        let Ok(data) = self.data() else { return };
+        // Models on the way may well diverge.
+        if let Ok((_, runs)) = score(model, &model.targets(&data.set.records)) {
+            *lock(&self.best) = Some((evaluations, runs));
+        }
+    }
+
+    /// Another search begins.
+    pub(super) fn forget_best(&self) {
+        *lock(&self.best) = None;
+    }
+
+    /// The free run of what a search has found so far, if it is another than that after so many evaluations.
+    fn best_since(&self, seen: &str) -> Value {
+        match lock(&self.best).as_ref() {
+            Some((evaluations, runs)) if evaluations.to_string() != seen => json!({
+                "evaluations": evaluations,
+                "runs": runs.iter().map(|run| packed(run)).collect::<Vec<_>>(),
+            }),
+            _ => json!({}),
+        }
     }
 
     /// Where a model's file lies.
@@ -297,8 +326,10 @@ impl Bench for ModelBench {
             Some(("keep", text)) => self.own.keep(text),
             Some(("forget", name)) => self.own.forget(name),
             Some(("inspect", file)) => self.uploads.inspect(file),
+            Some(("best", seen)) => Ok(self.best_since(seen)),
             _ => Err(Refusal(
-                "one of `check`, `keep`, `forget` and `inspect` with a text is needed".to_owned(),
+                "one of `check`, `keep`, `forget`, `inspect` and `best` with a text is needed"
+                    .to_owned(),
             )),
         }
     }

@@ -59,6 +59,7 @@ impl Command {
             Self::Extend => &["effect"],
             Self::Design => &[
                 "air-price",
+                "force",
                 "goal",
                 "horizon",
                 "least-air",

@@ -1,7 +1,9 @@
 //! A piece of work: what was asked for, as the command that it is, and what it leaves in the project.
 
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
 
 use host_fit::model::Model;
 use host_fit::output::write_atomic;
@@ -34,23 +36,69 @@ enum Asked {
 }
 
 /// The page, listening to a step.
-struct Page<'a>(&'a Work);
+struct Page<'a> {
+    work: &'a Work,
+    bench: &'a ModelBench,
+    glimpse: Mutex<Glimpse>,
+}
+
+/// When the model that is best so far is looked at: it costs the search time.
+struct Glimpse {
+    /// Not before this.
+    due: Instant,
+    evaluations: usize,
+    /// The best value there is, and the one whose model was looked at.
+    best: f64,
+    seen: f64,
+}
+
+impl<'a> Page<'a> {
+    fn new(bench: &'a ModelBench, work: &'a Work) -> Self {
+        Self {
+            work,
+            bench,
+            glimpse: Mutex::new(Glimpse {
+                // The first guesses are none worth looking at.
+                due: Instant::now() + Duration::from_millis(300),
+                evaluations: 0,
+                best: f64::INFINITY,
+                seen: f64::INFINITY,
+            }),
+        }
+    }
+}
 
 impl Onlooker for Page<'_> {
     fn begins(&self, what: &str) {
-        self.0.now(what);
+        self.work.now(what);
     }
     fn now(&self, what: &str) {
-        self.0.now(what);
+        self.work.now(what);
     }
     fn sees(&self, snapshot: &Snapshot) {
-        self.0.best(snapshot.evaluations, snapshot.best);
+        self.work.best(snapshot.evaluations, snapshot.best);
+        let mut glimpse = lock(&self.glimpse);
+        (glimpse.evaluations, glimpse.best) = (snapshot.evaluations, snapshot.best);
+    }
+    fn finds(&self, best: &dyn Fn() -> Option<Model>) {
+        /// Share of the search's time that looking may take: one part in so many.
+        const SHARE: u32 = 50;
+        let mut glimpse = lock(&self.glimpse);
+        let started = Instant::now();
+        if glimpse.best == glimpse.seen || started < glimpse.due {
+            return;
+        }
+        glimpse.seen = glimpse.best;
+        if let Some(model) = best() {
+            self.bench.show_best(&model, glimpse.evaluations);
+        }
+        glimpse.due = Instant::now() + (SHARE * started.elapsed()).max(Duration::from_secs(1));
     }
     fn hears(&self, warning: &str) {
-        self.0.warning(warning);
+        self.work.warning(warning);
     }
     fn interrupt(&self) -> &AtomicBool {
-        self.0.cancel()
+        self.work.cancel()
     }
 }
 
@@ -152,7 +200,8 @@ fn write(path: &Path, text: &str) -> Result<(), Refusal> {
 impl Task {
     /// Does it.
     pub(super) fn run(&self, bench: &ModelBench, work: &Work) -> Result<(), Refusal> {
-        let page = Page(work);
+        let page = Page::new(bench, work);
+        bench.forget_best();
         match &self.asked {
             Asked::Identify(args) => {
                 let request = args.request().map_err(told)?;
@@ -182,6 +231,9 @@ impl Task {
             Asked::Design(args) => {
                 page.begins("designing, and trying the law in the loop");
                 let tried = args.tried(&self.model(bench)?).map_err(told)?;
+                if let Some(refused) = tried.refused(args.force()) {
+                    return Err(Refusal(refused));
+                }
                 let id = self.made(
                     bench,
                     &tried.design.model,

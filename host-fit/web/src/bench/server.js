@@ -47,9 +47,10 @@ export const fileOf = (kind, model) => `/api/file/${kind}/${model}?token=${token
 
 /** @param {unknown} error */
 export function complain(error) {
-  place("message").append(
-    el("div", { class: "verdict warning", role: "alert" }, el("p", {}, error instanceof Error ? error.message : String(error))),
-  );
+  const told = el("div", { class: "verdict warning", role: "alert" },
+    el("button", { type: "button", class: "close", "aria-label": "close this message", onclick: () => told.remove() }, "×"),
+    el("p", {}, error instanceof Error ? error.message : String(error)));
+  place("message").append(told);
 }
 
 /** Does something that may be refused. @param {() => Promise<unknown>} does */

@@ -1,0 +1,60 @@
+//! Pictures of pages, compared with those that were looked at: thumbnails of 64 × 64 greys, because fonts differ from machine to machine.
+//!
+//! `cargo xtask browser --bless` writes the thumbnails anew; look at the pictures in `target/browser` first.
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use scenarios::browser::{Browser, Page};
+use serde_json::Value;
+
+use super::{act, picture, root};
+
+/// Largest mean difference of the greys, of 255: another font makes 1 to 3, a page in the wrong colours some 200, a missing section 15.
+const DIFFERENCE: f64 = 8.0;
+
+/// A browser's own means reduce a picture: no decoder of PNG is needed here. `small` gives 64 × 64 greys row by row.
+const SMALL: &str = "async (address) => { const i = new Image(); i.src = address; await i.decode(); const c = new OffscreenCanvas(i.width, i.height), x = c.getContext('2d'); x.drawImage(i, 0, 0); const d = x.getImageData(0, 0, i.width, i.height).data, n = 64, sum = new Array(n * n).fill(0), count = new Array(n * n).fill(0); for (let r = 0; r < i.height; r++) for (let k = 0; k < i.width; k++) { const cell = Math.floor(r * n / i.height) * n + Math.floor(k * n / i.width), p = 4 * (r * i.width + k); sum[cell] += 0.299 * d[p] + 0.587 * d[p + 1] + 0.114 * d[p + 2]; count[cell] += 1; } return sum.map((s, k) => Math.round(s / count[k])); }";
+
+/// A PNG of 64 × 64 greys, base64.
+const PNG: &str = "async (greys) => { const c = new OffscreenCanvas(64, 64), x = c.getContext('2d'), d = x.createImageData(64, 64); greys.forEach((g, k) => d.data.set([g, g, g, 255], 4 * k)); x.putImageData(d, 0, 0); const b = new Uint8Array(await (await c.convertToBlob()).arrayBuffer()); return btoa(String.fromCharCode(...b)); }";
+
+/// Takes a picture, an artefact of CI, and compares it with the one that was looked at.
+#[track_caller]
+pub(crate) fn shoot(b: &mut Browser, page: &Page, name: &str) {
+    let path = picture(name);
+    b.screenshot(page, &path).expect("a picture");
+    // A page of its own: what is looked at forbids pictures from elsewhere, and is not to be disturbed.
+    let desk = b.open("about:blank", (64, 64), false).expect("a page");
+    let taken = greys(b, &desk, &std::fs::read(&path).expect("the picture"));
+    let known = root().join("tests/tests/browser/pictures").join(name);
+    if std::env::var_os("BLESS").is_some() {
+        let text = act(b, &desk, &format!("({PNG})({})", serde_json::json!(taken)));
+        let png = STANDARD.decode(text.as_str().expect("base64"));
+        std::fs::create_dir_all(known.parent().expect("a folder")).expect("a folder");
+        std::fs::write(&known, png.expect("base64")).expect("a file");
+    } else {
+        let known = std::fs::read(&known).unwrap_or_else(|_| {
+            panic!("{name} has no thumbnail: look at it, then `cargo xtask browser --bless`")
+        });
+        let known = greys(b, &desk, &known);
+        let sum: f64 = taken.iter().zip(&known).map(|(a, k)| (a - k).abs()).sum();
+        let mean = sum / taken.len() as f64;
+        eprintln!("           {name}: {mean:.1} of 255 from the one that was looked at");
+        assert!(
+            mean < DIFFERENCE,
+            "{} is {mean:.1} of 255 from the picture that was looked at; if it is right, `cargo xtask browser --bless`",
+            path.display()
+        );
+    }
+    b.close(&desk).expect("closed");
+}
+
+/// A picture, PNG, as 64 × 64 greys.
+fn greys(b: &mut Browser, desk: &Page, png: &[u8]) -> Vec<f64> {
+    let address = format!("data:image/png;base64,{}", STANDARD.encode(png));
+    let told = act(b, desk, &format!("({SMALL})('{address}')"));
+    let greys = told.as_array().into_iter().flatten();
+    let greys: Vec<f64> = greys.filter_map(Value::as_f64).collect();
+    assert_eq!(greys.len(), 64 * 64, "greys of a picture");
+    greys
+}

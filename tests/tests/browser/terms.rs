@@ -1,0 +1,225 @@
+//! What no catalogue has, and what the records cannot tell apart: found on the page, to the end.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use scenarios::browser::Browser;
+
+use super::pictures::shoot;
+use super::{Steps, accessible, act, idle_with, serve, until};
+
+const SIZE: (u32, u32) = (1100, 1000);
+const PERIOD_S: f64 = 0.002;
+
+/// Numbers that repeat.
+struct Chance(u32);
+
+impl Chance {
+    /// From 0 to 1.
+    fn even(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(self.0) / f64::from(u32::MAX)
+    }
+
+    /// Standard normal, nearly.
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.even()).sum::<f64>() - 6.0
+    }
+}
+
+/// A flow of first order behind a valve, whose jet is what `jet` makes of the command that arrives and of the number of its
+/// pulse; read with a noise of 0.01. Each record is a name, a use and how long a switch lasts, samples.
+fn set(
+    folder: &Path,
+    samples: usize,
+    records: &[(&str, &str, fn(&mut Chance) -> usize)],
+    jet: fn(&mut f64, f64, u32) -> f64,
+) {
+    const ARRIVES: usize = 20;
+    const NOISE: f64 = 0.01;
+    std::fs::create_dir_all(folder).expect("a folder");
+    let mut manifest = format!("sample_period_s = {PERIOD_S}\n");
+    for (number, (name, role, lasts)) in (1..).zip(records) {
+        let mut chance = Chance(number);
+        let mut csv = "t,u,y,y_sd\n".to_owned();
+        let (mut y, mut u, mut left, mut pulses, mut state) = (0.0, 0.0, 0, 0, 0.0);
+        let mut sent = vec![(0.0, 0); ARRIVES];
+        for k in 0..samples {
+            if left == 0 {
+                u = 1.0 - u;
+                pulses += u32::from(u == 1.0);
+                left = lasts(&mut chance);
+            }
+            left -= 1;
+            let (arrived, pulse) = std::mem::replace(&mut sent[k % ARRIVES], (u, pulses));
+            let t = k as f64 * PERIOD_S;
+            let read = y + NOISE * chance.normal();
+            let _ = writeln!(csv, "{t:.3},{u},{read:.5},{NOISE}");
+            y += 0.03 * (jet(&mut state, arrived, pulse) - y);
+        }
+        std::fs::write(folder.join(format!("{name}.csv")), csv).expect("a record");
+        let _ = writeln!(
+            manifest,
+            "[[record]]\nname = \"{name}\"\nfile = \"{name}.csv\"\nuse = \"{role}\""
+        );
+    }
+    std::fs::write(folder.join("dataset.toml"), manifest).expect("a manifest");
+}
+
+/// Irregular switches, as a telegraph's.
+fn telegraph(chance: &mut Chance) -> usize {
+    40 + (360.0 * chance.even()) as usize
+}
+
+/// The leanest model, in no time.
+const LEAN: &str = "(() => { const f = document.getElementById('identify').elements; f.delay.value = 'fixed'; f.n1.value = 1; f.n2.value = 1; f['max-lag'].value = 60; f.evaluations.value = 300; f.n1.form.requestSubmit(); })()";
+
+#[test]
+#[ignore = "needs chromium: cargo xtask browser"]
+fn a_term_that_no_catalogue_has_is_found_and_taken_as_a_formula() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let data = folder.path().join("tiring");
+    let records: &[(&str, &str, fn(&mut Chance) -> usize)] = &[
+        ("square", "identify", |_| 150),
+        ("a", "identify", telegraph),
+        ("b", "identify", telegraph),
+        ("slow", "validate", |_| 400),
+        ("c", "validate", telegraph),
+    ];
+    // Jets that lose half of their strength over some six pulses: a sensor that tires would show the same.
+    set(&data, 3000, records, |_, u, pulse| {
+        u * (1.0 - 0.5 * (1.0 - (-(f64::from(pulse) - 1.0) / 6.0).exp()))
+    });
+    let mut steps = Steps::new("a term");
+    let project = folder.path().join("project");
+    let served = serve(&project, &[&data]);
+    let mut b = Browser::start().expect("chromium");
+    let page = b.open(&served.address, SIZE, false).expect("a page");
+    until(
+        &mut b,
+        &page,
+        20,
+        "document.querySelectorAll('.record').length === 5",
+    );
+    act(&mut b, &page, LEAN);
+    until(&mut b, &page, 60, &idle_with(1));
+    steps.done("identified");
+    act(&mut b, &page, "document.getElementById('discover').click()");
+    until(&mut b, &page, 300, &idle_with(2));
+    until(
+        &mut b,
+        &page,
+        20,
+        "document.querySelector('.model.current').textContent.includes('-by-pulse-number')",
+    );
+    steps.done("discovered");
+    // What was found is told where it was looked for.
+    act(
+        &mut b,
+        &page,
+        "[...document.querySelectorAll('#models button')].find(x => x.textContent === 'Undo').click()",
+    );
+    until(
+        &mut b,
+        &page,
+        20,
+        "document.querySelector('#discovery svg') !== null && document.querySelector('#discovery h3').textContent.includes('pulse number')",
+    );
+    act(
+        &mut b,
+        &page,
+        "document.getElementById('discovery-section').scrollIntoView()",
+    );
+    shoot(&mut b, &page, "workbench-term.png");
+    accessible(&mut b, &page);
+    let formula = act(
+        &mut b,
+        &page,
+        "document.querySelector('#discovery code').textContent",
+    );
+    assert!(
+        formula.as_str().is_some_and(|text| text.contains("exp(")),
+        "{formula}"
+    );
+    // The formula goes into the editor as an effect file, and from there into the model.
+    act(
+        &mut b,
+        &page,
+        "[...document.querySelectorAll('#discovery button')].find(x => x.textContent === 'Open its effect file').click()",
+    );
+    until(
+        &mut b,
+        &page,
+        20,
+        "document.getElementById('own-told').textContent.includes('-by-pulse-number') && document.getElementById('own-text').value.includes('exp(')",
+    );
+    act(&mut b, &page, "document.getElementById('own-add').click()");
+    until(&mut b, &page, 60, &idle_with(3));
+    let times_noise = act(
+        &mut b,
+        &page,
+        "fetch('/api/state', {headers: {'x-token': new URLSearchParams(location.search).get('token')}}).then(r => r.json()).then(s => { const m = s.models.at(-1); return m.rmse / m.noise_rmse; })",
+    );
+    eprintln!("  the held-out error is {times_noise} times the noise");
+    assert!(times_noise.as_f64() < Some(1.15), "{times_noise}");
+    steps.done("as a formula in the model");
+    assert_eq!(b.faults(), Vec::<String>::new());
+}
+
+#[test]
+#[ignore = "needs chromium: cargo xtask browser"]
+fn the_experiment_that_tells_is_drawn_and_saved() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let data = folder.path().join("slow-valve");
+    // A valve that opens gradually, a sensor and a flow that lag: slow squares show the same of all three.
+    let records: &[(&str, &str, fn(&mut Chance) -> usize)] = &[
+        ("a", "identify", |_| 250),
+        ("b", "identify", |_| 150),
+        ("c", "validate", |_| 250),
+    ];
+    set(&data, 3000, records, |open, u, _| {
+        *open += 0.1 * (u - *open);
+        *open
+    });
+    let mut steps = Steps::new("what the records cannot tell");
+    let project = folder.path().join("project");
+    let served = serve(&project, &[&data]);
+    let mut b = Browser::start().expect("chromium");
+    let page = b.open(&served.address, SIZE, false).expect("a page");
+    until(
+        &mut b,
+        &page,
+        20,
+        "document.querySelectorAll('.record').length === 3",
+    );
+    act(&mut b, &page, LEAN);
+    until(&mut b, &page, 60, &idle_with(1));
+    steps.done("identified");
+    act(&mut b, &page, "document.getElementById('diagnose').click()");
+    until(
+        &mut b,
+        &page,
+        300,
+        "document.getElementById('work').hidden && document.querySelector('#missing h3')?.textContent.startsWith('The experiment that tells apart')",
+    );
+    steps.done("diagnosed");
+    act(
+        &mut b,
+        &page,
+        "document.querySelector('#missing h3').scrollIntoView()",
+    );
+    shoot(&mut b, &page, "workbench-experiment.png");
+    accessible(&mut b, &page);
+    let csv = act(
+        &mut b,
+        &page,
+        "fetch([...document.querySelectorAll('#missing a')].find(a => a.textContent.includes('experiment.csv')).href).then(r => r.text())",
+    );
+    let csv = csv.as_str().expect("text");
+    let mut rows = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    assert_eq!(rows.next(), Some(vec!["t", "u"]));
+    let switches: Vec<&str> = rows.map(|row| row[1]).collect();
+    let edges = switches.windows(2).filter(|w| w[0] != w[1]).count();
+    assert!(switches.len() > 500 && edges > 5, "{edges} edges");
+    assert_eq!(b.faults(), Vec::<String>::new());
+}

@@ -222,7 +222,12 @@ pub(super) fn term_picture(term: &FoundTerm) -> String {
     curve(&CurvePlot {
         title: "",
         x_label: &format!("{} ({})", term.coordinate, term.coordinate_unit),
-        y_label: &format!("{} ({})", term.changes, term.unit),
+        // Of what is in the heading: an axis is short.
+        y_label: &format!(
+            "{} ({})",
+            term.changes.split(" of ").next().unwrap_or_default(),
+            term.unit
+        ),
         points: &points,
         ..CurvePlot::default()
     })

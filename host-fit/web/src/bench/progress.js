@@ -23,8 +23,8 @@ export function progress(best) {
   const values = (/** @type {uPlot} */ _u, /** @type {(number | null)[]} */ splits) => splits.map((v) => (v === null ? "" : significant(v, 3)));
   curve = new uPlot(
     {
-      width: Math.min(620, place("work").clientWidth || 620),
-      height: 180,
+      width: Math.max(200, (place("work").clientWidth || 430) - 30),
+      height: 150,
       legend: { show: false },
       cursor: { show: false },
       // The first guesses are far worse than the last.

@@ -24,12 +24,19 @@ import { el, place } from "./dom.js";
 
 export const token = new URLSearchParams(location.search).get("token") ?? "";
 
+/** The server does not answer: the page says so in a place of its own. */
+class Gone extends Error {}
+
 /** @param {string} path @param {unknown=} body JSON, or a file @returns {Promise<any>} */
 export async function ask(path, body) {
-  const response = await fetch(path, {
+  const request = {
     method: body === undefined ? "GET" : "POST",
     headers: { "x-token": token, ...(body instanceof Blob ? {} : { "content-type": "application/json" }) },
     body: body === undefined || body instanceof Blob ? body : JSON.stringify(body),
+  };
+  const response = await fetch(path, request).catch(() => {
+    place("offline").hidden = false;
+    throw new Gone();
   });
   const text = await response.text();
   if (response.ok) return JSON.parse(text);
@@ -47,6 +54,7 @@ export const fileOf = (kind, model) => `/api/file/${kind}/${model}?token=${token
 
 /** @param {unknown} error */
 export function complain(error) {
+  if (error instanceof Gone) return;
   const told = el("div", { class: "verdict warning", role: "alert" },
     el("button", { type: "button", class: "close", "aria-label": "close this message", onclick: () => told.remove() }, "×"),
     el("p", {}, error instanceof Error ? error.message : String(error)));

@@ -149,9 +149,12 @@ impl Session<'_> {
         (better || (leaner && !scatter)) && !drifts
     }
 
-    /// A hypothesis without the effects that the rest of it does as well without, for
-    /// all that one test for each effect says.
-    fn proven(&self, found: &Found) -> Hypothesis {
+    /// What was found without the effects that the rest of it does as well without.
+    fn pared(
+        &self,
+        found: &Found,
+        needless: impl Fn(&Hypothesis, &Hypothesis) -> bool,
+    ) -> Hypothesis {
         let mut best = found.best.clone();
         let mut index = 0;
         while index < best.terms.len() {
@@ -159,12 +162,7 @@ impl Session<'_> {
                 Some(_) => self.search.without(&best, index, &found.root),
                 None => None,
             };
-            let chance = lesser.filter(|lesser| {
-                let p = p_value(&lesser.judged.held_out, &best.judged.held_out);
-                let count = best.judged.model().candidates().count() as f64;
-                count * p >= RULES.level
-            });
-            match chance {
+            match lesser.filter(|lesser| needless(lesser, &best)) {
                 Some(lesser) => best = lesser,
                 None => index += 1,
             }
@@ -176,12 +174,22 @@ impl Session<'_> {
         let scatter = self.judge().noise_source == NoiseSource::Scatter;
         let dark = scatter
             && self.judge().unexplained_share(&found.bare.judged.held_out) <= RULES.too_much;
-        let proven = if dark {
-            self.proven(found)
+        let pared = if dark {
+            // One test for each effect: more cannot be asked in the dark.
+            self.pared(found, |lesser, best| {
+                let p = p_value(&lesser.judged.held_out, &best.judged.held_out);
+                best.judged.model().candidates().count() as f64 * p >= RULES.level
+            })
+        } else if found.best.terms.iter().filter_map(Term::effect).count() > 1 {
+            // Beside others, an effect is named for what it takes of the error.
+            self.pared(found, |lesser, best| {
+                let little = (1.0 - RULES.worthwhile) * lesser.judged.rmse();
+                best.judged.rmse() > little && self.fits(&lesser.judged)
+            })
         } else {
             found.best.clone()
         };
-        let (best, bare) = (&proven, &found.bare);
+        let (best, bare) = (&pared, &found.bare);
         let effects: Vec<&'static Spec> = best.terms.iter().filter_map(Term::effect).collect();
         let judge = self.judge();
         let of = |verdict: Verdict, model: &Hypothesis, effects: Vec<&'static Spec>| Conclusion {

@@ -569,4 +569,35 @@ mod tests {
         );
         assert!(fitted.standard_error(1).is_some_and(|error| error < 1e-4));
     }
+
+    /// A fixed delay that the search hands over is a whole number of samples; there, the
+    /// free run has a kink, and the derivative must not be 0.
+    #[test]
+    fn a_delay_leaves_the_whole_sample_that_it_set_out_from() {
+        let u: Vec<f64> = (0..3000)
+            .map(|k| f64::from(u8::from(k % 500 > 180)))
+            .collect();
+        let back = |k: usize, lag: usize| k.checked_sub(lag).map_or(0.0, |k| u[k]);
+        let mut y = vec![0.0];
+        for k in 0..u.len() - 1 {
+            y.push(0.97 * y[k] + 0.03 * (0.4 * back(k, 41) + 0.6 * back(k, 42)));
+        }
+        let record = Record::new("squares", Use::Identify, 0.001, u, y);
+        let mut start = Model {
+            sample_period_s: 0.001,
+            state_lags: vec![1],
+            a: vec![0.97],
+            product_lags: Vec::new(),
+            b: vec![0.03],
+            c: Vec::new(),
+            delay: Delay::Fixed { delays: vec![40] },
+            ..Model::default()
+        };
+        start.delay_between_samples();
+        let fitted = fit(&start, &[&record], &FitOptions::default()).expect("a fit");
+        let Delay::Law(law) = &fitted.model.delay else {
+            panic!("{:?}", fitted.model.delay);
+        };
+        assert!((law.parameters[0] - 41.6).abs() < 0.01, "{law:?}");
+    }
 }

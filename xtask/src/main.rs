@@ -16,6 +16,7 @@ mod new_effect;
 mod nucleo;
 mod pages;
 mod pil;
+mod rig_day;
 mod setup;
 mod shell;
 mod size;
@@ -44,6 +45,7 @@ const TASKS: &[Task] = &[
     nucleo::TASK,
     pages::TASK,
     pil::TASK,
+    rig_day::TASK,
     setup::TASK,
     size::TASK,
 ];

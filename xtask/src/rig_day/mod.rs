@@ -205,6 +205,8 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
                 "0.02",
                 "--min-off",
                 "0.02",
+                "--rig",
+                "rig.toml",
             ]),
         )?;
         day.firmware(name, Some(&controlled), true)?;

@@ -188,7 +188,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         day.quietly(&words(&["simulate", &model, &record, "-o", &run]))?;
     }
 
-    day.say("## 4. The law before and after the effect was known\n\nThe same goal for both models; the firmware is built with model and rig, and refuses a rig that contradicts the model.");
+    day.say("## 4. The law before and after the effect was known\n\nThe same goal for both models. A law is also tried on plants with effects that this rig was not found to have; where one of them loses attachment, only `--force` writes the law. The firmware is built with model and rig, and refuses a rig that contradicts the model.");
     let mut rms = Vec::new();
     for (name, model) in [("before", "model.toml"), ("after", "better.toml")] {
         let controlled = format!("{name}.toml");
@@ -207,6 +207,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
                 "0.02",
                 "--rig",
                 "rig.toml",
+                "--force",
             ]),
         )?;
         day.firmware(name, Some(&controlled), true)?;

@@ -21,13 +21,13 @@ pub(crate) const TASK: Task = Task {
 };
 
 /// What the rig hides, and which rig it is.
-const HIDDEN: &str = "plenum-droop";
+const HIDDEN: &str = "echo-path";
 const RIG: &str = "7";
-/// Commands of the bundled set: to identify on, and held out.
-const IDENTIFY: [&str; 5] = ["step", "sq8-50", "sq4-80", "sq4-50", "random-a"];
-const VALIDATE: [&str; 3] = ["sq8-80", "sq2-30", "random-b"];
+/// Commands of the bundled set: to identify on, and held out. The short form plays the first ones.
+const IDENTIFY: [&str; 5] = ["step", "sq4-50", "random-a", "sq8-50", "sq4-80"];
+const VALIDATE: [&str; 3] = ["sq2-30", "random-b", "sq8-80"];
 /// The one of them that the page shows.
-const SHOWN: &str = VALIDATE[1];
+const SHOWN: &str = VALIDATE[0];
 /// What the law is to hold.
 const TARGET: &str = "0.5";
 /// Of the noise floor that the held-out error may be at most.
@@ -52,9 +52,14 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         }
     }
     let (repeats, seconds, learn) = if short {
-        ("8", "25", "10")
+        ("3", "25", "10")
     } else {
-        ("20", "90", "30")
+        ("8", "90", "30")
+    };
+    let (identify, validate) = if short {
+        (&IDENTIFY[..3], &VALIDATE[..2])
+    } else {
+        (&IDENTIFY[..], &VALIDATE[..])
     };
     run(&mut cargo(&[
         "build",
@@ -75,7 +80,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         started: Instant::now(),
         times: Vec::new(),
     };
-    for name in IDENTIFY.iter().chain(&VALIDATE) {
+    for name in identify.iter().chain(validate) {
         let file = format!("{name}.csv");
         std::fs::copy(
             root().join("data/hidden-ramp").join(&file),
@@ -91,9 +96,9 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
     )?;
 
     day.say("## 2. Recordings\n\nCommands are played, each from rest; the board streams every sample. The rig file says what its counts mean.");
-    let commands: Vec<String> = IDENTIFY
+    let commands: Vec<String> = identify
         .iter()
-        .chain(&VALIDATE)
+        .chain(validate)
         .map(|n| format!("--command=commands/{n}.csv"))
         .collect();
     let mut line = port(
@@ -105,12 +110,12 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
     day.fit("record", &line)?;
     let mut line = words(&["average", "--period", "10", "--out", "set"]);
     line.extend(
-        IDENTIFY
+        identify
             .iter()
-            .chain(&VALIDATE)
+            .chain(validate)
             .map(|n| format!("raw/{n}.csv")),
     );
-    line.extend(VALIDATE.iter().map(|n| format!("--validate={n}")));
+    line.extend(validate.iter().map(|n| format!("--validate={n}")));
     day.fit("average", &line)?;
 
     day.say("## 3. A model, and what it lacks");

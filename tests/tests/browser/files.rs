@@ -112,9 +112,9 @@ fn recordings_are_dropped_mapped_and_identified() {
     assert_eq!(b.faults(), Vec::<String>::new());
 
     // The project brings its data along.
-    drop(served);
+    // The page goes first: one that loses its server complains.
     b.close(&page).expect("closed");
-    b.faults();
+    drop(served);
     let served = serve(&project, &[]);
     let page = b.open(&served.address, SIZE, false).expect("a page");
     until(

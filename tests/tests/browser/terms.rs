@@ -27,14 +27,12 @@ impl Chance {
     }
 }
 
+/// A record: its name, its use, and how long the next switch lasts, samples.
+type Asked = (&'static str, &'static str, fn(&mut Chance) -> usize);
+
 /// A flow of first order behind a valve, whose jet is what `jet` makes of the command that arrives and of the number of its
-/// pulse; read with a noise of 0.01. Each record is a name, a use and how long a switch lasts, samples.
-fn set(
-    folder: &Path,
-    samples: usize,
-    records: &[(&str, &str, fn(&mut Chance) -> usize)],
-    jet: fn(&mut f64, f64, u32) -> f64,
-) {
+/// pulse; read with a noise of 0.01.
+fn set(folder: &Path, samples: usize, records: &[Asked], jet: fn(&mut f64, f64, u32) -> f64) {
     const ARRIVES: usize = 20;
     const NOISE: f64 = 0.01;
     std::fs::create_dir_all(folder).expect("a folder");
@@ -79,7 +77,7 @@ const LEAN: &str = "(() => { const f = document.getElementById('identify').eleme
 fn a_term_that_no_catalogue_has_is_found_and_taken_as_a_formula() {
     let folder = tempfile::tempdir().expect("a folder");
     let data = folder.path().join("tiring");
-    let records: &[(&str, &str, fn(&mut Chance) -> usize)] = &[
+    let records: &[Asked] = &[
         ("square", "identify", |_| 150),
         ("a", "identify", telegraph),
         ("b", "identify", telegraph),
@@ -172,7 +170,7 @@ fn the_experiment_that_tells_is_drawn_and_saved() {
     let folder = tempfile::tempdir().expect("a folder");
     let data = folder.path().join("slow-valve");
     // A valve that opens gradually, a sensor and a flow that lag: slow squares show the same of all three.
-    let records: &[(&str, &str, fn(&mut Chance) -> usize)] = &[
+    let records: &[Asked] = &[
         ("a", "identify", |_| 250),
         ("b", "identify", |_| 150),
         ("c", "validate", |_| 250),

@@ -288,7 +288,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
 }
 
 const HEAD: &str = "# A day at the rig\n\n\
-`cargo xtask rig-day --page` made this page: a simulated rig that hides an effect, behind the board under QEMU, and nothing but the\n\
+`cargo xtask rig-day --short --page` made this page: a simulated rig that hides an effect, behind the board under QEMU, and nothing but the\n\
 serial line between it and the program. With a board at a port it is `--port /dev/ttyACM0` instead of `--port qemu …`, and the\n\
 program is flashed (`firmware/README.md`). What is printed below is what the commands printed.\n\n\
 ![A held-out record and both models; the reading under both laws](rig-day.svg)\n\n";

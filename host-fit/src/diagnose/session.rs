@@ -38,16 +38,14 @@ impl Session<'_> {
     }
 
     /// The given model's own structure, for rigs whose dynamics is the user's choice of
-    /// lags; with the product u·y where it has none and gains by it: that term is in
+    /// lags and delays; with the product u·y where it has none and gains by it: that term is in
     /// the base class and never counts as missing.
     pub(super) fn root_of_given(
         &self,
         given: &Model,
         as_given: &HeldOut,
     ) -> Result<(Hypothesis, &'static str), DiagnoseError> {
-        let mut model = given.clone();
-        model.delay_between_samples();
-        let plain = self.judge().refitted(&model)?;
+        let plain = self.judge().refitted(given)?;
         if given.product_lags.is_empty() {
             let bilinear = Model {
                 product_lags: vec![1],

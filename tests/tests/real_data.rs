@@ -1,7 +1,7 @@
 //! Public measured sets, where the folder with them is there; never bundled.
 
 use host_fit::data::{DataSet, InputFile, Record, Use};
-use host_fit::diagnose::{Diagnosis, Options, Verdict, diagnose};
+use host_fit::diagnose::{Diagnosis, Options, Ranked, Verdict, diagnose};
 use host_fit::fit::{FitOptions, fit};
 use host_fit::indicators::score;
 use host_fit::model::{Delay, Model, Start};
@@ -128,8 +128,17 @@ fn the_ball_screws_dry_friction_is_that_of_the_literature() {
         let found = diagnosed(&linear, train.clone(), test.clone(), 4);
         // It leads; whether it is named depends on how much the free run drifts, and
         // today it is not.
-        let first = found.ranking.first().expect("a ranking");
-        assert_eq!(first.effect, "dry-friction", "{:?}", found.ranking);
+        let leader = found.ranking.first().expect("a ranking");
+        let is_dry = |ranked: &&Ranked| ranked.effect == "dry-friction";
+        let first = found.ranking.iter().find(is_dry).expect("it is tried");
+        // Bouc–Wen's hysteresis has dry friction as its limit, and may be as good.
+        assert!(
+            leader.effect == "dry-friction"
+                || (leader.effect == "bouc-wen-hysteresis"
+                    && first.validate_rmse < 1.02 * leader.validate_rmse),
+            "{:?}",
+            found.ranking
+        );
         assert!(found.restarted_s.is_some());
         assert!(held_out(&linear, &test) > 0.0066);
         let Some(level) = first.parameters.get("level").map(|level| level.value) else {

@@ -374,8 +374,9 @@ impl<T: Real, L: DelayLaw<T>, J: Memory<T>> Arriving<'_, T, L, J> {
         let whole = tap.whole.min(farthest);
         self.nearest = self.nearest.min(whole);
         let newer = self.read(whole);
-        // Also where the fraction is 0: a delay that is a number of samples has a derivative, too.
-        if L::INTERPOLATES {
+        // An exact zero, value and derivatives: a delay of whole samples that is being
+        // fitted has a derivative.
+        if L::INTERPOLATES && tap.fraction != T::ZERO {
             let older = self.read(whole + 1);
             (newer + tap.fraction * (older - newer), older)
         } else {

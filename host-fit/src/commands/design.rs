@@ -191,7 +191,8 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let bar = console.progress(0, "{spinner} designing and trying in the loop {elapsed}");
     let tried = args.tried(&model)?;
     bar.finish_and_clear();
-    if let Some(refused) = tried.refused(args.force) {
+    let refused = tried.refused("--force").filter(|_| !args.force);
+    if let Some(refused) = refused {
         console.show(&tried, &[], &[])?;
         bail!("{refused}");
     }

@@ -18,13 +18,13 @@ pub(super) struct Tried {
 }
 
 impl Tried {
-    /// Why the law must not be written, unless it is to be by `force`.
-    pub(super) fn refused(&self, force: bool) -> Option<String> {
+    /// Why the law must not be written; `switch` is what writes it all the same.
+    pub(super) fn refused(&self, switch: &str) -> Option<String> {
         let lost = self.design.law.lost();
-        (!force && !lost.is_empty()).then(|| {
+        (!lost.is_empty()).then(|| {
             format!(
                 "the law was not written: it loses attachment with {}. Choose a target that is further inside of what can \
-                 be held, or find out whether the rig has that and `extend` the model; --force writes the law as it is, and \
+                 be held, or find out whether the rig has that and `extend` the model; {switch} writes the law as it is, and \
                  the file says so",
                 lost.join(", ")
             )

@@ -179,7 +179,14 @@ impl Report {
                 let cell = inline(row.get(index).map_or("", AsRef::as_ref));
                 match column {
                     Column::Text(_) => self.push(format_args!("<td>{cell}</td>")),
-                    Column::Number(_) => self.push(format_args!("<td class=\"n\">{cell}</td>")),
+                    Column::Number(_) => {
+                        // As on the axes of the pictures.
+                        let (sign, digits) = match cell.strip_prefix('-') {
+                            Some(digits) => ("−", digits),
+                            None => ("", cell.as_str()),
+                        };
+                        self.push(format_args!("<td class=\"n\">{sign}{digits}</td>"))
+                    }
                 };
             }
             self.push(format_args!("</tr>\n"));

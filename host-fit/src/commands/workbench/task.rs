@@ -231,7 +231,8 @@ impl Task {
             Asked::Design(args) => {
                 page.begins("designing, and trying the law in the loop");
                 let tried = args.tried(&self.model(bench)?).map_err(told)?;
-                if let Some(refused) = tried.refused(args.force()) {
+                let refused = tried.refused("the box “keep it even if a trial loses attachment”");
+                if let Some(refused) = refused.filter(|_| !args.force()) {
                     return Err(Refusal(refused));
                 }
                 let id = self.made(

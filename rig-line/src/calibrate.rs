@@ -175,9 +175,7 @@ fn shortest(
 ) -> Result<f64, LineError> {
     let longest = (plan.longest_pulse_s / period).round() as usize;
     let what = if open { "pulses" } else { "gaps" };
-    // The board refuses what is shorter than the hold times that it knows.
-    let mut length = 1;
-    while length <= longest {
+    let mut answers = |length: usize| {
         // Rests of half a second, as long as the flow needs to forget.
         let rest = (0.5 / period).round() as usize;
         let mut levels = if open { Vec::new() } else { vec![true; steady] };
@@ -189,36 +187,72 @@ fn shortest(
         levels.extend(std::iter::repeat_n(false, steady));
         let lead = if open { 0 } else { steady };
         let text = format!("{what} of {:.0} ms", length as f64 * period * 1e3);
-        match play(&text, levels) {
-            Ok(counts) => {
-                let answers: Vec<f64> = (0..plan.pulses as usize)
-                    .filter_map(|n| {
-                        let edge = lead + n * (rest + length) + rest;
-                        // Before the pulse, and the extreme of what comes after it.
-                        let before = mean(counts.get(edge - rest / 4..edge)?);
-                        let after = mean(counts.get(edge + 20.min(rest / 8)..edge + rest / 2)?);
-                        Some((after - before) * if open { swing } else { -swing } / swing.abs())
-                    })
-                    .collect();
-                let sure = deviation(&answers) / (answers.len() as f64).sqrt();
-                if mean(&answers) > plan.sigmas * sure {
-                    return Ok(length as f64 * period);
-                }
+        let counts = match play(&text, levels) {
+            Ok(counts) => counts,
+            // Shorter than the hold times that the board knows.
+            Err(LineError::Refused { reason, .. }) if reason.contains("hold time") => {
+                return Ok(false);
             }
-            // Shorter than the board allows: longer ones follow.
-            Err(LineError::Refused { reason, .. }) if reason.contains("hold time") => {}
             Err(other) => return Err(other),
-        }
-        length = if length < 8 {
+        };
+        let answers: Vec<f64> = (0..plan.pulses as usize)
+            .filter_map(|n| {
+                let edge = lead + n * (rest + length) + rest;
+                // Before the pulse, and the extreme of what comes after it.
+                let before = mean(counts.get(edge - rest / 4..edge)?);
+                let after = mean(counts.get(edge + 20.min(rest / 8)..edge + rest / 2)?);
+                Some((after - before) * if open { swing } else { -swing } / swing.abs())
+            })
+            .collect();
+        let sure = deviation(&answers) / (answers.len() as f64).sqrt();
+        Ok(mean(&answers) > plan.sigmas * sure)
+    };
+    match first_that(&lengths(longest), &mut answers)? {
+        Some(length) => Ok(length as f64 * period),
+        None => Err(LineError::Calibration(format!(
+            "the flow answers no {what} up to {} s; allow longer ones, or more of them",
+            plan.longest_pulse_s
+        ))),
+    }
+}
+
+/// Lengths that are tried, samples: all short ones, then each a quarter longer.
+fn lengths(longest: usize) -> Vec<usize> {
+    let longer = |length: &usize| {
+        Some(if *length < 8 {
             length + 1
         } else {
             length + length / 4
+        })
+    };
+    std::iter::successors(Some(1), longer)
+        .take_while(|length| *length < longest)
+        .chain([longest.max(1)])
+        .collect()
+}
+
+/// The first of `lengths` that is answered, if longer ones are answered too: by
+/// leaps that double, then by halves, since every one costs a quarter of a minute.
+fn first_that(
+    lengths: &[usize],
+    answers: &mut impl FnMut(usize) -> Result<bool, LineError>,
+) -> Result<Option<usize>, LineError> {
+    // Nothing below `low` is answered; `high` is, unless it is behind the end.
+    let (mut low, mut high, mut leap) = (0, lengths.len(), 1);
+    while low < high {
+        let at = if high == lengths.len() {
+            (low + leap - 1).min(high - 1)
+        } else {
+            (low + high) / 2
         };
+        if answers(lengths[at])? {
+            high = at;
+        } else {
+            low = at + 1;
+            leap *= 2;
+        }
     }
-    Err(LineError::Calibration(format!(
-        "the flow answers no {what} up to {} s; allow longer ones, or more of them",
-        plan.longest_pulse_s
-    )))
+    Ok(lengths.get(low).copied())
 }
 
 /// Plays a command once and gives the counts.
@@ -284,4 +318,25 @@ fn rounded(value: f64, digits: i32) -> f64 {
 /// Seven digits: a float's.
 fn significant(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shortest_answered_length_is_found_in_few_plays() {
+        let lengths = lengths(50);
+        assert_eq!(lengths.first().zip(lengths.last()), Some((&1, &50)));
+        for (place, shortest) in lengths.iter().enumerate() {
+            let mut plays = 0;
+            let found = first_that(&lengths, &mut |length| {
+                plays += 1;
+                Ok(length >= *shortest)
+            });
+            assert_eq!(found.unwrap(), Some(*shortest));
+            assert!(plays <= 9.min(2 * place + 1), "{plays} for {shortest}");
+        }
+        assert_eq!(first_that(&lengths, &mut |_| Ok(false)).unwrap(), None);
+    }
 }

@@ -70,17 +70,26 @@ impl Finder<'_> {
             |a: &(Term, Hypothesis), b: &(Term, Hypothesis)| size(&a.1).total_cmp(&size(&b.1));
         finished.sort_by(by_size);
         progress(&format!("term {number}: the flow's lags beside it"));
-        let leading = finished.iter().take(RULES.settled).cloned();
-        let settled: Vec<(Term, Hypothesis)> = leading
-            .map(|(term, hypothesis)| {
-                let best = self
-                    .search
-                    .run(Hypothesis::new(hypothesis.judged), || None)
-                    .best;
-                (term, best)
-            })
-            .collect();
-        finished.extend(settled);
+        let mut leading: Vec<(Term, Hypothesis)> = Vec::new();
+        for one in &finished {
+            // While it blows, the length of this pulse is the time since its edge.
+            let twin = |other: &(Term, Hypothesis)| {
+                let ratio = one.1.judged.rmse() / other.1.judged.rmse();
+                other.0.entry == one.0.entry && ratio - 1.0 < RULES.twins
+            };
+            if leading.len() < RULES.settled && !leading.iter().any(twin) {
+                leading.push(one.clone());
+            }
+        }
+        for (term, hypothesis) in leading {
+            let found = self.search.run(Hypothesis::new(hypothesis.judged), || None);
+            let over = self.search.judge.over_noise(found.best.judged.rmse());
+            finished.push((term, found.best));
+            // At the floor there is nothing to gain from others; what is as good is asked below.
+            if over < crate::diagnose::RULES.floor_margin {
+                break;
+            }
+        }
         let best = finished.into_iter().min_by(by_size);
         let found = best.and_then(|best| self.judged(best, base, looked_at, number));
         Round {

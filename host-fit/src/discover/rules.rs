@@ -22,6 +22,8 @@ rules! {
     finished: usize = 4, "", "judgement";
     /// Of those, for how many the flow's own lags are searched again.
     settled: usize = 2, "", "judgement: each takes as long as `identify`";
+    /// Curves at one place whose errors differ by less than this are the same curve.
+    twins: f64 = 0.001, "share of the rms error", "two names of one signal differ by rounding";
     /// A term must lower the held-out error of the best base without it by this fraction.
     worthwhile: f64 = 0.015, "share of the rms error", "as for effects of the catalogue";
     /// Level of the tests; p-values are multiplied by the number of curves that were looked at.

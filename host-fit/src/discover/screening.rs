@@ -9,7 +9,7 @@ use crate::data::Record;
 use crate::model::Model;
 use crate::terms::{Screen, Search, Tangent};
 use crate::user_effect::Definition;
-use model_core::effects::NUISANCES;
+use model_core::effects::{NUISANCES, ZERO_OFFSET};
 use rayon::prelude::*;
 
 /// A curve that was screened.
@@ -157,6 +157,12 @@ impl<'a> Context<'a> {
         Some(self.screen.tangent(&with, &term.name())?.direction)
     }
 
+    /// Whether the model has a zero of the sensor, which is a constant reading.
+    fn has_zero(&self) -> bool {
+        let effects = &self.model.effects;
+        effects.iter().any(|added| added.name == ZERO_OFFSET.name)
+    }
+
     /// The screening itself.
     pub(super) fn screen(&self) -> &Screen<'a> {
         &self.screen
@@ -203,7 +209,8 @@ impl<'a> Context<'a> {
             }
             _ => 0.0,
         };
-        let pinned = entry.has_free_level().then_some(pinned);
+        let zero = entry == Entry::Reading && self.has_zero();
+        let pinned = (zero || entry.has_free_level()).then_some(pinned);
         let mut term = Term {
             entry,
             coordinate,

@@ -24,7 +24,7 @@ rules! {
     nearly: f64 = 1.25, "times the noise floor", "the same";
     /// Where the noise is not known, this share of the excess is enough to be named.
     explained_in_unknown_noise: f64 = 0.75, "share of the excess", "the public sets";
-    /// Effects that take less than this share of the excess do not even stand in.
+    /// Effects that take less than this share of the excess are not named, nor do they stand in.
     stands_in: f64 = 0.5, "share of the excess", "judgement: half";
     /// Where slow noise is not known, a misfit counts if this share of it depends on something …
     depends: f64 = 0.1, "share of the excess", "the public sets";

@@ -144,7 +144,7 @@ impl Session<'_> {
             RULES.worthwhile
         };
         let better = with < (1.0 - worthwhile) * without && p < RULES.level;
-        let leaner = with < (1.0 + RULES.alike) * without && best.cost() < bare.cost();
+        let leaner = is_leaner(best, bare);
         let drifts = self.judge().drifts_more(&best.judged, &bare.judged);
         (better || (leaner && !scatter)) && !drifts
     }
@@ -197,31 +197,40 @@ impl Session<'_> {
             model: model.clone(),
             effects,
         };
-        if effects.is_empty() || !self.earned(best, bare) {
-            let verdict = if self.fits(&bare.judged) {
-                Verdict::NothingMissing
-            } else {
-                Verdict::Unexplained
-            };
-            return of(verdict, bare, Vec::new());
-        }
-        let left = judge.excess(&best.judged.held_out)
-            / judge.excess(&bare.judged.held_out).max(f64::MIN_POSITIVE);
-        let fits = self.fits(&best.judged);
-        let explained = match judge.noise_source {
-            NoiseSource::Scatter => 1.0 - left >= RULES.explained_in_unknown_noise,
-            NoiseSource::Measured | NoiseSource::Repeats => {
-                1.0 - left >= RULES.explained
-                    && judge.over_noise(best.judged.rmse()) <= RULES.nearly
-            }
+        let of_bare = if self.fits(&bare.judged) {
+            Verdict::NothingMissing
+        } else {
+            Verdict::Unexplained
         };
         // Effects on a base that is worse than what was given explain nothing.
         let no_better = best.judged.rmse() >= as_given.rmse();
+        if effects.is_empty() || no_better || !self.earned(best, bare) {
+            return of(of_bare, bare, Vec::new());
+        }
+        let left = judge.excess(&best.judged.held_out)
+            / judge.excess(&bare.judged.held_out).max(f64::MIN_POSITIVE);
+        let taken = 1.0 - left;
+        let fits = self.fits(&best.judged);
+        let explained = match judge.noise_source {
+            NoiseSource::Scatter => taken >= RULES.explained_in_unknown_noise,
+            NoiseSource::Measured | NoiseSource::Repeats => {
+                taken >= RULES.explained && judge.over_noise(best.judged.rmse()) <= RULES.nearly
+            }
+        };
+        let leaner = is_leaner(best, bare);
+        let known = judge.noise_source != NoiseSource::Scatter;
         match () {
-            () if no_better => of(Verdict::Unexplained, bare, Vec::new()),
+            // Near a known floor anything fits that takes a little.
+            () if taken < RULES.stands_in && !leaner && (known || !fits) => {
+                of(of_bare, bare, Vec::new())
+            }
             () if fits || explained => of(Verdict::EffectMissing, best, effects),
-            () if 1.0 - left >= RULES.stands_in => of(Verdict::PartlyExplained, best, effects),
-            () => of(Verdict::Unexplained, bare, Vec::new()),
+            () => of(Verdict::PartlyExplained, best, effects),
         }
     }
+}
+
+/// Whether effects do as well as what lags can do, with fewer parameters.
+fn is_leaner(best: &Hypothesis, bare: &Hypothesis) -> bool {
+    best.judged.rmse() < (1.0 + RULES.alike) * bare.judged.rmse() && best.cost() < bare.cost()
 }

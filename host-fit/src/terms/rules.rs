@@ -32,6 +32,8 @@ rules! {
     most_given: usize = 6, "terms", "judgement: each has to be tried without at the end";
     /// Effects that are tried in the place of another term.
     in_its_place: usize = 3, "", "judgement: the truth leads the screening or is next to the leader";
+    /// … and those that are followed to the end: what is further behind after a few steps does not catch up.
+    in_reach: f64 = 1.2, "times the error", "judgement: the lag of a valve in the place of a film's is 1.15 after the first steps";
     /// A base that is worse by no more than this, its parameters paid for, takes the place of a second name.
     as_well: f64 = 0.01, "share of the rms error", "a lag of the film and a second lag of the flow are one model where the delay is fixed, and the second costs a parameter more";
     /// Steps that every proposal is followed for.

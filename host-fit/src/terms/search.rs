@@ -248,12 +248,13 @@ impl Search<'_> {
         let end = best(&all, |_| true);
         let bare_end = best(&all, Hypothesis::is_bare);
         let found = self.pruned(all[end].clone(), &root);
-        let found = self.exchanged(found, &root);
+        // The best without effects is asked for before effects are tried in the place of its terms.
         let bare = if bare_end == end {
             found.clone()
         } else {
             self.pruned(all[bare_end].clone(), &root)
         };
+        let found = self.exchanged(found, &root);
         Found {
             root,
             best: found,
@@ -634,6 +635,9 @@ impl Search<'_> {
             let wanted = |other: &Term| room || other.effect().is_none();
             let without = term.taken_from(hypothesis.judged.model(), root.judged.model());
             let best = self.in_place_of(term, &without, wanted).into_iter().next();
+            let near =
+                |other: &InPlace| other.held_out.rmse() < RULES.in_reach * hypothesis.judged.rmse();
+            let best = best.filter(near);
             let other = best.and_then(|other| {
                 done.push(other.term.name());
                 let mut terms = hypothesis.terms.clone();

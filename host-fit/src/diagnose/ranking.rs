@@ -60,8 +60,11 @@ pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) 
             best.push((name, candidate));
         }
     }
+    // What the flow may be without a name promises little to first order, and often does as well.
     let wanted = |(place, (name, _)): (usize, &(String, &Candidate))| {
-        place < RULES.ranked_in_full || named.contains(&name.as_str())
+        place < RULES.ranked_in_full
+            || [FLOW_MEMORY, FLOW_LAG].contains(&name.as_str())
+            || named.contains(&name.as_str())
     };
     let before = context.judged.rmse();
     let rated: Vec<Rival> = best

@@ -1,8 +1,8 @@
 //! What a rig is: played and measured.
 //!
 //! In this order: the valve shut, then open, each until the flow is steady; then
-//! pulses of growing length, and gaps of growing length in steady blowing, until
-//! the flow answers. What a healthy sensor does (noise, equal readings in a row,
+//! pulses, and gaps in steady blowing, of several lengths until the shortest that the
+//! flow answers is known. What a healthy sensor does (noise, equal readings in a row,
 //! distance from the rails) is seen on the way.
 
 use wire::reply::Phase;

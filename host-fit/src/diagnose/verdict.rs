@@ -221,7 +221,7 @@ impl Session<'_> {
         let known = judge.noise_source != NoiseSource::Scatter;
         match () {
             // Near a known floor anything fits that takes a little.
-            () if taken < RULES.stands_in && !leaner && (known || !fits) => {
+            () if taken < RULES.stands_in && !(fits && (leaner || !known)) => {
                 of(of_bare, bare, Vec::new())
             }
             () if fits || explained => of(Verdict::EffectMissing, best, effects),

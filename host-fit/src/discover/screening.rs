@@ -157,12 +157,6 @@ impl<'a> Context<'a> {
         Some(self.screen.tangent(&with, &term.name())?.direction)
     }
 
-    /// Whether the model has a zero of the sensor, which is a constant reading.
-    fn has_zero(&self) -> bool {
-        let effects = &self.model.effects;
-        effects.iter().any(|added| added.name == ZERO_OFFSET.name)
-    }
-
     /// The screening itself.
     pub(super) fn screen(&self) -> &Screen<'a> {
         &self.screen
@@ -209,7 +203,8 @@ impl<'a> Context<'a> {
             }
             _ => 0.0,
         };
-        let zero = entry == Entry::Reading && self.has_zero();
+        // The sensor's zero is a constant reading.
+        let zero = entry == Entry::Reading && self.model.has_effect(ZERO_OFFSET.name);
         let pinned = (zero || entry.has_free_level()).then_some(pinned);
         let mut term = Term {
             entry,

@@ -266,7 +266,7 @@ impl Term {
     pub(super) fn added_to(&self, model: &Model, reference: Option<f64>) -> Option<Model> {
         let mut model = model.clone();
         let definition = self.definition().ok()?;
-        if model.effects.iter().any(|e| e.name == self.name()) {
+        if model.has_effect(&self.name()) {
             return None;
         }
         model.define(definition).ok()?;

@@ -196,6 +196,13 @@ impl Model {
         names
     }
 
+    /// Whether an effect called `name` was added, a nuisance included; the delay law does
+    /// not count.
+    #[must_use]
+    pub fn has_effect(&self, name: &str) -> bool {
+        self.effects.iter().any(|added| added.name == name)
+    }
+
     fn place_of(&self, added: &Added) -> Option<Place> {
         self.spec(&added.name).map(|spec| spec.place)
     }
@@ -234,7 +241,7 @@ impl Model {
         let name = definition.spec().name;
         match self.definition(name) {
             Some(known) if known == definition => return Ok(()),
-            Some(_) if self.effects.iter().any(|added| added.name == name) => {
+            Some(_) if self.has_effect(name) => {
                 return Err(DefineError {
                     name: name.to_owned(),
                 });

@@ -39,6 +39,11 @@ pub(super) fn fixed(value: f64, decimals: usize, trim: bool) -> String {
         let kept = text.trim_end_matches('0').trim_end_matches('.').len();
         text.truncate(kept);
     }
+    with_minus(text)
+}
+
+/// A number that was written with a hyphen, as `−12.3`.
+pub(super) fn with_minus(text: String) -> String {
     match text.strip_prefix('-') {
         // "−0" is what rounding leaves of a tiny negative number.
         Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),

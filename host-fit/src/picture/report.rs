@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::format::with_minus;
 use super::living::{self, Bundle, Living};
 use super::palette;
 
@@ -180,12 +181,7 @@ impl Report {
                 match column {
                     Column::Text(_) => self.push(format_args!("<td>{cell}</td>")),
                     Column::Number(_) => {
-                        // As on the axes of the pictures.
-                        let (sign, digits) = match cell.strip_prefix('-') {
-                            Some(digits) => ("−", digits),
-                            None => ("", cell.as_str()),
-                        };
-                        self.push(format_args!("<td class=\"n\">{sign}{digits}</td>"))
+                        self.push(format_args!("<td class=\"n\">{}</td>", with_minus(cell)))
                     }
                 };
             }

@@ -138,7 +138,7 @@ impl Screen<'_> {
     /// Changes by a slow wake, per pull.
     fn wakes(&self) -> Vec<(Term, Vec<f64>)> {
         // Nobody knows the wake of a flow that was blown before.
-        let present = self.model.effects.iter().any(|e| e.name == SLOW_WAKE.name);
+        let present = self.model.has_effect(SLOW_WAKE.name);
         if present || self.model.start == Start::Measured {
             return Vec::new();
         }
@@ -154,7 +154,7 @@ impl Screen<'_> {
 
     /// Changes by a rate that depends on the level, without jets and under them.
     fn level_rate(&self) -> Option<[Vec<f64>; 2]> {
-        if self.model.effects.iter().any(|e| e.name == LEVEL_RATE.name) {
+        if self.model.has_effect(LEVEL_RATE.name) {
             return None;
         }
         let of = |slopes: [f64; 2]| {
@@ -190,11 +190,7 @@ impl Screen<'_> {
             columns.push(separating);
             columns.push(attaching);
         }
-        let has_zero = self
-            .model
-            .effects
-            .iter()
-            .any(|e| e.name == ZERO_OFFSET.name);
+        let has_zero = self.model.has_effect(ZERO_OFFSET.name);
         if !has_zero && !self.judge.options.constant {
             let mut column = self.joined(self.runs.iter().map(Vec::as_slice));
             column.iter_mut().for_each(|x| *x = 1.0);

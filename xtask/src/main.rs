@@ -39,6 +39,7 @@ const TASKS: &[Task] = &[
     faults::TASK,
     firmware::TASK,
     campaigns::EFFECTS,
+    campaigns::CALIBRATE,
     campaigns::TERMS,
     identified::TASK,
     new_effect::TASK,

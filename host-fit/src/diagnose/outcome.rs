@@ -80,11 +80,12 @@ pub struct Ranked {
     pub validate_rmse: f64,
     /// By how much the held-out error falls, %.
     pub error_reduction_percent: f64,
-    /// p-value of the gain, corrected for the number of candidates (Holm).
+    /// p-value of the whole search: how often noise alone lets any effect, at any point of its
+    /// grid, take as much of the held-out error.
     pub p_value: f64,
-    /// The best that chance did with time-shifted and swapped versions of it:
-    /// reduction of the held-out error, %; none where it was only screened.
-    pub best_decoy_percent: Option<f64>,
+    /// By how much noise alone lets the best of all effects lower the held-out error in one
+    /// case of twenty, %.
+    pub best_decoy_percent: f64,
     /// Fitted parameters by name.
     pub parameters: BTreeMap<String, ParameterEstimate>,
     /// Candidates that the held-out records cannot tell from it.
@@ -121,6 +122,9 @@ pub struct Diagnosis {
     pub memory: Vec<Memory>,
     /// Models that were refitted in full on the way.
     pub tried: usize,
+    /// Effects at points of their grids that were screened on the final model without effects:
+    /// what the p-values of the ranking are corrected for.
+    pub alternatives: usize,
     /// How the errors were held out.
     pub held_out_by: HeldOutBy,
     /// After how many seconds free runs started anew from the measurement, for rigs

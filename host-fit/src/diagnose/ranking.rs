@@ -4,8 +4,8 @@
 use super::{NotTried, RULES, Ranked, estimates};
 use crate::model::Model;
 use crate::terms::{
-    Candidate, HeldOut, Hypothesis, Judge, Judged, Screen, Search, Table, Term, Units, decoys,
-    last_of_both, p_value,
+    Candidate, Chance, HeldOut, Hypothesis, Judged, Noise, Screen, Search, Table, Term, Units,
+    p_value,
 };
 use model_core::effect::Spec;
 use rayon::prelude::*;
@@ -40,11 +40,75 @@ impl Rival {
 /// All candidates for `context`, best first: the most promising refitted, and `named`
 /// in any case.
 pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) -> Vec<Rival> {
-    let model = context.judged.model();
-    let Some(screen) = Screen::new(search.judge, model) else {
-        return Vec::new();
-    };
-    let table = Table::of(&screen, &search.known, true);
+    match Screen::new(search.judge, context.judged.model()) {
+        Some(screen) => {
+            let table = Table::of(&screen, &search.known, true);
+            refitted(search, context, named, &screen, &table)
+        }
+        None => Vec::new(),
+    }
+}
+
+/// The same, with what noise alone would make of the best of them: the error of `last`
+/// under signs drawn from `seed`.
+pub(super) fn rivals_and_chance(
+    search: &Search<'_>,
+    context: &Hypothesis,
+    named: &[&str],
+    last: &Judged,
+    seed: u64,
+) -> (Vec<Rival>, Chance) {
+    let made = Screen::new(search.judge, context.judged.model()).and_then(|screen| {
+        let noise = Noise::new(&screen, last.model(), last.held_out.block(), seed)?;
+        let table = Table::with_chance(&screen, &search.known, &noise);
+        let rivals = refitted(search, context, named, &screen, &table);
+        Some((rivals, table.chance))
+    });
+    made.unwrap_or_default()
+}
+
+/// All candidates as the screening sees them, best first; `before` is the held-out error
+/// without them.
+pub(super) fn screened(screen: &Screen<'_>, table: &Table, before: f64) -> Vec<Rival> {
+    rated(screen, table, before, |_, _, _| None)
+}
+
+/// The most promising candidates, and `named` in any case, refitted on `context`. Nothing
+/// is where no effect is named.
+fn refitted(
+    search: &Search<'_>,
+    context: &Hypothesis,
+    named: &[&str],
+    screen: &Screen<'_>,
+    table: &Table,
+) -> Vec<Rival> {
+    rated(
+        screen,
+        table,
+        context.judged.rmse(),
+        |place, name, candidate| {
+            // What the flow may be without a name promises little to first order, and often does as well.
+            let wanted = place < RULES.ranked_in_full
+                || [FLOW_MEMORY, FLOW_LAG].contains(&name)
+                || named.contains(&name);
+            if !wanted || named.is_empty() {
+                return None;
+            }
+            let proposal = screen.alone(table, candidate)?;
+            let brief =
+                search.set_out(context.judged.model(), &proposal, crate::terms::RULES.brief)?;
+            let terms = [context.terms.clone(), proposal.terms].concat();
+            Some(search.finish(terms, brief)?.judged)
+        },
+    )
+}
+
+fn rated(
+    screen: &Screen<'_>,
+    table: &Table,
+    before: f64,
+    refit: impl Fn(usize, &str, &Candidate) -> Option<Judged> + Sync,
+) -> Vec<Rival> {
     // The best of each kind, in the order of what they promise.
     let mut best: Vec<(String, &Candidate)> = Vec::new();
     for candidate in &table.candidates {
@@ -60,31 +124,18 @@ pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) 
             best.push((name, candidate));
         }
     }
-    // What the flow may be without a name promises little to first order, and often does as well.
-    let wanted = |(place, (name, _)): (usize, &(String, &Candidate))| {
-        place < RULES.ranked_in_full
-            || [FLOW_MEMORY, FLOW_LAG].contains(&name.as_str())
-            || named.contains(&name.as_str())
-    };
-    let before = context.judged.rmse();
-    let rated: Vec<Rival> = best
+    let mut rated: Vec<Rival> = best
         .par_iter()
         .enumerate()
-        .map(|(place, (name, candidate))| {
-            let judged = (wanted((place, &best[place])) && !named.is_empty())
-                .then(|| refitted(search, &screen, &table, context, candidate))
-                .flatten();
-            Rival {
-                name: name.clone(),
-                spec: candidate.term.effect(),
-                judged,
-                promised: before * (1.0 - candidate.held_out).max(0.0).sqrt(),
-            }
+        .map(|(place, (name, candidate))| Rival {
+            name: name.clone(),
+            spec: candidate.term.effect(),
+            judged: refit(place, name, candidate),
+            promised: before * (1.0 - candidate.held_out).max(0.0).sqrt(),
         })
         .collect();
-    let mut rated = rated;
     // What the screening found no use for was tried all the same.
-    let useless = model.candidates().filter(|spec| {
+    let useless = screen.model().candidates().filter(|spec| {
         screen.pointless(spec).is_none() && !best.iter().any(|(name, _)| name == spec.name)
     });
     rated.extend(useless.map(|spec| Rival {
@@ -101,41 +152,16 @@ pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) 
     rated
 }
 
-fn refitted(
-    search: &Search<'_>,
-    screen: &Screen<'_>,
-    table: &Table,
-    context: &Hypothesis,
-    candidate: &Candidate,
-) -> Option<Judged> {
-    let proposal = screen.alone(table, candidate)?;
-    let brief = search.set_out(context.judged.model(), &proposal, crate::terms::RULES.brief)?;
-    let terms = [context.terms.clone(), proposal.terms].concat();
-    Some(search.finish(terms, brief)?.judged)
-}
-
-/// The ranking as it is reported, in the user's units.
-pub(super) fn ranked(
-    judge: &Judge,
-    units: &Units,
-    context: &Hypothesis,
-    rivals: &[Rival],
-    shifts: &[f64],
-) -> Vec<Ranked> {
-    let before = context.judged.rmse();
+/// The ranking as it is reported, in the user's units: `before` is the held-out error
+/// without them.
+pub(super) fn ranked(units: &Units, before: f64, rivals: &[Rival], chance: &Chance) -> Vec<Ranked> {
+    let by_chance = 1.0 - (1.0 - chance.usual()).max(0.0).sqrt();
     let effects = || rivals.iter().filter_map(|r| Some((r, r.spec?)));
     effects()
         .map(|(rival, spec)| {
             let after = rival.rmse();
-            // Every effect was looked at: the best of so many is often good by chance.
-            let p = rival.judged.as_ref().map(|judged| {
-                (RULES.alternatives * p_value(&context.judged.held_out, &judged.held_out)).min(1.0)
-            });
-            let chance = rival
-                .judged
-                .as_ref()
-                .and_then(|judged| best_decoy(judge, &context.judged, judged, shifts));
             let gain = 1.0 - after / before;
+            let p = chance.p_value(1.0 - (after / before).powi(2));
             let others = effects().filter(|(other, _)| {
                 let both = (other.judged.as_ref(), rival.judged.as_ref());
                 let (Some(a), Some(b)) = both else {
@@ -147,17 +173,15 @@ pub(super) fn ranked(
                 effect: rival.name.clone(),
                 validate_rmse: after * units.y,
                 error_reduction_percent: 100.0 * gain,
-                p_value: p.unwrap_or(1.0),
-                best_decoy_percent: chance.map(|chance| 100.0 * chance),
+                p_value: p,
+                best_decoy_percent: 100.0 * by_chance,
                 parameters: rival
                     .judged
                     .as_ref()
                     .map(|judged| estimates(&judged.fits[0], spec, units))
                     .unwrap_or_default(),
                 confounded_with: others.map(|(other, _)| other.name.clone()).collect(),
-                significant: p.is_some_and(|p| p < RULES.level)
-                    && gain > RULES.worthwhile
-                    && chance.is_none_or(|chance| gain > chance),
+                significant: rival.judged.is_some() && p <= RULES.level && gain > RULES.worthwhile,
                 refitted: rival.judged.is_some(),
             }
         })
@@ -176,26 +200,4 @@ pub(super) fn not_tried(search: &Search<'_>, model: &Model) -> Vec<NotTried> {
         })
     });
     reasons.collect()
-}
-
-/// The best reduction of the held-out rms error among copies of the change that are
-/// shifted in time or taken from another record.
-fn best_decoy(judge: &Judge, without: &Judged, with: &Judged, shifts: &[f64]) -> Option<f64> {
-    let change = |with: &HeldOut, without: &HeldOut| -> Vec<Vec<f64>> {
-        let pairs = with.errors.iter().zip(&without.errors);
-        pairs
-            .map(|(with, without)| {
-                let (with, without) = last_of_both(with, without);
-                without.iter().zip(with).map(|(b, w)| b - w).collect()
-            })
-            .collect()
-    };
-    let learned = judge.learned(without).ok()?;
-    let learning = change(&judge.learned(with).ok()?, &learned);
-    let judging = change(&with.held_out, &without.held_out);
-    let chances = decoys((&learned, &learning), (&without.held_out, &judging), shifts);
-    let shares = chances
-        .into_iter()
-        .map(|energy| 1.0 - (1.0 - energy).max(0.0).sqrt());
-    Some(shares.fold(0.0, f64::max))
 }

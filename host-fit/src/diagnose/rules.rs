@@ -36,8 +36,6 @@ rules! {
     promising: f64 = 0.02, "share of the rms error", "screening of nulls promises up to 0.008";
     /// Candidates that are refitted for the ranking beside the named ones.
     ranked_in_full: usize = 4, "", "judgement: further ones never matched the leader";
-    /// Copies of a candidate, shifted in time or swapped between records, against which its gain has to stand.
-    decoys: usize = 19, "", "the best of 19 is beaten by chance once in 20";
     /// A lag below this is the order of the flow, not a memory.
     shortest_memory: usize = 20, "samples", "judgement: as long as a fast flow takes";
     /// A rate below this share of that of the way back is what lags leave that cancel: it is no rate.

@@ -2,7 +2,7 @@
 
 use super::memory::memory;
 use super::outcome::Conclusion;
-use super::ranking::{not_tried, ranked, rivals};
+use super::ranking::{not_tried, ranked, rivals_and_chance};
 use super::{DiagnoseError, Diagnosis, Options, RULES, Rung, Verdict, estimates};
 use crate::model::Model;
 use crate::terms::{Found, HeldOut, Hypothesis, Judge, Judged, Search, Term, Units, p_value};
@@ -26,15 +26,6 @@ impl Session<'_> {
         let (judge, units) = (self.judge(), &self.units);
         let model = units.model_out(&judge.final_fit(judged).model);
         Rung::of(judge, units, &judged.held_out, effects, step, Some(model))
-    }
-
-    /// Decoys' shifts, as fractions of a record.
-    fn shifts(&self) -> Vec<f64> {
-        use rand::{RngExt, SeedableRng};
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(self.options.seed);
-        (0..RULES.decoys)
-            .map(|_| rng.random_range(0.1..0.9))
-            .collect()
     }
 
     /// The given model's own structure, for rigs whose dynamics is the user's choice of
@@ -89,7 +80,8 @@ impl Session<'_> {
             }
         }
         let names: Vec<&str> = effects.iter().map(|spec| spec.name).collect();
-        let others = rivals(search, &context, &names);
+        let (others, chance) =
+            rivals_and_chance(search, &context, &names, &last.judged, self.options.seed);
         let mut order = effects.clone();
         // The best single effect leads: the ladder falls as the ranking does.
         let place = |spec: &Spec| others.iter().position(|r| r.name == spec.name);
@@ -112,7 +104,7 @@ impl Session<'_> {
             .iter()
             .map(|spec| (spec.name.to_owned(), estimates(&end, spec, units)))
             .collect();
-        let mut ranking = ranked(judge, units, &context, &others, &self.shifts());
+        let mut ranking = ranked(units, context.judged.rmse(), &others, &chance);
         for entry in &mut ranking {
             // The ranking shows what the effects are in the final model, and only what
             // still cannot be told apart there.
@@ -153,6 +145,7 @@ impl Session<'_> {
             stand_ins,
             memory: memory(&model),
             tried: found.tried,
+            alternatives: chance.alternatives,
             held_out_by: judge.held_out_by,
             restarted_s,
             noise_source: judge.noise_source,

@@ -2,12 +2,12 @@
 
 use super::memory::memory;
 use super::outcome::Conclusion;
-use super::ranking::not_tried;
+use super::ranking::{Rival, not_tried, ranked, screened};
 use super::session::Session;
 use super::{Diagnosis, RULES, Rung, Verdict};
 use crate::model::Model;
 use crate::residual::{FailureCoordinate, NoiseSource, examine};
-use crate::terms::{Found, HeldOut, Hypothesis, Judged, Screen, Table, Term, p_value};
+use crate::terms::{Found, HeldOut, Hypothesis, Judged, Noise, Screen, Table, Term, p_value};
 use model_core::effect::Spec;
 use std::collections::BTreeMap;
 
@@ -29,17 +29,13 @@ impl Session<'_> {
             return None;
         }
         let screen = Screen::new(judge, given_inside)?;
-        let table = Table::of(
-            &screen,
-            &self.search.known,
-            over > crate::terms::RULES.at_the_floor,
-        );
-        let promised = table
-            .candidates
-            .iter()
-            .filter(|candidate| candidate.term.effect().is_some())
-            .map(|candidate| 1.0 - (1.0 - candidate.held_out).max(0.0).sqrt())
-            .fold(0.0, f64::max);
+        let noise = Noise::new(&screen, given_inside, as_given.block(), self.options.seed)?;
+        let table = Table::with_chance(&screen, &self.search.known, &noise);
+        let before = as_given.rmse();
+        let rivals = screened(&screen, &table, before);
+        let effects = rivals.iter().filter(|rival| rival.spec.is_some());
+        let least = effects.map(Rival::rmse).fold(before, f64::min);
+        let promised = 1.0 - least / before;
         if promised > RULES.promising || self.imitated(given_inside, as_given) {
             return None;
         }
@@ -50,12 +46,13 @@ impl Session<'_> {
             sets: Vec::new(),
             memory: memory(given),
             tried: 0,
+            alternatives: table.chance.alternatives,
             held_out_by: judge.held_out_by,
             restarted_s: None,
             noise_source: judge.noise_source,
             noise_estimate: judge.noise_rmse() * self.units.y,
             ladder: vec![first.clone()],
-            ranking: Vec::new(),
+            ranking: ranked(&self.units, before, &rivals, &table.chance),
             parameters: BTreeMap::new(),
             not_tried: not_tried(self.search, given_inside),
             separation: None,

@@ -77,13 +77,6 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
-/// Takes what lies along `direction`, of length 1, out of `x`.
-pub(crate) fn take_away(direction: &[f64], x: &mut [f64]) {
-    let along = dot(x, direction);
-    let each = x.iter_mut().zip(direction);
-    each.for_each(|(x, d)| *x -= along * d);
-}
-
 /// The inverse of an information matrix (symmetric, row-major, `n` × `n`) in the
 /// directions that it knows, and which coordinates take part in the others.
 /// `None` if the decomposition fails.

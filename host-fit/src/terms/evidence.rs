@@ -31,6 +31,11 @@ impl HeldOut {
         }
     }
 
+    /// Samples that count as independent of the next as many.
+    pub(crate) fn block(&self) -> usize {
+        self.block
+    }
+
     /// Infinite if nothing was judged.
     pub(crate) fn rmse(&self) -> f64 {
         if self.samples == 0 {
@@ -97,7 +102,7 @@ pub(crate) fn p_value(worse: &HeldOut, better: &HeldOut) -> f64 {
 }
 
 /// What two series have in common at their ends: warm-ups differ.
-pub(crate) fn last_of_both<'a>(a: &'a [f64], b: &'a [f64]) -> (&'a [f64], &'a [f64]) {
+fn last_of_both<'a>(a: &'a [f64], b: &'a [f64]) -> (&'a [f64], &'a [f64]) {
     let n = a.len().min(b.len());
     (&a[a.len() - n..], &b[b.len() - n..])
 }
@@ -137,46 +142,6 @@ pub(crate) fn p_above_noise(held_out: &HeldOut, variance: &[Vec<f64>], margin: f
     let middle = median(excess.clone());
     let deviation = median(excess.iter().map(|x| (x - middle).abs()).collect());
     student(mean, NORMAL * deviation / n.sqrt(), n - 1.0)
-}
-
-/// Fractions of the error energy that chance would have removed: what the
-/// candidate changes in the free run, shifted in time or taken from another
-/// record, scaled to fit the learning records and judged on the held-out ones.
-pub(crate) fn decoys(
-    learning: (&HeldOut, &[Vec<f64>]),
-    judging: (&HeldOut, &[Vec<f64>]),
-    shifts: &[f64],
-) -> Vec<f64> {
-    let shifted = |series: &[f64], shift: f64| -> Vec<f64> {
-        let by = (shift * series.len() as f64) as usize;
-        let (head, tail) = series.split_at(by.min(series.len()));
-        [tail, head].concat()
-    };
-    let decoy = |changes: &[Vec<f64>], swap: usize, shift: f64| -> Vec<Vec<f64>> {
-        (0..changes.len())
-            .map(|record| shifted(&changes[(record + swap) % changes.len()], shift))
-            .collect()
-    };
-    let moments = |held_out: &HeldOut, changes: &[Vec<f64>]| {
-        let pairs = held_out.errors.iter().zip(changes);
-        pairs.fold((0.0, 0.0), |(cross, own), (error, change)| {
-            let n = error.len().min(change.len());
-            (
-                cross + dot(&error[..n], &change[..n]),
-                own + dot(&change[..n], &change[..n]),
-            )
-        })
-    };
-    shifts
-        .iter()
-        .enumerate()
-        .map(|(i, shift)| {
-            let (cross, own) = moments(learning.0, &decoy(learning.1, i, *shift));
-            let scale = if own > 0.0 { cross / own } else { 0.0 };
-            let (cross, own) = moments(judging.0, &decoy(judging.1, i, *shift));
-            (2.0 * scale * cross - scale * scale * own) / judging.0.sum_of_squares
-        })
-        .collect()
 }
 
 #[cfg(test)]

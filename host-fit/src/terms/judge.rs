@@ -172,15 +172,6 @@ impl Judge {
         Ok(HeldOut::new(errors.into_iter().collect::<Result<_, _>>()?))
     }
 
-    /// Errors on what was learned from.
-    pub(crate) fn learned(&self, judged: &Judged) -> Result<HeldOut, SimulateError> {
-        let errors = judged.fits.iter().zip(&self.folds).flat_map(|(fit, fold)| {
-            let records = &fold.learning;
-            records.iter().map(|r| Self::error(&fit.model, r, 0))
-        });
-        Ok(HeldOut::new(errors.collect::<Result<_, _>>()?))
-    }
-
     /// The first fold's fit judged, with the other folds' from there.
     ///
     /// # Errors

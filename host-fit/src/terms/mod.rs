@@ -9,6 +9,7 @@
 
 mod automatic;
 mod bench;
+mod chance;
 mod evidence;
 mod folds;
 mod grid;
@@ -24,13 +25,15 @@ mod units;
 pub use crate::fit::Known;
 pub use automatic::{Automatic, base_model};
 pub use bench::Bench;
-pub(crate) use evidence::{HeldOut, decoys, last_of_both, p_value};
+pub use chance::Chance;
+pub(crate) use chance::Noise;
+pub(crate) use evidence::{HeldOut, p_value};
 pub use folds::HeldOutBy;
 pub use judge::{Judge, Judged};
 pub use proposal::Proposal;
 pub use rules::{RULES, Rules};
 pub use screen::Screen;
-pub(crate) use screen::Tangent;
+pub(crate) use screen::{Shown, Tangent};
 pub use search::{Found, Hypothesis, Search};
 pub use table::{Candidate, Table};
 pub use term::Term;

@@ -112,6 +112,8 @@ rules! {
     /// Delay laws are compared at this level, where nothing better is known.
     middle: f64 = 0.5, "size of y", "the middle of the range";
 
+    /// Errors that are noise alone, against which the best of all candidates has to stand.
+    draws: usize = 199, "", "a p-value of 0.005 is the least that can be said";
     /// Errors of blocks of so many correlation times count as independent …
     correlation_times: f64 = 8.0, "correlation times", "held by `the_p_value_is_calibrated_for_coloured_errors`";
     /// … of so many samples at least …

@@ -13,6 +13,7 @@
 
 use super::RULES;
 use super::judge::Judge;
+use super::table::Table;
 use super::term::Term;
 use crate::data::Record;
 use crate::fit::{channel_reference, sensitivities};
@@ -20,6 +21,7 @@ use crate::linalg::{dot, solve_symmetric};
 use crate::model::{Delay, Model};
 use model_core::effect::Spec;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// What the parameters of one effect do together.
 pub(crate) struct Tangent {
@@ -31,6 +33,21 @@ pub(crate) struct Tangent {
     pub(crate) held_out: f64,
     /// What they change in the free run, as far as the model itself cannot.
     pub(crate) direction: Vec<f64>,
+}
+
+/// What a change of the model shows in the free run.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shown {
+    /// Energy of the held-out error.
+    pub(crate) error: f64,
+    /// Energy of the change there, without what the model's own parameters can do.
+    pub(crate) promised: f64,
+    /// Standard deviation of change times error.
+    pub(crate) promised_deviation: f64,
+    /// The same without what the best term without a name can do besides.
+    pub(crate) left: f64,
+    /// Standard deviation of what is left of the change times error.
+    pub(crate) left_deviation: f64,
 }
 
 /// A fitted model, ready to be asked what a change would do.
@@ -49,7 +66,7 @@ pub struct Screen<'a> {
     pub(super) error: Vec<f64>,
     /// Directions that the model's own parameters can follow, orthonormal on what is
     /// learned from.
-    basis: Vec<Vec<f64>>,
+    pub(super) basis: Vec<Vec<f64>>,
 }
 
 impl<'a> Screen<'a> {
@@ -103,16 +120,51 @@ impl<'a> Screen<'a> {
         for column in jacobian {
             screen.follow(column);
         }
-        let errors: Vec<Vec<f64>> = screen
-            .records
-            .iter()
-            .zip(&screen.runs)
-            .map(|(record, run)| record.y.iter().zip(run).map(|(y, sim)| y - sim).collect())
-            .collect();
-        let mut error = screen.joined(errors.iter().map(Vec::as_slice));
+        let mut error = screen.error_with(&screen.runs);
         screen.residualise(&mut error);
         screen.error = error;
         Some(screen)
+    }
+
+    /// y − y_sim, joined.
+    fn error_with(&self, runs: &[Vec<f64>]) -> Vec<f64> {
+        let pairs = self.records.iter().zip(runs);
+        let each =
+            pairs.map(|(record, run)| record.y.iter().zip(run).map(|(y, sim)| y - sim).collect());
+        let errors: Vec<Vec<f64>> = each.collect();
+        self.joined(errors.iter().map(Vec::as_slice))
+    }
+
+    /// The error of another model, joined; `None` if it diverges.
+    pub(super) fn error_of(&self, other: &Model) -> Option<Vec<f64>> {
+        let runs: Option<Vec<Vec<f64>>> = (self.records.iter())
+            .map(|record| other.free_run(record).ok())
+            .collect();
+        Some(self.error_with(&runs?))
+    }
+
+    /// The joined series in blocks of so many samples, none in two records.
+    pub(super) fn blocks(&self, samples: usize) -> Vec<Range<usize>> {
+        let length = (samples / self.stride).max(1);
+        let mut blocks = Vec::new();
+        let mut start = 0;
+        for (record, from) in self.records.iter().zip(&self.from) {
+            let end = start + record.len().saturating_sub(*from) / self.stride;
+            let each = (start..end).step_by(length);
+            blocks.extend(each.map(|first| first..(first + length).min(end)));
+            start = end;
+        }
+        blocks
+    }
+
+    /// Records that are learned from, then those that are judged.
+    pub(crate) fn records(&self) -> &[&'a Record] {
+        &self.records
+    }
+
+    /// The model that is asked about.
+    pub(crate) fn model(&self) -> &'a Model {
+        self.model
     }
 
     /// Judged samples of all records, joined and averaged over neighbours.
@@ -190,34 +242,36 @@ impl<'a> Screen<'a> {
 
     /// The same with a ridge, as a share of the mean square of the columns.
     fn regress_with(&self, columns: &[&[f64]], ridge: f64) -> Option<(Vec<f64>, f64, f64)> {
-        let n = columns.len();
-        let learned = |series: &'_ [f64]| series[..self.learned].to_vec();
-        let own: Vec<Vec<f64>> = columns.iter().map(|c| learned(c)).collect();
-        let mut products = vec![0.0; n * n];
-        let mut right = vec![0.0; n];
-        for i in 0..n {
-            for j in 0..n {
-                products[i * n + j] = dot(&own[i], &own[j]);
-            }
-            right[i] = dot(&own[i], &self.error[..self.learned]);
-        }
-        let mean = (0..n).map(|i| products[i * n + i]).sum::<f64>() / n.max(1) as f64;
-        for i in 0..n {
-            products[i * n + i] *= 1.0 + 1e-9;
-            products[i * n + i] += ridge * mean;
-        }
-        let scale = solve_symmetric(&products, &right)?;
-        let mut rest = self.error.clone();
-        for (column, scale) in columns.iter().zip(&scale) {
-            let pairs = rest.iter_mut().zip(*column);
-            pairs.for_each(|(rest, x)| *rest -= scale * x);
-        }
+        let scale = self.coefficients(&self.error, columns, ridge)?;
+        let rest = less(&self.error, columns, &scale);
         let share = |rest: &[f64], whole: &[f64]| {
             dot(rest, rest) / dot(whole, whole).max(f64::MIN_POSITIVE)
         };
         let (before, after) = rest.split_at(self.learned);
         let (own, other) = self.error.split_at(self.learned);
         Some((scale, share(before, own), share(after, other)))
+    }
+
+    /// Coefficients of columns fitted to a series where it is learned.
+    fn coefficients(&self, series: &[f64], columns: &[&[f64]], ridge: f64) -> Option<Vec<f64>> {
+        let n = columns.len();
+        let learned = |a: &[f64], b: &[f64]| dot(&a[..self.learned], &b[..self.learned]);
+        let mut products: Vec<f64> = (0..n * n)
+            .map(|cell| learned(columns[cell / n], columns[cell % n]))
+            .collect();
+        let right: Vec<f64> = columns.iter().map(|c| learned(c, series)).collect();
+        let mean = (0..n).map(|i| products[i * n + i]).sum::<f64>() / n.max(1) as f64;
+        for i in 0..n {
+            products[i * n + i] *= 1.0 + 1e-9;
+            products[i * n + i] += ridge * mean;
+        }
+        solve_symmetric(&products, &right)
+    }
+
+    /// What columns fitted to a series leave of it.
+    fn rest_of(&self, series: &[f64], columns: &[&[f64]]) -> Option<Vec<f64>> {
+        let scale = self.coefficients(series, columns, 0.0)?;
+        Some(less(series, columns, &scale))
     }
 
     /// By how many samples the lag of each term should move, to first order; 0 where
@@ -282,6 +336,41 @@ impl<'a> Screen<'a> {
         })
     }
 
+    /// What `other` changes that neither this model's own parameters nor one of the `unnamed`
+    /// terms can do in its place; `block` samples of the error are independent of the next.
+    /// `None` if it diverges or changes nothing.
+    pub(crate) fn shown(&self, unnamed: &Table, other: &Model, block: usize) -> Option<Shown> {
+        let mut change = self.change(other)?;
+        self.residualise(&mut change);
+        let held_out = |series: &[f64]| {
+            let own = &series[self.learned..];
+            dot(own, own)
+        };
+        let deviation = |series: &[f64]| {
+            let blocks = self.blocks(block).into_iter();
+            let judged = blocks.filter(|block| block.start >= self.learned);
+            let each = judged.map(|b| dot(&series[b.clone()], &self.error[b]).powi(2));
+            each.sum::<f64>().sqrt()
+        };
+        let rests = unnamed.candidates.iter().filter_map(|candidate| {
+            let columns = candidate
+                .columns
+                .iter()
+                .map(|i| unnamed.columns[*i].as_slice());
+            self.rest_of(&change, &columns.collect::<Vec<_>>())
+        });
+        let least = rests.min_by(|a, b| held_out(a).total_cmp(&held_out(b)));
+        let left = least.unwrap_or_else(|| change.clone());
+        let shown = Shown {
+            error: held_out(&self.error),
+            promised: held_out(&change),
+            promised_deviation: deviation(&change),
+            left: held_out(&left),
+            left_deviation: deviation(&left),
+        };
+        (shown.left > 0.0 && shown.promised > 0.0).then_some(shown)
+    }
+
     /// Whether an effect cannot be tried here, and why.
     pub(crate) fn pointless(&self, spec: &Spec) -> Option<String> {
         if self
@@ -297,4 +386,14 @@ impl<'a> Screen<'a> {
         }
         spec.needs.unmet(self.judge.on_off).map(str::to_owned)
     }
+}
+
+/// A series less so many times each column.
+fn less(series: &[f64], columns: &[&[f64]], scales: &[f64]) -> Vec<f64> {
+    let mut rest = series.to_vec();
+    for (column, scale) in columns.iter().zip(scales) {
+        let pairs = rest.iter_mut().zip(*column);
+        pairs.for_each(|(rest, x)| *rest -= scale * x);
+    }
+    rest
 }

@@ -1,6 +1,7 @@
 //! Everything that could be added to a model, and what it takes of the error alone.
 
 use super::RULES;
+use super::chance::{Chance, Noise, Taken};
 use super::grid::{grid, longest_lag};
 use super::screen::Screen;
 use super::term::Term;
@@ -33,6 +34,8 @@ pub struct Table {
     /// The candidates, the best held-out share first.
     pub candidates: Vec<Candidate>,
     pub(super) columns: Vec<Vec<f64>>,
+    /// What noise alone would make of the best of the effects; of nothing where it was not asked for.
+    pub chance: Chance,
 }
 
 impl Table {
@@ -42,12 +45,26 @@ impl Table {
         let mut columns = Vec::new();
         let mut candidates = screen.base_candidates(&mut columns);
         if effects {
-            candidates.extend(screen.effect_candidates(known, &mut columns));
+            candidates.extend(screen.effect_candidates(known, None, &mut columns).0);
         }
+        Self::sorted(candidates, columns, Chance::default())
+    }
+
+    /// The same with effects, and what `noise` alone would make of them.
+    pub(crate) fn with_chance(screen: &Screen, known: &Known, noise: &Noise) -> Self {
+        let mut columns = Vec::new();
+        let mut candidates = screen.base_candidates(&mut columns);
+        let (effects, chance) = screen.effect_candidates(known, Some(noise), &mut columns);
+        candidates.extend(effects);
+        Self::sorted(candidates, columns, chance)
+    }
+
+    fn sorted(mut candidates: Vec<Candidate>, columns: Vec<Vec<f64>>, chance: Chance) -> Self {
         candidates.sort_by(|a, b| b.held_out.total_cmp(&a.held_out));
         Self {
             candidates,
             columns,
+            chance,
         }
     }
 
@@ -270,29 +287,51 @@ impl Screen<'_> {
         term
     }
 
-    /// Effects with what they change, best first; those that make no sense left out.
-    fn rated(&self, terms: Vec<Term>) -> Vec<(Candidate, Vec<f64>)> {
-        let rated = terms.into_par_iter().filter_map(|term| {
+    /// Effects with what they change, best first; those that make no sense left out. What each
+    /// takes of noise alone is added to `by_chance`.
+    fn rated(
+        &self,
+        terms: Vec<Term>,
+        noise: Option<&Noise>,
+        by_chance: &mut Vec<(String, Vec<Taken>)>,
+    ) -> Vec<(Candidate, Vec<f64>)> {
+        let rated = terms.into_par_iter().map(|term| {
             let mut column = self.change(&term.added_to(self.model, &[]))?;
             let before = self.learned_square(&column);
             self.residualise(&mut column);
             let after = self.learned_square(&column);
             let shows = after > 1e-10 * before && after > 0.0;
             let (scale, learned, held_out) = self.regress(&[&column]).filter(|_| shows)?;
+            let makes_sense = |scale: f64| Self::is_feasible(&term, scale);
+            let taken = noise.map(|noise| noise.taken(self, &column, makes_sense));
+            let feasible = makes_sense(scale[0]);
             let candidate = Candidate {
                 learned: 1.0 - learned,
                 held_out: 1.0 - held_out,
                 columns: Vec::new(),
                 term,
             };
-            Self::is_feasible(&candidate.term, scale[0]).then_some((candidate, column))
+            Some((candidate, column, feasible, taken))
         });
-        let mut rated: Vec<_> = rated.collect();
+        let all: Vec<_> = rated.collect();
+        let mut rated = Vec::new();
+        for (candidate, column, feasible, taken) in all.into_iter().flatten() {
+            by_chance.extend(taken.map(|taken| (candidate.term.name(), taken)));
+            if feasible {
+                rated.push((candidate, column));
+            }
+        }
         rated.sort_by(|a, b| b.0.learned.total_cmp(&a.0.learned));
         rated
     }
 
-    fn effect_candidates(&self, known: &Known, columns: &mut Vec<Vec<f64>>) -> Vec<Candidate> {
+    fn effect_candidates(
+        &self,
+        known: &Known,
+        noise: Option<&Noise>,
+        columns: &mut Vec<Vec<f64>>,
+    ) -> (Vec<Candidate>, Chance) {
+        let mut by_chance = Vec::new();
         let specs = self.model.candidates();
         let specs = specs.filter(|spec| self.pointless(spec).is_none());
         let with_grading = |spec: &'static Spec, parameters: Vec<f64>, grading: Grading| {
@@ -311,7 +350,7 @@ impl Screen<'_> {
             })
             .map(|(spec, parameters)| with_grading(spec, parameters, self.model.grading))
             .collect();
-        let mut rated = self.rated(terms);
+        let mut rated = self.rated(terms, noise, &mut by_chance);
         // How the flow takes jets of part strength shows only once there are some.
         if self.judge.on_off && !has_jet_effect(self.model) {
             let mut met: Vec<&str> = Vec::new();
@@ -333,7 +372,7 @@ impl Screen<'_> {
                     .filter(|g| *g != self.model.grading);
                 others.extend(gradings.map(|g| with_grading(spec, parameters.clone(), g)));
             }
-            rated.extend(self.rated(others));
+            rated.extend(self.rated(others, noise, &mut by_chance));
             rated.sort_by(|a, b| b.0.learned.total_cmp(&a.0.learned));
         }
         let mut met = Vec::new();
@@ -347,7 +386,7 @@ impl Screen<'_> {
                 kept.push(candidate);
             }
         }
-        kept
+        (kept, Chance::of(by_chance))
     }
 }
 

@@ -3,14 +3,14 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use scenarios::campaign::{Case, Given, Group, Ledger, Row, Sizes, cases, run, table};
+use scenarios::campaign::{Case, Given, Group, Ledger, Row, Sizes, calibration, cases, run, table};
 
 /// The diagnosis on rigs that hide something.
 ///
 /// One line a rig is kept in a file: a campaign that was stopped goes on where it was, and pieces of it can
 /// run one after the other. Rows belong to the program that made them; take a new file for a new program.
 #[derive(Debug, Parser)]
-#[command(name = "hidden-effects")]
+#[command(name = "hidden-effects", args_override_self = true)]
 struct Arguments {
     #[command(flatten)]
     ledger: Ledger,
@@ -32,10 +32,16 @@ struct Arguments {
     /// Rigs that are written down in five units each.
     #[arg(long, default_value_t = 2)]
     units: u64,
+    /// Rigs for each effect of the size at which the diagnosis says that it would be seen.
+    #[arg(long, default_value_t = 0)]
+    power: u64,
+    /// Prints what the rows say of error rates, coverage and power in place of the tables of what was found.
+    #[arg(long)]
+    calibration: bool,
     /// Model that is handed in: default (what `identify` makes), lean, truth, guess, bad-delays.
     #[arg(long, default_value = "default", value_parser = given)]
     given: Given,
-    /// Only this group: single, altered, nothing, pair, outside, units.
+    /// Only this group: single, altered, nothing, pair, outside, units, power.
     #[arg(long, value_parser = group)]
     group: Option<Group>,
 }
@@ -47,8 +53,9 @@ fn given(word: &str) -> Result<Given, String> {
 
 fn group(word: &str) -> Result<Group, String> {
     let found = Group::ALL.into_iter().find(|group| group.word() == word);
-    found
-        .ok_or_else(|| "one of single, altered, nothing, pair, outside, units is needed".to_owned())
+    found.ok_or_else(|| {
+        "one of single, altered, nothing, pair, outside, units, power is needed".to_owned()
+    })
 }
 
 fn main() -> ExitCode {
@@ -69,14 +76,17 @@ fn campaign(arguments: &Arguments) -> anyhow::Result<()> {
         pairs: arguments.pairs,
         outside: arguments.outside,
         units: arguments.units,
+        power: arguments.power,
     };
     let wanted: Vec<Case> = cases(&sizes, arguments.given, arguments.ledger.seed)
         .into_iter()
         .filter(|case| arguments.group.is_none_or(|group| case.group == group))
         .collect();
-    (arguments.ledger).keep("hidden-effects", wanted, run, tell, |rows: &[Row]| {
-        table(rows)
-    })
+    let told = |rows: &[Row]| match arguments.calibration {
+        true => calibration(arguments.ledger.seed, rows),
+        false => table(rows),
+    };
+    (arguments.ledger).keep("hidden-effects", wanted, run, tell, told)
 }
 
 /// A line for whoever watches.

@@ -28,17 +28,20 @@ pub enum Group {
     Units,
     /// Physics beyond the catalogue, which a search for unknown terms should find.
     Beyond,
+    /// One effect of the size at which the diagnosis of the rig without it says that it would be seen.
+    Power,
 }
 
 impl Group {
     /// The groups of the diagnosis, in the order of tables.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Single,
         Self::Altered,
         Self::Nothing,
         Self::Pair,
         Self::Outside,
         Self::Units,
+        Self::Power,
     ];
 
     /// The word in keys and on command lines.
@@ -52,6 +55,7 @@ impl Group {
             Self::Outside => "outside",
             Self::Units => "units",
             Self::Beyond => "beyond",
+            Self::Power => "power",
         }
     }
 }
@@ -138,7 +142,13 @@ impl Case {
     /// # Errors
     /// [`RigError`] for effects that cannot be in one rig.
     pub fn plan(&self) -> Result<RigPlan, RigError> {
-        let hidden: Vec<&str> = self.hidden.iter().map(String::as_str).collect();
+        // How much there is of an effect of just the size that is seen, its rig without it has to tell first.
+        let drawn = if self.group == Group::Power {
+            &[]
+        } else {
+            self.hidden.as_slice()
+        };
+        let hidden: Vec<&str> = drawn.iter().map(String::as_str).collect();
         let plan = RigPlan::draw(self.family, &hidden, self.noise, &self.nuisances, self.seed)?;
         Ok(plan.in_units(self.units))
     }
@@ -191,6 +201,8 @@ pub struct Sizes {
     pub outside: u64,
     /// Rigs that are written down in five units each.
     pub units: u64,
+    /// Rigs for each effect of the size at which it is said to be seen; the families take turns.
+    pub power: u64,
 }
 
 /// The units of twins: seconds and y times these.
@@ -209,14 +221,14 @@ const GROUP_SEEDS: u64 = 100_000;
 /// Hands every rig of a campaign a seed of its own.
 pub(super) struct Seeds {
     campaign: u64,
-    used: [u64; 7],
+    used: [u64; 8],
 }
 
 impl Seeds {
     pub(super) fn of(campaign: u64) -> Self {
         Self {
             campaign,
-            used: [0; 7],
+            used: [0; 8],
         }
     }
 
@@ -302,6 +314,16 @@ pub fn cases(sizes: &Sizes, given: Given, seed: u64) -> Vec<Case> {
             });
         }
     }
+    for round in 0..sizes.power {
+        let named = Effect::NAMES.iter().filter(|name| has_amplitude(name));
+        for (index, name) in named.enumerate() {
+            let seed = next(Group::Power);
+            all.push(Case {
+                given,
+                ..Case::new(Group::Power, turn(round, index), &[name], seed)
+            });
+        }
+    }
     for number in 0..sizes.nulls {
         all.push(Case {
             given,
@@ -332,6 +354,13 @@ fn shows(name: &str, family: Family) -> bool {
     on_off(name) || family == Family::FirstOrder
 }
 
+/// Whether the diagnosis can say on plain records how much of it would be seen.
+fn has_amplitude(name: &str) -> bool {
+    let card = model_core::effects::spec(name);
+    let said = card.is_some_and(|card| card.amplitude.is_some() && card.channel.is_none());
+    said && on_off(name)
+}
+
 /// Whether off and on are enough for it to show.
 fn on_off(name: &str) -> bool {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
@@ -356,6 +385,7 @@ mod tests {
             pairs: 6,
             outside: 1,
             units: 3,
+            power: 0,
         };
         let all = cases(&sizes, Given::Default, 5000);
         assert_eq!(all.len(), 21 + 5 * 19 + 12 + 60 + 6 + 3 + 15);

@@ -5,6 +5,7 @@
 //! effects) or `host-fit discover --json` (hidden terms) with the model that it writes: what a user would do,
 //! with what a user would get. One line of JSON a case is kept in a file.
 
+mod calibration;
 mod case;
 mod counts;
 mod ledger;
@@ -14,9 +15,10 @@ mod run;
 mod table;
 pub mod terms;
 
+pub use calibration::calibration;
 pub use case::{Case, Given, Group, Sizes, cases};
 pub use ledger::{Entry, Ledger};
 pub use program::{Program, Spent};
-pub use row::{Found, Row};
+pub use row::{Found, PutIn, Row};
 pub use run::run;
 pub use table::table;

@@ -15,6 +15,12 @@ pub struct Found {
     pub truth: f64,
     /// As the written model has it.
     pub found: f64,
+    /// Its symbol of unit.
+    #[serde(default)]
+    pub unit: String,
+    /// The stated 95 % interval; none where the diagnosis states none.
+    #[serde(default)]
+    pub interval: Option<[f64; 2]>,
 }
 
 impl Found {
@@ -23,6 +29,32 @@ impl Found {
     pub fn is_near(&self) -> bool {
         (self.found - self.truth).abs() <= NEAR * self.truth.abs()
     }
+
+    /// Whether the stated interval holds the truth; none where none is stated.
+    #[must_use]
+    pub fn is_covered(&self) -> Option<bool> {
+        let [low, high] = self.interval?;
+        Some((low..=high).contains(&self.truth))
+    }
+
+    /// Its kind: times, levels of y, or anything else.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self.unit.as_str() {
+            "s" | "Hz" | "rad/s" | "samples" => "times and frequencies",
+            "y" => "levels of y",
+            _ => "other",
+        }
+    }
+}
+
+/// An effect of the size at which it is said to be seen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PutIn {
+    /// Its name.
+    pub effect: String,
+    /// Its amplitude; none where the diagnosis says that any size could stay unseen.
+    pub amplitude: Option<f64>,
 }
 
 /// What came of a case.
@@ -63,6 +95,13 @@ pub struct Row {
     pub given_over_floor: Option<f64>,
     /// Held-out error of the last model, over the noise floor.
     pub over_floor: Option<f64>,
+    /// p-value of the whole search, for the effect that stands out most; none where none was tried.
+    #[serde(default)]
+    pub p_value: Option<f64>,
+    /// The effect and the size of its amplitude that were put in because the diagnosis of the same rig without
+    /// them said that they would be seen.
+    #[serde(default)]
+    pub put_in: Option<PutIn>,
     /// Parameters of the effects that were hidden and found.
     pub parameters: Vec<Found>,
     /// How long the identification took.
@@ -116,7 +155,7 @@ impl Row {
         }
         let named = self.named();
         match self.group {
-            Group::Single | Group::Altered | Group::Units => {
+            Group::Single | Group::Altered | Group::Units | Group::Power => {
                 named.first().copied() == self.hidden.first().map(String::as_str)
             }
             Group::Pair => self
@@ -126,6 +165,20 @@ impl Row {
             Group::Nothing => named.is_empty(),
             Group::Outside | Group::Beyond => named.is_empty() && self.verdict != "nothing-missing",
         }
+    }
+
+    /// Needless names with which nothing else is stated.
+    #[must_use]
+    pub fn wrong_alone(&self) -> Vec<&str> {
+        let mut names = self.needless();
+        names.retain(|name| {
+            let own = self
+                .sets
+                .iter()
+                .find(|set| set.first().is_some_and(|first| first == name));
+            own.is_none_or(|set| set.len() == 1)
+        });
+        names
     }
 
     /// Found, with nothing needless beside it.
@@ -193,6 +246,8 @@ mod tests {
             stand_ins: Vec::new(),
             given_over_floor: Some(3.0),
             over_floor: Some(1.05),
+            p_value: None,
+            put_in: None,
             parameters: Vec::new(),
             identify: Spent::default(),
             diagnose: Spent {
@@ -258,7 +313,15 @@ mod tests {
         for (found, hit) in [(-0.0119, true), (-0.0121, false), (f64::NAN, false)] {
             let name = "valve-lag.opening_time".to_owned();
             let truth = -0.01;
-            one.parameters = vec![Found { name, truth, found }];
+            let unit = "s".to_owned();
+            one.parameters = vec![Found {
+                name,
+                truth,
+                found,
+                unit,
+                interval: Some([-0.0125, -0.01]),
+            }];
+            assert_eq!(one.parameters[0].is_covered(), Some(true));
             assert_eq!(one.parameters_hit(), Some(hit));
         }
     }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use firmware_sim::family::RigPlan;
-use firmware_sim::plant::{Character, FlowDelay};
+use firmware_sim::plant::{Character, Effect, FlowDelay};
 use host_fit::model::{Delay, Model, Start, Training};
 use model_core::effect::Unit;
 use model_core::effects::StateDependentDelay;
@@ -13,9 +13,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 
-use super::case::{Case, Given};
+use super::case::{Case, Given, Group};
 use super::program::{Program, Spent};
-use super::row::{Found, Row};
+use super::row::{Found, PutIn, Row};
 
 /// Runs a case. What goes wrong is a row too.
 #[must_use]
@@ -38,6 +38,8 @@ pub fn run(case: &Case, program: &Program) -> Row {
         stand_ins: Vec::new(),
         given_over_floor: None,
         over_floor: None,
+        p_value: None,
+        put_in: None,
         parameters: Vec::new(),
         identify: Spent::default(),
         diagnose: Spent::default(),
@@ -61,7 +63,18 @@ pub fn run(case: &Case, program: &Program) -> Row {
 }
 
 fn fill(row: &mut Row, case: &Case, program: &Program, folder: &Path) -> Result<(), String> {
-    let plan = case.plan().map_err(|e| e.to_string())?;
+    let mut plan = case.plan().map_err(|e| e.to_string())?;
+    if case.group == Group::Power {
+        let own = folder.join("without");
+        let (put_in, effect) = just_seen(case, &plan, program, &own)?;
+        row.put_in = Some(put_in);
+        row.hidden = case.hidden.clone();
+        let Some(effect) = effect else {
+            row.verdict = "unseen".to_owned();
+            return Ok(());
+        };
+        plan.plant.effects = vec![effect];
+    }
     let owned = |names: Vec<&str>| names.into_iter().map(str::to_owned).collect();
     row.hidden = owned(plan.hidden());
     row.also_right = owned(plan.also_right());
@@ -69,31 +82,9 @@ fn fill(row: &mut Row, case: &Case, program: &Program, folder: &Path) -> Result<
         plan.plant.character,
         Character::Inertia { .. } | Character::SecondLag { .. }
     );
-    let inside = |name: &str| folder.join(name).to_string_lossy().into_owned();
-    let (data, given, found) = (inside("set"), inside("given.toml"), inside("found.toml"));
-    // Of an earlier run.
-    let _ = fs::remove_dir_all(folder.join("set"));
-    let _ = fs::remove_file(&found);
-    fs::create_dir_all(folder).map_err(|e| e.to_string())?;
-    let set = plan.build().map_err(|e| e.to_string())?.data;
-    set.save(Path::new(&data)).map_err(|e| e.to_string())?;
-    fs::write(inside("answer.toml"), plan.answer()).map_err(|e| e.to_string())?;
-
-    if let Some(model) = guess(case, &plan) {
-        model.save(Path::new(&given)).map_err(|e| e.to_string())?;
-    } else {
-        let structure = structure(case.given, &plan);
-        let mut arguments = vec!["identify", &data, "-o", &given];
-        arguments.extend(structure.iter().map(String::as_str));
-        row.identify = program.json(&arguments, folder)?.1;
-    }
-    let arguments = ["diagnose", &given, &data, "-o", &found];
     let document;
-    (document, row.diagnose) = program.json(&arguments, folder)?;
-
-    row.verdict = (document["verdict"].as_str())
-        .ok_or("no verdict in the document of diagnose")?
-        .to_owned();
+    (document, row.identify, row.diagnose) = asked(case, &plan, program, folder)?;
+    row.verdict = verdict(&document)?;
     row.missing = names(&document["missing"]);
     row.stand_ins = names(&document["stand_ins"]);
     let sets = document["sets"].as_array();
@@ -105,11 +96,95 @@ fn fill(row: &mut Row, case: &Case, program: &Program, folder: &Path) -> Result<
     let ladder = document["ladder"].as_array();
     row.given_over_floor = over(ladder.and_then(|rungs| rungs.first()));
     row.over_floor = over(ladder.and_then(|rungs| rungs.last()));
-    if Path::new(&found).is_file() {
-        let model = Model::load(Path::new(&found)).map_err(|e| e.to_string())?;
-        row.parameters = compare(&plan, &model);
+    let ranking = document["ranking"].as_array();
+    let p_values = ranking
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| entry["p_value"].as_f64());
+    row.p_value = p_values.reduce(f64::min);
+    let found = folder.join(FOUND);
+    if found.is_file() {
+        let model = Model::load(&found).map_err(|e| e.to_string())?;
+        row.parameters = compare(&plan, &model, &document);
     }
     Ok(())
+}
+
+/// The model that a diagnosis writes.
+const FOUND: &str = "found.toml";
+
+/// What `diagnose` says of a rig, after `identify` where the case has no model to hand in; and how long both took.
+fn asked(
+    case: &Case,
+    plan: &RigPlan,
+    program: &Program,
+    folder: &Path,
+) -> Result<(Value, Spent, Spent), String> {
+    let inside = |name: &str| folder.join(name).to_string_lossy().into_owned();
+    let (data, given, found) = (inside("set"), inside("given.toml"), inside(FOUND));
+    // Of an earlier run.
+    let _ = fs::remove_dir_all(folder.join("set"));
+    let _ = fs::remove_file(&found);
+    fs::create_dir_all(folder).map_err(|e| e.to_string())?;
+    let set = plan.build().map_err(|e| e.to_string())?.data;
+    set.save(Path::new(&data)).map_err(|e| e.to_string())?;
+    fs::write(inside("answer.toml"), plan.answer()).map_err(|e| e.to_string())?;
+
+    let mut identify = Spent::default();
+    if let Some(model) = guess(case, plan) {
+        model.save(Path::new(&given)).map_err(|e| e.to_string())?;
+    } else {
+        let structure = structure(case.given, plan);
+        let mut arguments = vec!["identify", &data, "-o", &given];
+        arguments.extend(structure.iter().map(String::as_str));
+        identify = program.json(&arguments, folder)?.1;
+    }
+    let arguments = ["diagnose", &given, &data, "-o", &found];
+    let (document, diagnose) = program.json(&arguments, folder)?;
+    Ok((document, identify, diagnose))
+}
+
+fn verdict(document: &Value) -> Result<String, String> {
+    let word = document["verdict"].as_str();
+    Ok(word
+        .ok_or("no verdict in the document of diagnose")?
+        .to_owned())
+}
+
+/// The effect of a case as large as the diagnosis of the rig without it says that it would be seen; none where it
+/// says that any size could stay unseen.
+fn just_seen(
+    case: &Case,
+    plan: &RigPlan,
+    program: &Program,
+    folder: &Path,
+) -> Result<(PutIn, Option<Effect>), String> {
+    let name = case.hidden.first().ok_or("no effect to put in")?;
+    let (document, ..) = asked(case, plan, program, folder)?;
+    if verdict(&document)? != "nothing-missing" {
+        return Err("something is said to be missing on the rig without it".to_owned());
+    }
+    let said = document["detectable"].as_array().into_iter().flatten();
+    let own = said.clone().find(|entry| entry["effect"] == name.as_str());
+    let own = own.ok_or("nothing is said of how much of it would be seen")?;
+    let amplitude = own["amplitude"].as_f64();
+    let put_in = PutIn {
+        effect: name.clone(),
+        amplitude,
+    };
+    if amplitude.is_none() {
+        return Ok((put_in, None));
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(case.seed);
+    let mut effect = Effect::draw(name, &plan.plant.base, &mut rng).map_err(|e| e.to_string())?;
+    let values = own["parameters"].as_array().into_iter().flatten();
+    for (parameter, value) in effect.parameters().iter().zip(values) {
+        let value = value.as_f64().ok_or("a parameter is no number")?;
+        effect = effect
+            .with(parameter.name, value)
+            .map_err(|e| e.to_string())?;
+    }
+    Ok((put_in, Some(effect)))
 }
 
 fn names(list: &Value) -> Vec<String> {
@@ -119,7 +194,8 @@ fn names(list: &Value) -> Vec<String> {
 }
 
 /// Parameters of the hidden effects that the model has too.
-fn compare(plan: &RigPlan, model: &Model) -> Vec<Found> {
+fn compare(plan: &RigPlan, model: &Model, document: &Value) -> Vec<Found> {
+    let ranking = document["ranking"].as_array();
     let mut found = Vec::new();
     for (effect, parameters) in plan.exact() {
         let added = model.effects.iter().find(|added| added.name == effect);
@@ -129,11 +205,16 @@ fn compare(plan: &RigPlan, model: &Model) -> Vec<Found> {
             _ => continue,
         };
         for (parameter, value) in parameters.iter().zip(values) {
+            let mut entries = ranking.into_iter().flatten();
+            let stated = entries.find(|entry| entry["effect"] == effect);
+            let bound = |end: &str| stated?["parameters"][parameter.name][end].as_f64();
             let scale = Unit::of(parameter.unit).scale(plan.units.y, plan.units.time, 1.0);
             found.push(Found {
                 name: format!("{effect}.{}", parameter.name),
                 truth: scale * parameter.value,
                 found: *value,
+                unit: parameter.unit.to_owned(),
+                interval: bound("low").zip(bound("high")).map(<[f64; 2]>::from),
             });
         }
     }

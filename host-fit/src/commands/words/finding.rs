@@ -97,15 +97,8 @@ pub(in super::super) fn ranking_rows(ranked: &[Ranked]) -> Vec<Vec<String>> {
             r.effect.clone(),
             if r.significant { "yes" } else { "no" }.to_owned(),
             format!("{:.1} %", r.error_reduction_percent),
-            r.best_decoy_percent
-                .map_or_else(|| "–".to_owned(), |percent| format!("{percent:.1} %")),
-            if !r.refitted {
-                "–".to_owned()
-            } else if r.p_value < 0.001 {
-                "< 0.001".to_owned()
-            } else {
-                format!("{:.3}", r.p_value)
-            },
+            format!("{:.1} %", r.best_decoy_percent),
+            format!("{:.3}", r.p_value),
             said,
         ]
     };

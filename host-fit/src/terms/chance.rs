@@ -1,0 +1,194 @@
+//! What noise alone would make of the best of all candidates.
+//!
+//! The wild cluster bootstrap of the largest gain: blocks of the final model's error, longer than its
+//! correlation, get signs by lot, which leaves their spectrum and their size where they are and takes away
+//! whatever a candidate could explain. The candidates are screened on each such error as they were on the
+//! measured one: coefficients from what is learned from, gains on what is held out. (White 2000, A reality
+//! check for data snooping; Cameron, Gelbach & Miller 2008, Bootstrap-based improvements for inference with
+//! clustered errors.)
+
+use super::RULES;
+use super::screen::Screen;
+use crate::linalg::dot;
+use crate::model::Model;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::ops::Range;
+
+/// Errors that are noise alone, as many as are drawn, in the numbers of a screen.
+pub(crate) struct Noise {
+    error: Vec<f64>,
+    /// Parts of the joined series that get one sign each; none lies in two records.
+    blocks: Vec<Range<usize>>,
+    /// A sign for each block, per draw.
+    signs: Vec<Vec<f64>>,
+    /// How far each draw lies along the directions that the model's own parameters follow.
+    along: Vec<Vec<f64>>,
+    /// Its energy where it is held out, after the model was refitted to it.
+    held_out: Vec<f64>,
+}
+
+/// What a candidate takes of the energy of one draw.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Taken {
+    /// Where it is learned from.
+    learned: f64,
+    /// On what is held out.
+    held_out: f64,
+}
+
+impl Noise {
+    /// The error of `last`, which explains all that can be explained, under drawn signs; `block`
+    /// samples count as independent of the next. `None` if its free run diverges.
+    pub(crate) fn new(screen: &Screen, last: &Model, block: usize, seed: u64) -> Option<Self> {
+        let error = screen.error_of(last)?;
+        let blocks = screen.blocks(block);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let signs: Vec<Vec<f64>> = (0..RULES.draws)
+            .map(|_| {
+                let sign = |_| if rng.random_bool(0.5) { 1.0 } else { -1.0 };
+                blocks.iter().map(sign).collect()
+            })
+            .collect();
+        let mut noise = Self {
+            error,
+            blocks,
+            signs,
+            along: Vec::new(),
+            held_out: Vec::new(),
+        };
+        let learned = screen.learned;
+        let sums: Vec<Vec<f64>> = screen.basis.iter().map(|q| noise.sums(q)).collect();
+        let products: Vec<f64> = screen
+            .basis
+            .iter()
+            .flat_map(|p| {
+                screen
+                    .basis
+                    .iter()
+                    .map(|q| dot(&p[learned..], &q[learned..]))
+            })
+            .collect();
+        let energy = dot(&noise.error[learned..], &noise.error[learned..]);
+        let n = sums.len();
+        for signs in &noise.signs {
+            let (along, beside): (Vec<f64>, Vec<f64>) = sums
+                .iter()
+                .map(|sums| noise.halves(sums, signs, learned))
+                .unzip();
+            let mut left = energy - 2.0 * dot(&along, &beside);
+            for i in 0..n {
+                left += along[i] * dot(&along, &products[i * n..(i + 1) * n]);
+            }
+            noise.along.push(along);
+            noise.held_out.push(left);
+        }
+        Some(noise)
+    }
+
+    /// Column times error, block by block.
+    fn sums(&self, column: &[f64]) -> Vec<f64> {
+        let of = |block: &Range<usize>| dot(&column[block.clone()], &self.error[block.clone()]);
+        self.blocks.iter().map(of).collect()
+    }
+
+    /// The same summed under `signs`: where it is learned from, and where it is held out.
+    fn halves(&self, sums: &[f64], signs: &[f64], learned: usize) -> (f64, f64) {
+        let first = self.blocks.partition_point(|block| block.start < learned);
+        let (sums, others) = sums.split_at(first);
+        let (signs, other_signs) = signs.split_at(first);
+        (dot(sums, signs), dot(others, other_signs))
+    }
+
+    /// What a residualised column takes of each draw; nothing where its size makes no sense.
+    pub(super) fn taken(
+        &self,
+        screen: &Screen,
+        column: &[f64],
+        makes_sense: impl Fn(f64) -> bool,
+    ) -> Vec<Taken> {
+        let learned = screen.learned;
+        let sums = self.sums(column);
+        let (own, other) = column.split_at(learned);
+        let (own, other_square) = (dot(own, own).max(f64::MIN_POSITIVE), dot(other, other));
+        let beside: Vec<f64> = screen
+            .basis
+            .iter()
+            .map(|q| dot(&q[learned..], other))
+            .collect();
+        let draws = self.signs.iter().zip(&self.along).zip(&self.held_out);
+        let taken = draws.map(|((signs, along), energy)| {
+            let (with_learned, with_held_out) = self.halves(&sums, signs, learned);
+            let scale = with_learned / own;
+            if !makes_sense(scale) {
+                return Taken {
+                    learned: 0.0,
+                    held_out: 0.0,
+                };
+            }
+            let with_held_out = with_held_out - dot(along, &beside);
+            let gain = scale * (2.0 * with_held_out - scale * other_square);
+            Taken {
+                learned: scale * with_learned,
+                held_out: gain / energy.max(f64::MIN_POSITIVE),
+            }
+        });
+        taken.collect()
+    }
+}
+
+/// What noise alone would make of the best of all candidates.
+#[derive(Clone, Debug, Default)]
+pub struct Chance {
+    /// Share of the held-out energy that the best takes, one a draw, rising.
+    best: Vec<f64>,
+    /// Candidates that were looked at, points of grids and all.
+    pub alternatives: usize,
+}
+
+impl Chance {
+    /// Of candidates of one kind, those that take most where they are learned are kept, as in a
+    /// table, and of all kept ones the best counts.
+    pub(super) fn of(candidates: Vec<(String, Vec<Taken>)>) -> Self {
+        let mut kinds: Vec<(&str, Vec<&[Taken]>)> = Vec::new();
+        for (kind, taken) in &candidates {
+            match kinds.iter_mut().find(|(met, _)| met == kind) {
+                Some((_, all)) => all.push(taken),
+                None => kinds.push((kind, vec![taken])),
+            }
+        }
+        let best_of = |draw: usize| {
+            let of_kind = |all: &Vec<&[Taken]>| {
+                let mut all: Vec<Taken> = all.iter().map(|taken| taken[draw]).collect();
+                all.sort_by(|a, b| b.learned.total_cmp(&a.learned));
+                let kept = all.iter().take(RULES.kept_points);
+                kept.map(|taken| taken.held_out).fold(0.0, f64::max)
+            };
+            kinds
+                .iter()
+                .map(|(_, all)| of_kind(all))
+                .fold(0.0, f64::max)
+        };
+        let draws = candidates.first().map_or(0, |(_, taken)| taken.len());
+        let mut best: Vec<f64> = (0..draws).map(best_of).collect();
+        best.sort_by(f64::total_cmp);
+        Self {
+            best,
+            alternatives: candidates.len(),
+        }
+    }
+
+    /// How often noise alone lets some candidate take this share of the held-out energy, or more.
+    #[must_use]
+    pub fn p_value(&self, share: f64) -> f64 {
+        let below = self.best.partition_point(|best| *best < share);
+        (self.best.len() - below + 1) as f64 / (self.best.len() + 1) as f64
+    }
+
+    /// The share that the best takes of noise alone in all but one of twenty cases; 0 of nothing.
+    #[must_use]
+    pub fn usual(&self) -> f64 {
+        let at = (0.95 * self.best.len() as f64) as usize;
+        self.best.get(at).copied().unwrap_or(0.0)
+    }
+}

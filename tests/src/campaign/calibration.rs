@@ -1,0 +1,133 @@
+//! What a name is worth: error rates, coverage and power of the diagnosis, as a page for the docs.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use super::case::Group;
+use super::counts::bounded;
+use super::row::{Found, Row};
+
+/// The page, from the rows of the campaign with this seed.
+#[must_use]
+pub fn calibration(seed: u64, rows: &[Row]) -> String {
+    let mut text = format!(
+        "# Calibration: what a name is worth\n\n\
+         Written by `cargo xtask calibrate` from {} rigs of seed {seed} ([rigs.md](rigs.md)), each of them identified \
+         and diagnosed as a user would; bounds are Wilson's, with 95 % confidence. What each line means, and what is \
+         done about it: [hidden-effects.md](hidden-effects.md).\n\n| | reached | goal |\n|---|---|---|\n",
+        rows.len()
+    );
+    let of = |group: Group| -> Vec<&Row> {
+        let done = rows.iter().filter(|row| row.failure.is_none());
+        done.filter(|row| row.group == group).collect()
+    };
+    let (nothing, exact, altered) = (of(Group::Nothing), of(Group::Single), of(Group::Altered));
+    let mut line = |what: &str, reached: Option<String>, goal: &str| {
+        let reached = reached.unwrap_or_else(|| "not measured".to_owned());
+        let _ = writeln!(text, "| {what} | {reached} | {goal} |");
+    };
+    line(
+        "named although nothing is missing",
+        share(&nothing, |row| !row.named().is_empty()),
+        "≤ 3 % of ≥ 300",
+    );
+    for (what, rows, inside, wrong) in [
+        ("exact laws", &exact, "≥ 97 %", "≤ 1 %"),
+        ("altered laws", &altered, "≥ 95 %", "≤ 5 %"),
+    ] {
+        let named: Vec<&Row> = (rows.iter().copied())
+            .filter(|row| !row.missing.is_empty())
+            .collect();
+        line(
+            &format!("the truth in one of the stated sets, where something is named, {what}"),
+            share(&named, Row::is_in_set),
+            inside,
+        );
+        let sizes = named.iter().flat_map(|row| &row.sets).map(Vec::len);
+        line(
+            &format!("median size of the sets, {what}"),
+            median(sizes.collect()).map(|size| size.to_string()),
+            if what == "exact laws" { "1" } else { "≤ 2" },
+        );
+        line(
+            &format!("a wrong name alone in its set, {what}"),
+            share(rows, |row| !row.wrong_alone().is_empty()),
+            wrong,
+        );
+    }
+    let with_effect: Vec<&Row> = exact.iter().chain(&altered).copied().collect();
+    line(
+        "extra names",
+        share(&with_effect, |row| !row.needless().is_empty()),
+        "≤ 5 % of runs",
+    );
+    let put_in = of(Group::Power);
+    let seen: Vec<&Row> = (put_in.iter().copied())
+        .filter(|row| {
+            row.put_in
+                .as_ref()
+                .is_some_and(|put_in| put_in.amplitude.is_some())
+        })
+        .collect();
+    line(
+        "put in as large as is said to be seen with 80 % power: named",
+        share(&seen, Row::is_found),
+        "70–90 %",
+    );
+    line(
+        "p ≤ 0.05 of the whole search where nothing is missing",
+        share(&nothing, |row| row.p_value.is_some_and(|p| p <= 0.05)),
+        "3–7 %",
+    );
+    let mut kinds: BTreeMap<&str, Vec<&Found>> = BTreeMap::new();
+    let stated = exact.iter().flat_map(|row| &row.parameters);
+    for found in stated.filter(|found| found.interval.is_some()) {
+        kinds.entry(found.kind()).or_default().push(found);
+    }
+    for (kind, all) in &kinds {
+        let covered = all.iter().filter(|found| found.is_covered() == Some(true));
+        line(
+            &format!("95 % intervals that hold the truth, {kind}"),
+            Some(bounded(covered.count(), all.len())),
+            "92–97 %",
+        );
+    }
+    text += "\n## Put in as large as is said to be seen\n\n| effect | named | said instead |\n|---|---|---|\n";
+    let mut effects: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
+    for row in &seen {
+        effects.entry(&row.label).or_default().push(row);
+    }
+    for (effect, rows) in &effects {
+        let named = rows.iter().filter(|row| row.is_found()).count();
+        let others = rows
+            .iter()
+            .filter(|row| !row.is_found())
+            .map(|row| row.said());
+        let others: Vec<String> = others.collect();
+        let _ = writeln!(
+            text,
+            "| {effect} | {named} of {} | {} |",
+            rows.len(),
+            others.join("; ")
+        );
+    }
+    let failed = rows.iter().filter(|row| row.failure.is_some());
+    let failed: Vec<&Row> = failed.collect();
+    if !failed.is_empty() {
+        text += "\n## Without an answer\n\n";
+        for row in failed {
+            let _ = writeln!(text, "- `{}`: {}", row.key, row.said());
+        }
+    }
+    text
+}
+
+fn share(rows: &[&Row], test: impl Fn(&Row) -> bool) -> Option<String> {
+    let hits = rows.iter().filter(|row| test(row)).count();
+    (!rows.is_empty()).then(|| bounded(hits, rows.len()))
+}
+
+fn median(mut sizes: Vec<usize>) -> Option<usize> {
+    sizes.sort_unstable();
+    sizes.get(sizes.len() / 2).copied()
+}

@@ -1,6 +1,7 @@
 //! Fitted parameters as they are reported.
 
 use crate::fit::Fit;
+use crate::model::Model;
 use crate::terms::Units;
 use model_core::effect::Spec;
 use serde::Serialize;
@@ -25,6 +26,17 @@ pub(crate) fn estimates(
     spec: &Spec,
     units: &Units,
 ) -> BTreeMap<String, ParameterEstimate> {
+    estimates_among(fit, &[], spec, units)
+}
+
+/// The same with the choice of lags and of jet response in the intervals: by how much the
+/// parameters differ in `alike`, models that do as well with the same effects, adds to the variance.
+pub(crate) fn estimates_among(
+    fit: &Fit,
+    alike: &[&Model],
+    spec: &Spec,
+    units: &Units,
+) -> BTreeMap<String, ParameterEstimate> {
     let values = fit.model.values();
     let coordinates = fit.model.coordinates();
     let own = coordinates
@@ -37,7 +49,17 @@ pub(crate) fn estimates(
         });
     own.map(|(index, parameter)| {
         let value = values[index];
-        let half = 1.96 * fit.standard_error(index).unwrap_or(f64::INFINITY);
+        let own = fit.standard_error(index).unwrap_or(f64::INFINITY);
+        let of = |model: &&Model| {
+            let others = model.coordinates();
+            let at = others
+                .iter()
+                .position(|other| other.name == coordinates[index].name)?;
+            Some((model.values()[at] - value).powi(2))
+        };
+        let apart: Vec<f64> = alike.iter().filter_map(of).collect();
+        let between = apart.iter().sum::<f64>() / (apart.len() + 1) as f64;
+        let half = 1.96 * (own * own + between).sqrt();
         let (low, high) = if parameter.is_logarithmic() {
             let factor = (half / value).exp();
             (value / factor, value * factor)

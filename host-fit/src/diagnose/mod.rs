@@ -8,6 +8,7 @@ mod alternatives;
 mod estimate;
 mod memory;
 mod outcome;
+mod quoted;
 mod ranking;
 mod rules;
 mod session;
@@ -19,6 +20,7 @@ pub use estimate::ParameterEstimate;
 pub(crate) use estimate::estimates;
 pub use memory::Memory;
 pub use outcome::{Diagnosis, NotTried, Ranked, Rung, Verdict};
+pub use quoted::Quoted;
 pub use ranking::{FLOW_LAG, FLOW_MEMORY};
 pub use rules::{RULES, Rules};
 
@@ -71,6 +73,23 @@ impl Default for Options {
 /// # Errors
 /// [`DiagnoseError`].
 pub fn diagnose(
+    given: &Model,
+    records: &[Record],
+    options: &Options,
+    interrupt: &AtomicBool,
+    progress: &(dyn Fn(&str) + Sync),
+) -> Result<Diagnosis, DiagnoseError> {
+    let (chosen_by, kept) = quoted::kept_back(records);
+    let diagnosis = chosen(given, &chosen_by, options, interrupt, progress)?;
+    let quoted = Quoted::of(given, &diagnosis.model, &kept);
+    Ok(Diagnosis {
+        quoted,
+        ..diagnosis
+    })
+}
+
+/// The diagnosis by `records`, all of them.
+fn chosen(
     given: &Model,
     records: &[Record],
     options: &Options,

@@ -1,6 +1,6 @@
 //! What a diagnosis hands over.
 
-use super::{Memory, ParameterEstimate, Separation};
+use super::{Memory, ParameterEstimate, Quoted, Separation};
 use crate::model::Model;
 use crate::residual::NoiseSource;
 use crate::terms::{HeldOut, HeldOutBy, Hypothesis, Judge, Units};
@@ -134,6 +134,9 @@ pub struct Diagnosis {
     pub noise_source: NoiseSource,
     /// The noise floor on what was judged, y rms: measured or estimated.
     pub noise_estimate: f64,
+    /// The last error on records that nothing was chosen by; none where there are too few to keep
+    /// some back.
+    pub quoted: Option<Quoted>,
     /// Held-out errors from the model as given to the last one.
     pub ladder: Vec<Rung>,
     /// All candidates for the final model without effects, best first.

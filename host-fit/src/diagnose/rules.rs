@@ -8,6 +8,8 @@ rules! {
 
     /// A misfit below this factor is within what `y_sd` itself is known to.
     floor_margin: f64 = 1.10, "times the noise floor", "a standard deviation from 20 repeats is known to 16 % a sample; nulls of six families stay below 1.03";
+    /// A given model within this factor of the noise floor is not searched further unless something promises a gain.
+    at_once: f64 = 1.03, "times the noise floor", "what `identify` leaves of nulls is 0.99 to 1.02; lags that imitate an effect leave 1.03 and more";
     /// Level of the tests.
     level: f64 = 0.05, "p-value", "convention";
     /// Alternatives that a search looks at: effects, points of their grids and responses to part jets. The p-value of a
@@ -36,6 +38,8 @@ rules! {
     promising: f64 = 0.02, "share of the rms error", "screening of nulls promises up to 0.008";
     /// Candidates that are refitted for the ranking beside the named ones.
     ranked_in_full: usize = 4, "", "judgement: further ones never matched the leader";
+    /// Of so many `validate` records every third is kept back, and the last error is quoted there as well.
+    enough_to_quote: usize = 4, "records", "judgement: fewer than three to choose by are too few";
     /// A lag below this is the order of the flow, not a memory.
     shortest_memory: usize = 20, "samples", "judgement: as long as a fast flow takes";
     /// A rate below this share of that of the way back is what lags leave that cancel: it is no rate.

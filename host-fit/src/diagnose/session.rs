@@ -1,9 +1,10 @@
 //! A diagnosis in the making: from what the search found to what is handed over.
 
+use super::estimate::estimates_among;
 use super::memory::memory;
 use super::outcome::Conclusion;
 use super::ranking::{not_tried, ranked, rivals_and_chance};
-use super::{DiagnoseError, Diagnosis, Options, RULES, Rung, Verdict, estimates};
+use super::{DiagnoseError, Diagnosis, Options, RULES, Rung, Verdict};
 use crate::model::Model;
 use crate::terms::{Found, HeldOut, Hypothesis, Judge, Judged, Search, Term, Units, p_value};
 use model_core::effect::Spec;
@@ -100,9 +101,13 @@ impl Session<'_> {
             .collect();
         let end = judge.final_fit(&last.judged);
         let model = units.model_out(&end.model);
+        let alike = found.as_good_as(&last);
         let parameters: BTreeMap<_, _> = order
             .iter()
-            .map(|spec| (spec.name.to_owned(), estimates(&end, spec, units)))
+            .map(|spec| {
+                let estimates = estimates_among(&end, &alike, spec, units);
+                (spec.name.to_owned(), estimates)
+            })
             .collect();
         let mut ranking = ranked(units, context.judged.rmse(), &others, &chance);
         for entry in &mut ranking {
@@ -147,6 +152,7 @@ impl Session<'_> {
             tried: found.tried,
             alternatives: chance.alternatives,
             held_out_by: judge.held_out_by,
+            quoted: None,
             restarted_s,
             noise_source: judge.noise_source,
             noise_estimate: judge.noise_rmse() * units.y,

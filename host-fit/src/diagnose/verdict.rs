@@ -23,9 +23,7 @@ impl Session<'_> {
     ) -> Option<Diagnosis> {
         let judge = self.judge();
         let over = judge.over_noise(as_given.rmse());
-        if over > RULES.floor_margin
-            || judge.p_above_noise(as_given, RULES.floor_margin) < RULES.level
-        {
+        if over > RULES.at_once || judge.p_above_noise(as_given, RULES.at_once) < RULES.level {
             return None;
         }
         let screen = Screen::new(judge, given_inside)?;
@@ -48,6 +46,7 @@ impl Session<'_> {
             tried: 0,
             alternatives: table.chance.alternatives,
             held_out_by: judge.held_out_by,
+            quoted: None,
             restarted_s: None,
             noise_source: judge.noise_source,
             noise_estimate: judge.noise_rmse() * self.units.y,

@@ -6,7 +6,8 @@ use super::onlooker::watched;
 use super::{Onlooker, StepError, check_period, trained_in_free_run, verdict};
 use crate::data::DataSet;
 use crate::diagnose::{
-    Diagnosis, HeldOutBy, Memory, NotTried, Options, Ranked, Rung, Verdict, diagnose as search,
+    Diagnosis, HeldOutBy, Memory, NotTried, Options, Quoted, Ranked, Rung, Verdict,
+    diagnose as search,
 };
 use crate::discover::{Glance, glance};
 use crate::indicators::{Scores, score, score_new};
@@ -59,6 +60,8 @@ impl Serialize for Finding {
             detectable: &'a [Detectable],
             beyond: Option<&'a Glance>,
             held_out_by: HeldOutBy,
+            quoted: Option<&'a Quoted>,
+            alternatives: usize,
             restarted_s: Option<f64>,
             noise_source: NoiseSource,
             noise_estimate: f64,
@@ -85,6 +88,8 @@ impl Serialize for Finding {
             detectable: &self.detectable,
             beyond: self.beyond.as_ref(),
             held_out_by: found.held_out_by,
+            quoted: found.quoted.as_ref(),
+            alternatives: found.alternatives,
             restarted_s: found.restarted_s,
             noise_source: found.noise_source,
             noise_estimate: found.noise_estimate,

@@ -1,15 +1,18 @@
 //! A diagnosis in plain language.
 
-use crate::diagnose::{Diagnosis, HeldOutBy, Rung, Verdict};
+use crate::diagnose::{Diagnosis, FLOW_LAG, FLOW_MEMORY, HeldOutBy, Rung, Verdict};
 use crate::discover::Glance;
 use crate::picture::significant;
 use crate::residual::NoiseSource;
+use crate::terms::RULES as TERMS;
+use model_core::effect::Place;
+use model_core::effects::spec;
 
 /// Headline and meaning of a diagnosis, in words.
 pub(super) fn words(diagnosis: &Diagnosis) -> (String, String) {
     let (headline, mut meaning) = finding(diagnosis);
     match diagnosis.held_out_by {
-        HeldOutBy::Records => {}
+        HeldOutBy::Records => meaning.push_str(&quoted(diagnosis)),
         HeldOutBy::Turns => meaning.push_str(
             " No record is marked `validate`: each in turn was judged by models that had not seen it.",
         ),
@@ -23,6 +26,7 @@ pub(super) fn words(diagnosis: &Diagnosis) -> (String, String) {
             significant(seconds, 3)
         ));
     }
+    meaning.push_str(bench_check(&diagnosis.sets));
     for memory in &diagnosis.memory {
         meaning.push_str(&format!(
             " The flow feels its own past of {} s, with {} without jets and {} under them.",
@@ -39,6 +43,55 @@ pub(super) fn words(diagnosis: &Diagnosis) -> (String, String) {
         ));
     }
     (headline, meaning)
+}
+
+/// On which records the last error stands.
+fn quoted(diagnosis: &Diagnosis) -> String {
+    match &diagnosis.quoted {
+        Some(quoted) => format!(
+            " On {}, by which nothing was chosen, it goes from {} to {}{}.",
+            quoted.records.join(" and "),
+            significant(quoted.before_rmse, 3),
+            significant(quoted.validate_rmse, 3),
+            quoted.noise_rmse.map_or(String::new(), |noise| format!(
+                ", {} times the noise there",
+                significant(quoted.validate_rmse / noise, 3)
+            ))
+        ),
+        None if diagnosis.tried > 0 => {
+            " The same records were chosen by: with four or more marked `validate`, some are kept back to quote on."
+                .to_owned()
+        }
+        None => String::new(),
+    }
+}
+
+/// What tells apart at the rig, without the flow, what records cannot: lags in series commute.
+fn bench_check(sets: &[Vec<String>]) -> &'static str {
+    let places = |set: &[String]| {
+        let of = |name: &String| match name.as_str() {
+            FLOW_LAG | FLOW_MEMORY => Some(Place::Flow),
+            name => Some(spec(name)?.place),
+        };
+        let mut places: Vec<Place> = Vec::new();
+        for place in set.iter().filter_map(of) {
+            if !places.contains(&place) {
+                places.push(place);
+            }
+        }
+        places
+    };
+    let sets: Vec<Vec<Place>> = sets.iter().map(|set| places(set)).collect();
+    let across = |place: Place| sets.iter().any(|set| set.len() > 1 && set.contains(&place));
+    match (across(Place::Jet), across(Place::Sensor)) {
+        (true, _) => {
+            " At the bench: play the same command with the tunnel off. What the valve and its supply do shows in the jets and stays; what the flow does goes."
+        }
+        (false, true) => {
+            " At the bench: give the sensor alone a step, of its heating current or behind a shutter. What the sensor does stays; what the flow does goes."
+        }
+        (false, false) => "",
+    }
 }
 
 /// What a term beyond the catalogue promises, and how to go on.
@@ -95,6 +148,21 @@ fn finding(diagnosis: &Diagnosis) -> (String, String) {
                 significant(first, 3),
                 significant(last, 3)
             );
+            let least = diagnosis
+                .ranking
+                .iter()
+                .map(|r| r.p_value)
+                .fold(1.0, f64::min);
+            meaning.push_str(&format!(
+                " Noise alone lets one of the {} alternatives do as much with p {} {}.",
+                diagnosis.alternatives,
+                if least > 1.0 / (TERMS.draws + 1) as f64 {
+                    "="
+                } else {
+                    "≤"
+                },
+                significant(least, 2)
+            ));
             let found = diagnosis
                 .ranking
                 .iter()

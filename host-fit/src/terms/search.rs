@@ -92,6 +92,22 @@ pub struct Found {
 }
 
 impl Found {
+    /// Other models that were fitted to the end, with the same effects as `last` and no worse than it
+    /// by anything that counts.
+    pub(crate) fn as_good_as(&self, last: &Hypothesis) -> Vec<&Model> {
+        let names = |hypothesis: &Hypothesis| {
+            let effects = hypothesis.terms.iter().filter_map(Term::effect);
+            let mut names: Vec<&str> = effects.map(|spec| spec.name).collect();
+            names.sort_unstable();
+            names
+        };
+        let own = names(last);
+        let near = (1.0 + RULES.price) * last.judged.rmse();
+        let all = self.all.iter();
+        let alike = all.filter(|other| other.judged.rmse() <= near && names(other) == own);
+        alike.map(|other| other.judged.model()).collect()
+    }
+
     /// Whether the given structure was a second place to set out from.
     #[must_use]
     pub fn set_out_twice(&self) -> bool {

@@ -1,0 +1,54 @@
+//! The last error, told of records that played no part in the choice.
+
+use super::RULES;
+use crate::data::{Record, Use};
+use crate::indicators::score;
+use crate::model::Model;
+use serde::Serialize;
+
+/// What the final model does on records that nothing was chosen by.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Quoted {
+    /// Their names.
+    pub records: Vec<String>,
+    /// Root mean square error of the given model's free run there, y.
+    pub before_rmse: f64,
+    /// The same of the final model.
+    pub validate_rmse: f64,
+    /// The noise floor there; none without y_sd.
+    pub noise_rmse: Option<f64>,
+}
+
+/// Records to choose by, and `validate` records that are kept back to quote on: every third, if there are
+/// enough of them.
+pub(super) fn kept_back(records: &[Record]) -> (Vec<Record>, Vec<Record>) {
+    let held_out = records.iter().filter(|r| r.role == Use::Validate).count();
+    let (mut chosen_by, mut kept) = (Vec::new(), Vec::new());
+    let mut met = 0;
+    for record in records {
+        met += usize::from(record.role == Use::Validate);
+        let third = record.role == Use::Validate && met % 3 == 0;
+        if third && held_out >= RULES.enough_to_quote {
+            kept.push(record.clone());
+        } else {
+            chosen_by.push(record.clone());
+        }
+    }
+    (chosen_by, kept)
+}
+
+impl Quoted {
+    /// What both models do on `kept`; `None` of no records, or where one diverges.
+    pub(super) fn of(given: &Model, last: &Model, kept: &[Record]) -> Option<Self> {
+        if kept.is_empty() {
+            return None;
+        }
+        let (before, after) = (score(given, kept).ok()?.0, score(last, kept).ok()?.0);
+        Some(Self {
+            records: kept.iter().map(|record| record.name.clone()).collect(),
+            before_rmse: before.validate?.rmse,
+            validate_rmse: after.validate.as_ref()?.rmse,
+            noise_rmse: after.validate?.noise_rmse,
+        })
+    }
+}

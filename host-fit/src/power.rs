@@ -1,12 +1,11 @@
 //! What would have been seen, had it been there: the amplitude of each effect at which
 //! the diagnosis of these records names it in eight cases of ten.
 //!
-//! The amplitude has to pass what decides there. What the effect changes in the free run,
-//! less what the model's own parameters can imitate to first order, must lower the held-out
-//! error enough for the search to set out; less what a memory, a lag or another term without
-//! a name can imitate, it must be worth a name and be significant among all alternatives. A gain
-//! x²·‖z‖² scatters by 2x·S, S² = Σ (z·e)² over blocks longer than the correlation of the error
-//! e; what is asked for has to be passed by 0.84 of that.
+//! The amplitude has to pass what decides there. Whoever has such records identifies a model on them
+//! first, and its lags imitate what they can: what the effect changes in the free run, less what the
+//! model's own parameters do in its place and less ever more lags and other terms without a name, as long as
+//! each is worth its price, must be worth a name and be significant among all alternatives. A gain x²·‖z‖² scatters by 2x·S, S² = Σ (z·e)² over blocks longer
+//! than the correlation of the error e; what is asked for has to be passed by 0.84 of that.
 
 use crate::data::Record;
 use crate::diagnose::RULES as NAMED;
@@ -16,7 +15,7 @@ use crate::picture::significant;
 use crate::residual::NoiseSource;
 use crate::rules;
 use crate::simulate::SimulateError;
-use crate::terms::{Bench, Known, Screen, Shown, Table, Units};
+use crate::terms::{Bench, Known, Left, RULES as TERMS, Screen, Shown, Table, Units};
 use model_core::effect::{Parameter, Spec};
 use model_core::effects::SPECS;
 use rayon::prelude::*;
@@ -29,6 +28,10 @@ rules! {
 
     /// What is seen is seen so often.
     power: f64 = 0.8, "share of cases", "convention; `cargo xtask calibrate` counts";
+    /// Lags and other terms without a name that may imitate it …
+    terms: usize = 6, "", "what `identify` takes of a flow with two memories";
+    /// … each for the price of so many parameters.
+    term_cost: f64 = 2.0, "parameters", "a lag and its weight";
     /// An effect that is not linear in its amplitude is probed this often, ever nearer to the amplitude that comes out.
     probes: usize = 4, "", "judgement";
 }
@@ -81,45 +84,54 @@ pub fn detectable(model: &Model, records: &[Record]) -> Result<Vec<Detectable>, 
     Ok(found.into_iter().flatten().collect())
 }
 
-/// What an effect has to take of the held-out error, as shares of its energy.
+/// What has to be left of an effect.
 struct Asked {
-    /// Before the search sets out.
-    promised: f64,
-    /// To be worth a name.
+    /// Of the held-out error energy, as a share of it.
     worthwhile: f64,
     /// Standard deviations above 0.
     significant: f64,
-    /// Standard deviations by which all that is passed in so many cases.
+    /// Standard deviations by which both are passed in so many cases.
     often: f64,
 }
 
 impl Asked {
     fn of(noise: NoiseSource) -> Self {
         let normal = Normal::standard();
-        let energy = |share: f64| 1.0 / (1.0 - share).powi(2) - 1.0;
-        // Where no noise floor is known, every search sets out, and more is asked for.
-        let (promised, worthwhile) = match noise {
-            NoiseSource::Measured | NoiseSource::Repeats => (NAMED.promising, NAMED.worthwhile),
-            NoiseSource::Scatter => (0.0, NAMED.worthwhile_in_the_dark),
+        // Where no noise floor is known, a name has to take more.
+        let share = match noise {
+            NoiseSource::Measured | NoiseSource::Repeats => NAMED.worthwhile,
+            NoiseSource::Scatter => NAMED.worthwhile_in_the_dark,
         };
         Self {
-            promised: energy(promised),
-            worthwhile: energy(worthwhile),
+            worthwhile: 1.0 / (1.0 - share).powi(2) - 1.0,
             significant: normal.inverse_cdf(1.0 - NAMED.level / NAMED.alternatives),
             often: normal.inverse_cdf(RULES.power),
         }
     }
 
-    /// The multiple of what is shown that passes all.
+    /// The multiple that passes both with what is left.
+    fn passes(&self, left: &Left, error: f64) -> f64 {
+        let scatter = self.often * left.deviation;
+        let wanted = scatter * scatter + left.energy * self.worthwhile * error;
+        let first = (scatter + wanted.sqrt()) / left.energy;
+        let test = (self.significant + self.often) * left.deviation / left.energy;
+        first.max(test)
+    }
+
+    /// The multiple of what is shown that passes beside all terms that are worth it then.
     fn multiple(&self, shown: &Shown) -> f64 {
-        let passes = |energy: f64, deviation: f64, share: f64| {
-            let scatter = self.often * deviation;
-            (scatter + (scatter * scatter + energy * share * shown.error).sqrt()) / energy
-        };
-        let first = passes(shown.promised, shown.promised_deviation, self.promised);
-        let last = passes(shown.left, shown.left_deviation, self.worthwhile);
-        let test = (self.significant + self.often) * shown.left_deviation / shown.left;
-        first.max(last).max(test)
+        let mut x = 0.0_f64;
+        for (left, next) in shown.beside.iter().zip(shown.beside.iter().skip(1)) {
+            x = x.max(self.passes(left, shown.error));
+            let before = shown.error + x * x * left.energy;
+            let after = shown.error + x * x * next.energy;
+            let worth = 0.5 * (before / after).ln() > TERMS.price * RULES.term_cost;
+            if !worth {
+                return x;
+            }
+        }
+        let last = shown.beside.last();
+        last.map_or(f64::INFINITY, |left| x.max(self.passes(left, shown.error)))
     }
 }
 
@@ -190,7 +202,9 @@ impl Detector<'_> {
         let mut model = self.screen.model().clone();
         let reference = channel_reference(spec, self.screen.records()).ok()?;
         model.add(spec, parameters, reference);
-        let shown = self.screen.shown(&self.unnamed, &model, self.block)?;
+        let shown = self
+            .screen
+            .shown(&self.unnamed, &model, self.block, RULES.terms)?;
         let x = size * self.asked.multiple(&shown);
         x.is_finite().then_some(x)
     }

@@ -29,6 +29,9 @@ pub(crate) struct Args {
     /// Write a report page with pictures.
     #[arg(long, value_name = "out.html")]
     report: Option<PathBuf>,
+    /// File for the trace: the signal that would explain the misfit of the best base, at each place.
+    #[arg(long, value_name = "trace.csv")]
+    trace: Option<PathBuf>,
     /// Most terms.
     #[arg(long, value_name = "COUNT", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=6))]
     terms: u32,
@@ -78,12 +81,21 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         found.model.save(path)?;
         written.push(path);
     }
+    if let (Some(path), Some(trace)) = (&args.trace, &found.discovery.trace) {
+        write_atomic(path, |out| out.write_all(trace.csv().as_bytes()))?;
+        written.push(path);
+    }
     let first = found.discovery.terms.first();
     if let (Some(path), Some(term)) = (&args.effect_out, first) {
         write_atomic(path, |out| out.write_all(term.file.as_bytes()))?;
         written.push(path);
     }
     console.show(&found, &[], &written)?;
+    if args.trace.is_some() && found.discovery.trace.is_none() {
+        console.say(
+            "no trace was written: the best base is at the noise floor, or its free run diverges",
+        )?;
+    }
     if args.effect_out.is_some() && first.is_none() {
         console.say("no effect file was written: no term was found")?;
     }

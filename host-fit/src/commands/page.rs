@@ -2,7 +2,7 @@
 
 use host_fit::data::{DataSet, Record};
 use host_fit::diagnose::{Diagnosis, Verdict};
-use host_fit::discover::FoundTerm;
+use host_fit::discover::{Entry, FoundTerm, TRACED, Trace};
 use host_fit::indicators::{Scores, score};
 use host_fit::model::Model;
 use host_fit::picture::{
@@ -169,6 +169,9 @@ pub(crate) fn discovery(given: &Model, set: &DataSet, found: &Terms, command: &s
         report.paragraph("The effect file that the term makes:");
         report.code(&term.file);
     }
+    if let Some(trace) = &found.discovery.trace {
+        report_trace(&mut report, trace);
+    }
     report.section("The model with the terms");
     report.paragraph(&describe(&found.model));
     report_scores(&mut report, &found.scores);
@@ -205,6 +208,54 @@ pub(super) fn law(model: &Model, tried: &Tried, tracks: bool, command: &str) -> 
     report.provenance("command", command);
     report.provenance("data", &model.training.data_hash);
     report.html()
+}
+
+/// Records whose trace is drawn.
+const TRACED_RECORDS: usize = 3;
+
+/// What is missing at the likeliest place, record by record.
+fn report_trace(report: &mut Report, trace: &Trace) {
+    let likeliest = TRACED.iter().enumerate().max_by(|a, b| {
+        let odds = |entry: &Entry| trace.odds.get(entry.place().word()).copied().unwrap_or(0.0);
+        odds(a.1).total_cmp(&odds(b.1))
+    });
+    let Some((index, entry)) = likeliest else {
+        return;
+    };
+    report.section("The trace of what is missing");
+    report.paragraph(&format!(
+        "The signal at the {} that would explain the misfit of the best base without a term, whatever it depends on: lay it \
+         beside what else was measured that day. `--trace trace.csv` writes it, with those at the other places.",
+        entry.place().word()
+    ));
+    for record in trace.records.iter().rev().take(TRACED_RECORDS) {
+        let Some(signal) = record.signals.get(index) else {
+            continue;
+        };
+        let values = signal.value.iter().zip(&signal.half);
+        let points: Vec<BandPoint> = record
+            .t
+            .iter()
+            .zip(values)
+            .map(|(t, (w, half))| BandPoint {
+                x: *t,
+                value: *w,
+                low: w - half,
+                high: w + half,
+            })
+            .collect();
+        let picture = curve(&CurvePlot {
+            x_label: "time in record (s)",
+            y_label: &format!(
+                "{} ({})",
+                entry.words().split(" of ").next().unwrap_or_default(),
+                entry.unit().symbol()
+            ),
+            points: &points,
+            ..CurvePlot::default()
+        });
+        report.figure(&picture, &format!("{}: {}.", record.name, entry.words()));
+    }
 }
 
 /// The curve of a term.

@@ -8,7 +8,8 @@ rules! {
 
     /// A misfit below this factor is within what `y_sd` itself is known to.
     floor_margin: f64 = 1.10, "times the noise floor", "a standard deviation from 20 repeats is known to 16 % a sample; nulls of six families stay below 1.03";
-    /// A given model within this factor of the noise floor is not searched further unless something promises a gain.
+    /// A given model within this factor of the noise floor is not searched further unless an effect promises what it
+    /// takes to be named, and more than chance does.
     at_once: f64 = 1.03, "times the noise floor", "what `identify` leaves of nulls is 0.99 to 1.02; lags that imitate an effect leave 1.03 and more";
     /// Level of the tests.
     level: f64 = 0.05, "p-value", "convention";
@@ -34,8 +35,6 @@ rules! {
     too_much: f64 = 0.06, "share of the variance of y", "the public sets";
     /// Where neither the noise is known nor anything shows that the base errs, an effect must lower the error by this.
     worthwhile_in_the_dark: f64 = 0.1, "share of the rms error", "the hair dryer and the gas furnace, where nothing is missing";
-    /// A given model at the noise floor is not searched further unless a single effect promises this.
-    promising: f64 = 0.02, "share of the rms error", "screening of nulls promises up to 0.008";
     /// Candidates that are refitted for the ranking beside the named ones.
     ranked_in_full: usize = 4, "", "judgement: further ones never matched the leader";
     /// Of so many `validate` records every third is kept back, and the last error is quoted there as well.

@@ -34,7 +34,9 @@ impl Session<'_> {
         let effects = rivals.iter().filter(|rival| rival.spec.is_some());
         let least = effects.map(Rival::rmse).fold(before, f64::min);
         let promised = 1.0 - least / before;
-        if promised > RULES.promising || self.imitated(given_inside, as_given) {
+        let p = table.chance.p_value(1.0 - (1.0 - promised).powi(2));
+        let promising = promised > RULES.worthwhile && p <= RULES.level;
+        if promising || self.imitated(given_inside, as_given) {
             return None;
         }
         Some(Diagnosis {

@@ -16,11 +16,13 @@ mod place;
 mod rules;
 mod screening;
 mod term;
+mod trace;
 
 pub use coordinate::Coordinate;
 pub use outcome::{Alike, CurvePoint, Discovery, FoundTerm, Smallest};
 pub use place::{Entry, Place};
 pub use rules::{RULES, Rules};
+pub use trace::{Signal, TRACED, Trace, TracedRecord};
 
 use crate::data::Record;
 use crate::diagnose::{DiagnoseError, Rung};
@@ -130,6 +132,13 @@ pub fn discover(
     let by_size = |a: &Hypothesis, b: &Hypothesis| size(a).total_cmp(&size(b));
     let base = bases.into_iter().min_by(by_size).unwrap_or(leanest.clone());
     ladder.push(rung(&base, &[], "the best base without a new term"));
+    let missing = judge.over_noise(base.judged.rmse()) > crate::terms::RULES.at_the_floor;
+    let trace = missing
+        .then(|| {
+            progress("the trace of what is missing");
+            trace::trace(judge, &base.judged, units)
+        })
+        .flatten();
     let mut current = base.clone();
     let mut contexts = vec![current.clone()];
     if size(&leanest) > size(&current) {
@@ -184,6 +193,7 @@ pub fn discover(
         noise_source: judge.noise_source,
         noise_estimate: judge.noise_rmse() * units.y,
         looked_at,
+        trace,
         model,
     })
 }

@@ -2,6 +2,7 @@
 
 use super::place::{Entry, Place};
 use super::term::{Shape, Term};
+use super::trace::Trace;
 use crate::diagnose::{ParameterEstimate, Rung};
 use crate::fit::Fit;
 use crate::model::Model;
@@ -100,6 +101,8 @@ pub struct Discovery {
     pub noise_estimate: f64,
     /// Curves that were looked at.
     pub looked_at: usize,
+    /// The signal that would explain the misfit of the best base, at each place; none where nothing is left.
+    pub trace: Option<Trace>,
     /// The model with the terms.
     pub model: Model,
 }

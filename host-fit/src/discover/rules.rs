@@ -34,6 +34,12 @@ rules! {
     formula: f64 = 0.01, "share of the rms error", "judgement";
     /// An effect of the catalogue resembles a curve if what both change in the free run correlates so well.
     resembles: f64 = 0.9, "", "judgement";
+    /// A trace has so many knots a record, at most.
+    knots: usize = 100, "", "judgement: for the time it takes";
+    /// How much its prior wants a trace small, beside smooth.
+    smallness: f64 = 0.01, "", "judgement: bends of ten knots count as much as size";
+    /// A place is said to be the one from this probability on.
+    likely: f64 = 0.9, "probability", "convention";
     /// A delay may become this much longer.
     longest_delay_s: f64 = 0.1, "s at 1 kHz", "judgement: three times the delays of the rigs at hand";
     /// Largest change that is searched, relative or in units of y.

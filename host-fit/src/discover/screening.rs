@@ -26,7 +26,7 @@ pub(super) struct Screened {
 }
 
 /// The command is on above this, inner units.
-const ON: f64 = 0.5;
+pub(super) const ON: f64 = 0.5;
 /// Times of coordinates are multiples of the flow's, which is taken within these bounds, s at 1 kHz.
 const FASTEST_S: f64 = 0.005;
 const SLOWEST_S: f64 = 0.2;
@@ -103,6 +103,18 @@ fn points(mut values: Vec<f64>) -> Option<(Vec<f64>, usize)> {
         from(a).total_cmp(&from(b))
     })?;
     Some((x, nearest))
+}
+
+/// By how much the model's own delay is made shorter for a term, s: a delay may shrink as well.
+pub(super) fn room(entry: Entry, model: &Model) -> f64 {
+    match entry {
+        Entry::Delay => {
+            let period = model.sample_period_s;
+            let present = model.delay.present(0.5, period).floor();
+            (0.8 * present).floor().clamp(0.0, 20.0) * period
+        }
+        _ => 0.0,
+    }
 }
 
 /// A model that curves are screened beside.
@@ -195,14 +207,7 @@ impl<'a> Context<'a> {
             .collect();
         let stride = shown.len().div_ceil(SHOWN).max(1);
         let (x, pinned) = points(shown.into_iter().step_by(stride).collect())?;
-        let shift = match entry {
-            Entry::Delay => {
-                let period = self.model.sample_period_s;
-                let room = self.model.delay.present(0.5, period).floor();
-                (0.8 * room).floor().clamp(0.0, 20.0) * period
-            }
-            _ => 0.0,
-        };
+        let shift = room(entry, self.model);
         // The sensor's zero is a constant reading.
         let zero = entry == Entry::Reading && self.model.has_effect(ZERO_OFFSET.name);
         let pinned = (zero || entry.has_free_level()).then_some(pinned);

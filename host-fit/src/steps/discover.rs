@@ -4,7 +4,7 @@ use super::onlooker::watched;
 use super::{Onlooker, StepError, check_period, trained_in_free_run};
 use crate::data::DataSet;
 use crate::diagnose::Rung;
-use crate::discover::{Discovery, FoundTerm, Options, Smallest, discover as search};
+use crate::discover::{Discovery, FoundTerm, Options, Smallest, Trace, discover as search};
 use crate::indicators::{Scores, score};
 use crate::model::{Model, Training};
 use crate::picture::significant;
@@ -43,6 +43,7 @@ impl Serialize for Terms {
             noise_source: NoiseSource,
             noise_estimate: f64,
             curves_looked_at: usize,
+            trace: Option<&'a Trace>,
             words: String,
         }
         let found = &self.discovery;
@@ -54,6 +55,7 @@ impl Serialize for Terms {
             noise_source: found.noise_source,
             noise_estimate: found.noise_estimate,
             curves_looked_at: found.looked_at,
+            trace: found.trace.as_ref(),
             words: format!("{}. {}", self.headline, self.meaning),
         };
         document.serialize(serializer)
@@ -92,7 +94,10 @@ pub fn discover(
     })?;
     let runs_before = score(model, &records).ok().map(|(_, runs)| runs);
     let (scores, runs) = score(&discovery.model, &records)?;
-    let (headline, meaning) = words(&discovery);
+    let (headline, mut meaning) = words(&discovery);
+    if let Some(trace) = &discovery.trace {
+        meaning += &where_it_enters(trace);
+    }
     let found = discovery.terms.iter().map(|term| term.effect.clone());
     Ok(Terms {
         model: Model {
@@ -195,6 +200,24 @@ fn words(discovery: &Discovery) -> (String, String) {
     }
     meaning += &format!("The held-out error is {}; {floor}.", significant(last, 3));
     (headline, meaning)
+}
+
+/// Where the misfit enters, by its trace.
+fn where_it_enters(trace: &Trace) -> String {
+    let odds = trace
+        .odds
+        .iter()
+        .map(|(place, odds)| format!("{place} {:.0} %", 100.0 * odds));
+    let odds = odds.collect::<Vec<_>>().join(", ");
+    match trace.place {
+        Some(place) => format!(
+            " Whatever it depends on, what is missing beside the flow's own memory enters at the {} (odds: {odds}).",
+            place.word()
+        ),
+        None => format!(
+            " A free signal at one place explains the misfit as well as at another: these records cannot tell where it enters (odds: {odds})."
+        ),
+    }
 }
 
 fn spoken(value: f64, unit: &str) -> String {

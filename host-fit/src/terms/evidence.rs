@@ -31,6 +31,11 @@ impl HeldOut {
         }
     }
 
+    /// Samples that say as much as one would.
+    pub(crate) fn correlated(&self) -> f64 {
+        (self.block as f64 / RULES.correlation_times).max(1.0)
+    }
+
     /// Samples that count as independent of the next as many.
     pub(crate) fn block(&self) -> usize {
         self.block

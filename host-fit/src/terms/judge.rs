@@ -122,6 +122,13 @@ impl Judge {
         self.folds[fold].learning.iter().collect()
     }
 
+    /// All records of the first fold, those that are learned from first.
+    pub(crate) fn first_fold(&self) -> Vec<&Record> {
+        let fold = &self.folds[0];
+        let judging = fold.judging.iter().map(|judging| &judging.record);
+        fold.learning.iter().chain(judging).collect()
+    }
+
     /// How `model` is fitted: with the constant where it has one.
     #[must_use]
     pub fn options_for(&self, model: &Model) -> FitOptions {

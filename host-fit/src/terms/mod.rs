@@ -33,7 +33,7 @@ pub use judge::{Judge, Judged};
 pub use proposal::Proposal;
 pub use rules::{RULES, Rules};
 pub use screen::Screen;
-pub(crate) use screen::{Shown, Tangent};
+pub(crate) use screen::{Left, Shown, Tangent};
 pub use search::{Found, Hypothesis, Search};
 pub use table::{Candidate, Table};
 pub use term::Term;

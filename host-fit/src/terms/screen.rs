@@ -35,19 +35,22 @@ pub(crate) struct Tangent {
     pub(crate) direction: Vec<f64>,
 }
 
-/// What a change of the model shows in the free run.
-#[derive(Clone, Copy, Debug)]
+/// What a change of the model shows in the free run, on what is held out.
+#[derive(Clone, Debug)]
 pub(crate) struct Shown {
-    /// Energy of the held-out error.
+    /// Energy of the error.
     pub(crate) error: f64,
-    /// Energy of the change there, without what the model's own parameters can do.
-    pub(crate) promised: f64,
-    /// Standard deviation of change times error.
-    pub(crate) promised_deviation: f64,
-    /// The same without what the best term without a name can do besides.
-    pub(crate) left: f64,
-    /// Standard deviation of what is left of the change times error.
-    pub(crate) left_deviation: f64,
+    /// What is left of the change beside ever more terms without a name; first, beside none.
+    pub(crate) beside: Vec<Left>,
+}
+
+/// What is left of a change.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Left {
+    /// Its energy.
+    pub(crate) energy: f64,
+    /// Standard deviation of it times the error.
+    pub(crate) deviation: f64,
 }
 
 /// A fitted model, ready to be asked what a change would do.
@@ -74,11 +77,7 @@ impl<'a> Screen<'a> {
     #[must_use]
     pub fn new(judge: &'a Judge, model: &'a Model) -> Option<Self> {
         let fold = &judge.folds[0];
-        let records: Vec<&Record> = fold
-            .learning
-            .iter()
-            .chain(fold.judging.iter().map(|judging| &judging.record))
-            .collect();
+        let records = judge.first_fold();
         let warm_up = model.warm_up();
         let judged_from = fold.judging.iter().map(|judging| judging.from.max(warm_up));
         let from: Vec<usize> = vec![warm_up; fold.learning.len()]
@@ -336,39 +335,53 @@ impl<'a> Screen<'a> {
         })
     }
 
-    /// What `other` changes that neither this model's own parameters nor one of the `unnamed`
-    /// terms can do in its place; `block` samples of the error are independent of the next.
+    /// What `other` changes that this model's own parameters cannot do in its place, nor up to `most`
+    /// columns of `unnamed`, the best first; `block` samples of the error are independent of the next.
     /// `None` if it diverges or changes nothing.
-    pub(crate) fn shown(&self, unnamed: &Table, other: &Model, block: usize) -> Option<Shown> {
+    pub(crate) fn shown(
+        &self,
+        unnamed: &Table,
+        other: &Model,
+        block: usize,
+        most: usize,
+    ) -> Option<Shown> {
         let mut change = self.change(other)?;
         self.residualise(&mut change);
-        let held_out = |series: &[f64]| {
-            let own = &series[self.learned..];
-            dot(own, own)
+        let blocks: Vec<Range<usize>> = self.blocks(block);
+        let left = |series: &[f64]| {
+            let held_out = &series[self.learned..];
+            let judged = blocks.iter().filter(|block| block.start >= self.learned);
+            let each = judged.map(|b| dot(&series[b.clone()], &self.error[b.clone()]).powi(2));
+            Left {
+                energy: dot(held_out, held_out),
+                deviation: each.sum::<f64>().sqrt(),
+            }
         };
-        let deviation = |series: &[f64]| {
-            let blocks = self.blocks(block).into_iter();
-            let judged = blocks.filter(|block| block.start >= self.learned);
-            let each = judged.map(|b| dot(&series[b.clone()], &self.error[b]).powi(2));
-            each.sum::<f64>().sqrt()
+        let held_out = &self.error[self.learned..];
+        let mut shown = Shown {
+            error: dot(held_out, held_out),
+            beside: vec![left(&change)],
         };
-        let rests = unnamed.candidates.iter().filter_map(|candidate| {
-            let columns = candidate
+        let mut rest = change.clone();
+        let mut chosen: Vec<&[f64]> = Vec::new();
+        while chosen.len() < most {
+            let takes = |column: &&Vec<f64>| {
+                let (own, rest) = (&column[..self.learned], &rest[..self.learned]);
+                dot(own, rest).powi(2) / dot(own, own).max(f64::MIN_POSITIVE)
+            };
+            let best = unnamed
                 .columns
                 .iter()
-                .map(|i| unnamed.columns[*i].as_slice());
-            self.rest_of(&change, &columns.collect::<Vec<_>>())
-        });
-        let least = rests.min_by(|a, b| held_out(a).total_cmp(&held_out(b)));
-        let left = least.unwrap_or_else(|| change.clone());
-        let shown = Shown {
-            error: held_out(&self.error),
-            promised: held_out(&change),
-            promised_deviation: deviation(&change),
-            left: held_out(&left),
-            left_deviation: deviation(&left),
-        };
-        (shown.left > 0.0 && shown.promised > 0.0).then_some(shown)
+                .max_by(|a, b| takes(a).total_cmp(&takes(b)));
+            let Some(best) = best else { break };
+            chosen.push(best);
+            let Some(less) = self.rest_of(&change, &chosen) else {
+                break;
+            };
+            rest = less;
+            shown.beside.push(left(&rest));
+        }
+        (shown.beside.last()?.energy > 0.0).then_some(shown)
     }
 
     /// Whether an effect cannot be tried here, and why.

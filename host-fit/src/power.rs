@@ -15,7 +15,7 @@ use crate::picture::significant;
 use crate::residual::NoiseSource;
 use crate::rules;
 use crate::simulate::SimulateError;
-use crate::terms::{Bench, Known, Left, RULES as TERMS, Screen, Shown, Table, Units};
+use crate::terms::{Bench, Judge, Known, Left, RULES as TERMS, Screen, Shown, Table, Units};
 use model_core::effect::{Parameter, Spec};
 use model_core::effects::SPECS;
 use rayon::prelude::*;
@@ -56,11 +56,17 @@ pub struct Detectable {
 
 /// For each effect of the catalogue that has an amplitude, is not in the model
 /// and can be tried on these records: the amplitude that would have been named. The effect's
-/// other parameters are at the middle of the catalogue's starting values.
+/// other parameters are at the middle of the catalogue's starting values. `usual` is the share of
+/// the held-out energy that noise alone lets the best of all effects take
+/// ([`Diagnosis::usual_by_chance`](crate::diagnose::Diagnosis::usual_by_chance)).
 ///
 /// # Errors
 /// A missing channel of the model's own, or a free run that diverges.
-pub fn detectable(model: &Model, records: &[Record]) -> Result<Vec<Detectable>, SimulateError> {
+pub fn detectable(
+    model: &Model,
+    records: &[Record],
+    usual: f64,
+) -> Result<Vec<Detectable>, SimulateError> {
     let Some(bench) = Bench::of(model, records) else {
         return Ok(Vec::new());
     };
@@ -72,7 +78,7 @@ pub fn detectable(model: &Model, records: &[Record]) -> Result<Vec<Detectable>, 
     let detector = Detector {
         unnamed: Table::of(&screen, &known, false),
         block: held_out.block(),
-        asked: Asked::of(bench.judge.noise_source),
+        asked: Asked::of(&bench.judge, held_out.rmse(), usual),
         units: &bench.units,
         screen,
     };
@@ -86,36 +92,35 @@ pub fn detectable(model: &Model, records: &[Record]) -> Result<Vec<Detectable>, 
 
 /// What has to be left of an effect.
 struct Asked {
-    /// Of the held-out error energy, as a share of it.
-    worthwhile: f64,
-    /// Standard deviations above 0.
-    significant: f64,
-    /// Standard deviations by which both are passed in so many cases.
+    /// Energy, as a share of that of the held-out error.
+    share: f64,
+    /// Standard deviations by which it is passed in so many cases.
     often: f64,
 }
 
 impl Asked {
-    fn of(noise: NoiseSource) -> Self {
-        let normal = Normal::standard();
+    fn of(judge: &Judge, rmse: f64, usual: f64) -> Self {
         // Where no noise floor is known, a name has to take more.
-        let share = match noise {
+        let worthwhile = match judge.noise_source {
             NoiseSource::Measured | NoiseSource::Repeats => NAMED.worthwhile,
             NoiseSource::Scatter => NAMED.worthwhile_in_the_dark,
         };
+        // What leaves the error at the floor is not looked for.
+        let from_floor = (judge.over_noise(rmse) / TERMS.at_the_floor).powi(2);
+        let taken = (1.0 - (1.0 - worthwhile).powi(2))
+            .max(usual.min(0.99))
+            .max(1.0 - from_floor);
         Self {
-            worthwhile: 1.0 / (1.0 - share).powi(2) - 1.0,
-            significant: normal.inverse_cdf(1.0 - NAMED.level / NAMED.alternatives),
-            often: normal.inverse_cdf(RULES.power),
+            share: taken / (1.0 - taken),
+            often: Normal::standard().inverse_cdf(RULES.power),
         }
     }
 
-    /// The multiple that passes both with what is left.
+    /// The multiple that passes with what is left.
     fn passes(&self, left: &Left, error: f64) -> f64 {
         let scatter = self.often * left.deviation;
-        let wanted = scatter * scatter + left.energy * self.worthwhile * error;
-        let first = (scatter + wanted.sqrt()) / left.energy;
-        let test = (self.significant + self.often) * left.deviation / left.energy;
-        first.max(test)
+        let wanted = scatter * scatter + left.energy * self.share * error;
+        (scatter + wanted.sqrt()) / left.energy
     }
 
     /// The multiple of what is shown that passes beside all terms that are worth it then.
@@ -221,7 +226,7 @@ mod tests {
     /// What the diagnosis says of records into which `effect` was put, `times` as large as
     /// what is said to be seen.
     fn named(model: &Model, records: &[Record], effect: &str, times: f64) -> Vec<String> {
-        let found = detectable(model, records).expect("stable");
+        let found = detectable(model, records, 0.01).expect("stable");
         let found = found.iter().find(|d| d.effect == effect).expect("judged");
         let spec = spec(effect).expect("in the catalogue");
         let mut parameters = found.parameters.clone();

@@ -137,6 +137,8 @@ pub struct Diagnosis {
     /// The last error on records that nothing was chosen by; none where there are too few to keep
     /// some back.
     pub quoted: Option<Quoted>,
+    /// Share of the held-out energy that the best of all effects takes of noise alone in one search of twenty.
+    pub usual_by_chance: f64,
     /// Held-out errors from the model as given to the last one.
     pub ladder: Vec<Rung>,
     /// All candidates for the final model without effects, best first.

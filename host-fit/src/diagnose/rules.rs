@@ -13,9 +13,10 @@ rules! {
     at_once: f64 = 1.03, "times the noise floor", "what `identify` leaves of nulls is 0.99 to 1.02; lags that imitate an effect leave 1.03 and more";
     /// Level of the tests.
     level: f64 = 0.05, "p-value", "convention";
-    /// Alternatives that a search looks at: effects, points of their grids and responses to part jets. The p-value of a
-    /// gain is multiplied by it (Bonferroni).
-    alternatives: f64 = 300.0, "", "counted: the grids of 21 cards";
+    /// Level of the whole search: noise alone may let any effect at any point of its grid do as much so often.
+    level_of_search: f64 = 0.02, "p-value", "three false names in a hundred are too many";
+    /// What promises to be named on a given model at the noise floor is looked at from this p-value on.
+    worth_a_search: f64 = 0.1, "p-value", "judgement: one null in ten costs a search";
     /// An effect must lower the held-out error of the best base without it by this fraction, unless it does as well with
     /// fewer parameters.
     worthwhile: f64 = 0.015, "share of the rms error", "nulls of six families: chance manages 0.01";

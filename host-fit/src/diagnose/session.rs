@@ -151,6 +151,7 @@ impl Session<'_> {
             memory: memory(&model),
             tried: found.tried,
             alternatives: chance.alternatives,
+            usual_by_chance: chance.usual(),
             held_out_by: judge.held_out_by,
             quoted: None,
             restarted_s,

@@ -7,7 +7,9 @@ use super::session::Session;
 use super::{Diagnosis, RULES, Rung, Verdict};
 use crate::model::Model;
 use crate::residual::{FailureCoordinate, NoiseSource, examine};
-use crate::terms::{Found, HeldOut, Hypothesis, Judged, Noise, Screen, Table, Term, p_value};
+use crate::terms::{
+    Found, HeldOut, Hypothesis, Judged, Noise, RULES as TERMS, Screen, Table, Term, p_value,
+};
 use model_core::effect::Spec;
 use std::collections::BTreeMap;
 
@@ -35,7 +37,8 @@ impl Session<'_> {
         let least = effects.map(Rival::rmse).fold(before, f64::min);
         let promised = 1.0 - least / before;
         let p = table.chance.p_value(1.0 - (1.0 - promised).powi(2));
-        let promising = promised > RULES.worthwhile && p <= RULES.level;
+        let promising =
+            over > TERMS.at_the_floor && promised > RULES.worthwhile && p <= RULES.worth_a_search;
         if promising || self.imitated(given_inside, as_given) {
             return None;
         }
@@ -47,6 +50,7 @@ impl Session<'_> {
             memory: memory(given),
             tried: 0,
             alternatives: table.chance.alternatives,
+            usual_by_chance: table.chance.usual(),
             held_out_by: judge.held_out_by,
             quoted: None,
             restarted_s: None,
@@ -127,24 +131,38 @@ impl Session<'_> {
         let (with, without) = (best.judged.rmse(), bare.judged.rmse());
         let scatter = self.judge().noise_source == NoiseSource::Scatter;
         let in_the_dark = scatter && self.fits(&bare.judged);
-        // The best of so many alternatives is often good by chance. Where the base
-        // errs far beyond what scatters from sample to sample, records are few and
-        // short as a rule: one test for each effect has to do.
-        let alternatives = if scatter && !in_the_dark {
-            best.judged.model().candidates().count() as f64
-        } else {
-            RULES.alternatives
-        };
-        let p = alternatives * p_value(&bare.judged.held_out, &best.judged.held_out);
         let worthwhile = if in_the_dark {
             RULES.worthwhile_in_the_dark
         } else {
             RULES.worthwhile
         };
-        let better = with < (1.0 - worthwhile) * without && p < RULES.level;
+        // What is at the floor has nothing to gain.
+        let open = self.judge().over_noise(without) > TERMS.at_the_floor;
+        let better = open && with < (1.0 - worthwhile) * without && {
+            // The best of so many alternatives is often good by chance. Where the base
+            // errs far beyond what scatters from sample to sample, records are few and
+            // short as a rule: one test for each effect has to do.
+            let p = p_value(&bare.judged.held_out, &best.judged.held_out);
+            match scatter && !in_the_dark {
+                true => p * (best.judged.model().candidates().count() as f64) < RULES.level,
+                false => self.by_chance(best, bare) <= RULES.level_of_search,
+            }
+        };
         let leaner = is_leaner(best, bare);
         let drifts = self.judge().drifts_more(&best.judged, &bare.judged);
         (better || (leaner && !scatter)) && !drifts
+    }
+
+    /// How often noise alone, as `best` leaves it, lets one of all effects lower the error of `bare` as far
+    /// as `best` does. The error of `bare` itself would hide an effect that shows in few records.
+    fn by_chance(&self, best: &Hypothesis, bare: &Hypothesis) -> f64 {
+        let chance = Screen::new(self.judge(), bare.judged.model()).and_then(|screen| {
+            let block = best.judged.held_out.block();
+            let noise = Noise::new(&screen, best.judged.model(), block, self.options.seed)?;
+            Some(Table::with_chance(&screen, &self.search.known, &noise).chance)
+        });
+        let left = (best.judged.rmse() / bare.judged.rmse()).powi(2);
+        chance.map_or(1.0, |chance| chance.p_value(1.0 - left))
     }
 
     /// What was found without the effects that the rest of it does as well without.

@@ -59,6 +59,12 @@ impl Finder<'_> {
         let looked_at = pool.len();
         let promised = |(index, curve): &(usize, Screened)| size(&contexts[*index]) + curve.score;
         pool.sort_by(|a, b| promised(a).total_cmp(&promised(b)));
+        // To first order a term promises less than it does: half of what is asked is enough to try it.
+        let wanted = (1.0 - RULES.promised * RULES.worthwhile) * base.judged.rmse();
+        pool.retain(|(index, curve)| {
+            let left = (1.0 - curve.held_out).max(0.0).sqrt();
+            left * contexts[*index].judged.rmse() < wanted
+        });
         let pool = diverse(pool, RULES.tried, |(_, curve)| &curve.term);
         progress(&format!("term {number}: refitting {} curves", pool.len()));
         let tried: Vec<(Term, Fit)> = pool

@@ -132,13 +132,6 @@ pub fn discover(
     let by_size = |a: &Hypothesis, b: &Hypothesis| size(a).total_cmp(&size(b));
     let base = bases.into_iter().min_by(by_size).unwrap_or(leanest.clone());
     ladder.push(rung(&base, &[], "the best base without a new term"));
-    let missing = judge.over_noise(base.judged.rmse()) > crate::terms::RULES.at_the_floor;
-    let trace = missing
-        .then(|| {
-            progress("the trace of what is missing");
-            trace::trace(judge, &base.judged, units)
-        })
-        .flatten();
     let mut current = base.clone();
     let mut contexts = vec![current.clone()];
     if size(&leanest) > size(&current) {
@@ -162,6 +155,15 @@ pub fn discover(
             break;
         }
     }
+    // Beside the base that the first term needs: the best one without may have bent to stand in for it.
+    let lacking = found.first().map_or(&base.judged, |found| &found.without);
+    let missing = judge.over_noise(lacking.rmse()) > crate::terms::RULES.at_the_floor;
+    let trace = missing
+        .then(|| {
+            progress("the trace of what is missing");
+            trace::trace(judge, lacking, units)
+        })
+        .flatten();
     progress("formulas");
     let (terms, end) = finder.formulas(found, current);
     if !terms.is_empty() {

@@ -101,7 +101,8 @@ pub struct Discovery {
     pub noise_estimate: f64,
     /// Curves that were looked at.
     pub looked_at: usize,
-    /// The signal that would explain the misfit of the best base, at each place; none where nothing is left.
+    /// The signal that would explain the misfit of the base without the first term, or of the best base where none was
+    /// found, at each place; none where nothing is left.
     pub trace: Option<Trace>,
     /// The model with the terms.
     pub model: Model,

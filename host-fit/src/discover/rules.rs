@@ -14,6 +14,8 @@ rules! {
     beyond: f64 = 0.01, "share of the samples", "judgement";
     /// Points are at least this far apart.
     apart: f64 = 0.05, "of the way from the first point", "judgement: rests and times since edges span three decades";
+    /// A curve is refitted if the screening promises this share of what a term must lower the error by.
+    promised: f64 = 0.5, "share", "judgement: first order promises less than a refit does";
     /// Curves that are refitted for a few steps per round …
     tried: usize = 10, "", "judgement";
     /// … no more of them of one place and one kind of coordinate than this …

@@ -136,7 +136,9 @@ pub fn diagnose(
         let diagnosis = search(model, &records, options, onlooker.interrupt(), &progress)?;
         let failures = where_it_fails(&diagnosis.model, &records);
         let detectable = match diagnosis.verdict {
-            Verdict::NothingMissing => detectable(&diagnosis.model, &records),
+            Verdict::NothingMissing => {
+                detectable(&diagnosis.model, &records, diagnosis.usual_by_chance)
+            }
             Verdict::EffectMissing | Verdict::PartlyExplained | Verdict::Unexplained => {
                 Ok(Vec::new())
             }

@@ -1,8 +1,8 @@
 //! What noise alone would make of the best of all candidates.
 //!
-//! The wild cluster bootstrap of the largest gain: blocks of the final model's error, longer than its
-//! correlation, get signs by lot, which leaves their spectrum and their size where they are and takes away
-//! whatever a candidate could explain. The candidates are screened on each such error as they were on the
+//! The wild cluster bootstrap of the largest gain: the error of each record (of pieces longer than its
+//! correlation, where records are few) gets a sign by lot, which leaves its spectrum, its size and whatever is the
+//! same all through a record where they are, and takes away what a candidate could explain in all of them. The candidates are screened on each such error as they were on the
 //! measured one: coefficients from what is learned from, gains on what is held out. (White 2000, A reality
 //! check for data snooping; Cameron, Gelbach & Miller 2008, Bootstrap-based improvements for inference with
 //! clustered errors.)
@@ -38,8 +38,9 @@ pub(super) struct Taken {
 }
 
 impl Noise {
-    /// The error of `last`, which explains all that can be explained, under drawn signs; `block`
-    /// samples count as independent of the next. `None` if its free run diverges.
+    /// The error of `last` under drawn signs, `block` samples of it independent of the next as many:
+    /// that of the model without candidates for a test, of one with them for what chance would do
+    /// beside them. `None` if its free run diverges.
     pub(crate) fn new(screen: &Screen, last: &Model, block: usize, seed: u64) -> Option<Self> {
         let error = screen.error_of(last)?;
         let blocks = screen.blocks(block);

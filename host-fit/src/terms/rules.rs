@@ -112,6 +112,8 @@ rules! {
     /// Delay laws are compared at this level, where nothing better is known.
     middle: f64 = 0.5, "size of y", "the middle of the range";
 
+    /// Signs are drawn for records, or for pieces of records where there are fewer records than this.
+    fewest_pieces: usize = 8, "", "2⁸ patterns of signs: a p-value of 0.01 can be told";
     /// Errors that are noise alone, against which the best of all candidates has to stand.
     draws: usize = 199, "", "a p-value of 0.005 is the least that can be said";
     /// Errors of blocks of so many correlation times count as independent …

@@ -142,9 +142,13 @@ impl<'a> Screen<'a> {
         Some(self.error_with(&runs?))
     }
 
-    /// The joined series in blocks of so many samples, none in two records.
+    /// The joined series in pieces whose errors are independent of each other: whole records, for what
+    /// scatters between records is the same all through one; where there are few, pieces of them, of
+    /// so many samples at least.
     pub(super) fn blocks(&self, samples: usize) -> Vec<Range<usize>> {
-        let length = (samples / self.stride).max(1);
+        let most = self.records.iter().map(|r| r.len()).max().unwrap_or(0);
+        let pieces = RULES.fewest_pieces.div_ceil(self.records.len().max(1));
+        let length = (samples.max(most.div_ceil(pieces)) / self.stride).max(1);
         let mut blocks = Vec::new();
         let mut start = 0;
         for (record, from) in self.records.iter().zip(&self.from) {

@@ -52,3 +52,31 @@ impl Quoted {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_third_of_four_held_out_records_is_kept_back_and_of_three_none() {
+        let record = |name: &str, role| Record::new(name, role, 0.001, vec![0.0; 4], vec![0.0; 4]);
+        let set = |held_out: usize| -> Vec<Record> {
+            let names = ["a", "b", "c", "d", "e", "f"];
+            let held_out = names
+                .iter()
+                .take(held_out)
+                .map(|n| record(n, Use::Validate));
+            std::iter::once(record("own", Use::Identify))
+                .chain(held_out)
+                .collect()
+        };
+        let names = |records: &[Record]| -> Vec<String> {
+            records.iter().map(|r| r.name.clone()).collect()
+        };
+        let (chosen_by, kept) = kept_back(&set(3));
+        assert_eq!((chosen_by.len(), kept.len()), (4, 0));
+        let (chosen_by, kept) = kept_back(&set(6));
+        assert_eq!(names(&kept), ["c", "f"]);
+        assert_eq!(names(&chosen_by), ["own", "a", "b", "d", "e"]);
+    }
+}

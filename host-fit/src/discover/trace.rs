@@ -381,3 +381,46 @@ fn explained(parts: &[Part], energy: f64, independent: f64) -> Option<Explained>
     let known = each.filter(|e| e.log_likelihood.is_finite());
     known.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::residual::plants::{base, records};
+    use crate::terms::Bench;
+
+    /// Jets that tire as their plenum empties: the trace is at the jet, and below 0 while it blows for long.
+    #[test]
+    fn a_droop_is_traced_to_the_jet() {
+        let records = records(&["plenum-droop"], &[], 4);
+        let model = base(&records);
+        let bench = Bench::of(&model, &records).expect("records to learn from");
+        let judged = bench.judge.refitted(&bench.given).expect("a stable model");
+        let found = trace(&bench.judge, &judged, &bench.units).expect("a trace");
+        println!("{:?}", found.odds);
+        assert_eq!(found.place, Some(Place::Jet));
+        let mut blown = (0.0, 0.0);
+        for (traced, record) in found.records.iter().zip(&records) {
+            let jet = &traced.signals[0];
+            for ((t, w), half) in traced.t.iter().zip(&jet.value).zip(&jet.half) {
+                let k = (t / record.sample_period_s) as usize;
+                let long = k >= 600
+                    && record
+                        .u
+                        .get(k - 600..=k)
+                        .is_some_and(|u| u.iter().all(|u| *u > 0.5));
+                if long {
+                    blown.0 += w;
+                    blown.1 += half;
+                }
+            }
+        }
+        assert!(blown.1 > 0.0 && blown.0 < -blown.1, "{blown:?}");
+        let csv = found.csv();
+        let lines = 1 + found.records.iter().map(|r| r.t.len()).sum::<usize>();
+        assert_eq!(csv.lines().count(), lines);
+        assert!(
+            csv.lines().all(|line| line.matches(',').count() == 13),
+            "{csv}"
+        );
+    }
+}

@@ -193,3 +193,45 @@ impl Chance {
         self.best.get(at).copied().unwrap_or(0.0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn taken(pairs: &[(f64, f64)]) -> Vec<Taken> {
+        let each = pairs.iter().map(|(learned, held_out)| Taken {
+            learned: *learned,
+            held_out: *held_out,
+        });
+        each.collect()
+    }
+
+    /// One draw: of three points of a kind the two that take most where they are learned
+    /// count, as in a table; what the third would take on what is held out does not.
+    #[test]
+    fn only_points_that_a_table_keeps_can_be_the_best() {
+        let kind = |points: &[(f64, f64)]| -> Vec<(String, Vec<Taken>)> {
+            let each = points
+                .iter()
+                .map(|point| ("lag".to_owned(), taken(&[*point])));
+            each.collect()
+        };
+        let chance = Chance::of(kind(&[(3.0, 0.01), (2.0, 0.02), (1.0, 0.5)]));
+        assert_eq!(chance.best, [0.02]);
+        assert_eq!(chance.alternatives, 3);
+    }
+
+    #[test]
+    fn the_p_value_counts_the_searches_that_do_as_much() {
+        let best: Vec<f64> = (0..19).map(|i| 0.001 * f64::from(i)).collect();
+        let chance = Chance {
+            best,
+            alternatives: 7,
+        };
+        assert!((chance.p_value(0.5) - 0.05).abs() < 1e-12);
+        assert!((chance.p_value(0.0) - 1.0).abs() < 1e-12);
+        assert!((chance.p_value(0.0175) - 0.1).abs() < 1e-12);
+        assert!((chance.usual() - 0.018).abs() < 1e-12);
+        assert!(Chance::default().usual() == 0.0 && Chance::default().p_value(0.1) == 1.0);
+    }
+}

@@ -30,10 +30,10 @@
 //! |---|---|
 //! | [`steps`] | the way, step by step, with the results as data |
 //! | [`codegen`], [`design`], [`extend`] | what is done with a model |
-//! | [`diagnose`] | which effect is missing, and how sure that is |
+//! | [`diagnose`], [`power`] | which effect is missing, and how sure that is; how large one would have to be to be named |
 //! | [`discover`] | the term that is missing where no catalogue has it |
 //! | [`terms`] | one search over lags, the sensor's zero and effects |
-//! | [`experiment`], [`power`], [`residual`] | what would tell models apart, what would have been seen, where a model fails |
+//! | [`experiment`], [`residual`] | what would tell models apart, where a model fails |
 //! | [`identify`], [`delay`], [`excitation`] | what is done with recordings |
 //! | [`fit`], [`search`] | parameters by Levenberg–Marquardt on the free run, delays by mesh-adaptive direct search |
 //! | [`indicators`], [`simulate`], [`target`] | a model run over records, and judged |

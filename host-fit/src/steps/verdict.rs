@@ -59,7 +59,7 @@ fn quoted(diagnosis: &Diagnosis) -> String {
             ))
         ),
         None if diagnosis.tried > 0 => {
-            " The same records were chosen by: with four or more marked `validate`, some are kept back to quote on."
+            " The model was chosen by the same records; of four or more marked `validate`, some are kept back to quote on."
                 .to_owned()
         }
         None => String::new(),
@@ -154,7 +154,7 @@ fn finding(diagnosis: &Diagnosis) -> (String, String) {
                 .map(|r| r.p_value)
                 .fold(1.0, f64::min);
             meaning.push_str(&format!(
-                " Noise alone lets one of the {} alternatives do as much with p {} {}.",
+                " Noise alone would make one of {} alternatives do as much with p {} {}.",
                 diagnosis.alternatives,
                 if least > 1.0 / (TERMS.draws + 1) as f64 {
                     "="

@@ -11,6 +11,7 @@ mod automatic;
 mod bench;
 mod chance;
 mod evidence;
+mod exchange;
 mod folds;
 mod grid;
 mod judge;

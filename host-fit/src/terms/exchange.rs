@@ -1,0 +1,139 @@
+//! What the end of a search does: drops what is needless, and tries other terms in the place of what is left.
+
+use super::RULES;
+use super::evidence::{HeldOut, p_value};
+use super::screen::Screen;
+use super::search::{Hypothesis, Search, count_effects, score};
+use super::table::Table;
+use super::term::Term;
+use crate::fit::Fit;
+use crate::model::Model;
+use rayon::prelude::*;
+
+/// An effect added to a model, followed for a few steps.
+pub(crate) struct InPlace {
+    pub(crate) term: Term,
+    pub(crate) held_out: HeldOut,
+    fit: Fit,
+}
+
+impl Search<'_> {
+    /// Single terms in the place of one that was taken out, on the model without it, the
+    /// best first: of those `wanted` one of each kind, and of effects the leading ones.
+    pub(crate) fn in_place_of(
+        &self,
+        taken: &Term,
+        without: &Model,
+        wanted: impl Fn(&Term) -> bool,
+    ) -> Vec<InPlace> {
+        let Ok(judged) = self.judge.refitted(without) else {
+            return Vec::new();
+        };
+        let model = judged.model();
+        let Some(screen) = Screen::new(self.judge, model) else {
+            return Vec::new();
+        };
+        let table = Table::of(&screen, &self.known, true);
+        let kind = |term: &Term| term.with_lag(0).name();
+        let (mut met, mut effects) = (vec![kind(taken)], 0);
+        let leading: Vec<_> = table
+            .candidates
+            .iter()
+            .filter(|candidate| {
+                let kind = kind(&candidate.term);
+                if met.contains(&kind) || !wanted(&candidate.term) {
+                    return false;
+                }
+                met.push(kind);
+                let is_effect = candidate.term.effect().is_some();
+                effects += usize::from(is_effect);
+                !is_effect || effects <= RULES.in_its_place
+            })
+            .collect();
+        let tried = leading.into_par_iter().filter_map(|candidate| {
+            let proposal = screen.alone(&table, candidate)?;
+            let fit = self.set_out(model, &proposal, RULES.brief)?;
+            let held_out = self.judge.held_out(|_| &fit.model).ok()?;
+            let term = proposal.terms.into_iter().next()?;
+            Some(InPlace {
+                term,
+                held_out,
+                fit,
+            })
+        });
+        let mut tried: Vec<InPlace> = tried.collect();
+        let score = |other: &InPlace| score(other.held_out.rmse(), other.term.cost());
+        tried.sort_by(|a, b| score(a).total_cmp(&score(b)));
+        tried
+    }
+
+    /// A hypothesis with other terms in the place of its own, one by one, if it does
+    /// better so: terms of the base imitate effects and effects imitate those, and a
+    /// search that took the wrong one first does not come back.
+    pub(super) fn exchanged(&self, mut hypothesis: Hypothesis, root: &Hypothesis) -> Hypothesis {
+        if let [Term::Effect { .. }] = hypothesis.terms[..] {
+            // The first round compared all that could stand in its place.
+            return hypothesis;
+        }
+        let mut done: Vec<String> = Vec::new();
+        while let Some(index) = hypothesis
+            .terms
+            .iter()
+            .position(|term| !done.contains(&term.name()))
+            && self.effects
+            && !self.interrupted()
+        {
+            let term = &hypothesis.terms[index];
+            done.push(term.name());
+            let effects = count_effects(&hypothesis.terms);
+            let others = effects - count_effects(std::slice::from_ref(term));
+            let room = others < self.most_effects;
+            let wanted = |other: &Term| room || other.effect().is_none();
+            let without = term.taken_from(hypothesis.judged.model(), root.judged.model());
+            let best = self.in_place_of(term, &without, wanted).into_iter().next();
+            let near =
+                |other: &InPlace| other.held_out.rmse() < RULES.in_reach * hypothesis.judged.rmse();
+            let best = best.filter(near);
+            let other = best.and_then(|other| {
+                done.push(other.term.name());
+                let mut terms = hypothesis.terms.clone();
+                terms[index] = other.term;
+                self.finish(terms, other.fit)
+            });
+            let Some(other) = other else { continue };
+            // A further name says something only if no base does as well.
+            let needless = effects > 1 && count_effects(&other.terms) < effects;
+            let within = if needless { RULES.as_well } else { 0.0 };
+            if other.score() < hypothesis.score() + within {
+                let from_given = hypothesis.from_given;
+                let other = Hypothesis {
+                    from_given,
+                    ..other
+                };
+                hypothesis = self.pruned(other, root);
+            }
+        }
+        hypothesis
+    }
+
+    /// Drops what the other terms make needless.
+    pub(super) fn pruned(&self, mut hypothesis: Hypothesis, root: &Hypothesis) -> Hypothesis {
+        loop {
+            let without: Vec<Option<Hypothesis>> = (0..hypothesis.terms.len())
+                .into_par_iter()
+                .map(|index| self.without(&hypothesis, index, root))
+                .collect();
+            let needless = without.into_iter().flatten().filter(|lesser| {
+                let loss = (lesser.judged.rmse() / hypothesis.judged.rmse()).ln();
+                let cost = (hypothesis.cost() - lesser.cost()).max(RULES.head_start) as f64;
+                let p = p_value(&lesser.judged.held_out, &hypothesis.judged.held_out);
+                loss < RULES.price * cost || p > RULES.level
+            });
+            let by_score = |a: &Hypothesis, b: &Hypothesis| a.score().total_cmp(&b.score());
+            match needless.min_by(by_score) {
+                Some(lesser) if !self.interrupted() => hypothesis = lesser,
+                _ => return hypothesis,
+            }
+        }
+    }
+}

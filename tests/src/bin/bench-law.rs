@@ -17,6 +17,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 const PLANTS: u64 = 8;
+/// Nothing was chosen on these.
+const FIRST_SEED: u64 = 900;
 const SAMPLES: usize = 12_000;
 const JUDGED: usize = 3000;
 const TIMES: HoldTimes = HoldTimes { on: 10, off: 10 };
@@ -363,7 +365,7 @@ fn main() {
         (6.0, "Flows as slow as the paper's, 0.12-0.9 s"),
     ] {
         let benches: Vec<Bench> = (0..PLANTS)
-            .map(|seed| Bench::draw(100 + seed, slower))
+            .map(|seed| Bench::draw(FIRST_SEED + seed, slower))
             .collect();
         for level in [0.5, 0.8] {
             heading(&format!("{words}: held at {level} of steady blowing"));

@@ -264,7 +264,7 @@ fn heading(text: &str) {
 
 /// Every contender on every plant, held at a share of steady blowing.
 fn hold_closely(benches: &[Bench], level: f64) {
-    let rows: [(&str, Run); 10] = [
+    let rows: [(&str, Run); 11] = [
         ("steady blowing", |b, g| {
             Some(b.run(OpenLoop::steady(), g, g))
         }),
@@ -288,6 +288,9 @@ fn hold_closely(benches: &[Bench], level: f64) {
         }),
         ("  the least ripple at the relay's switches/s", |b, g| {
             Some(b.floor(g, b.relay(g).switches_per_s))
+        }),
+        ("the designed law at the PI's switches/s", |b, g| {
+            b.law(g, Some(b.tuned(g, false).switches_per_s), false)
         }),
     ];
     for (name, figures) in rows {

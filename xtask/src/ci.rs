@@ -100,11 +100,6 @@ const STEPS: &[Step] = &[
         crate::firmware::build("nucleo-f446re", "nucleo-pil", &[], None).map(|_| ())
     }),
     ("faults", || crate::faults::faults(&[])),
-    ("nucleo", || crate::nucleo::nucleo()),
-    // From an unknown rig to the law that knows what it hides, over a serial line.
-    ("rig-day", || {
-        crate::rig_day::rig_day(&["--brief".to_owned()])
-    }),
     // Links only without panics; runs the constants; checks the budgets.
     ("pil", crate::budgets::check),
     // The whole way: what the demo found is built for the board and runs there.

@@ -65,6 +65,9 @@ pub const fn smallest(values: &[f32]) -> f32 {
 pub const fn law(law: &Tracking<f32>) -> bool {
     let shares = [law.observer, law.bias_rate, law.integral_rate];
     let limits = [law.correction_limit, law.residual_limit, law.slope];
+    if !(law.settled > 0.0 && law.settled <= 1.0 && law.play >= 0.0 && law.play.is_finite()) {
+        return false;
+    }
     let mut i = 0;
     while i < shares.len() {
         if !(shares[i] >= 0.0 && shares[i] <= 1.0 && limits[i] >= 0.0 && limits[i].is_finite()) {
@@ -145,6 +148,8 @@ mod tests {
             observer: 0.1,
             bias_rate: 0.1,
             integral_rate: 0.0,
+            settled: 1.0,
+            play: 0.0,
             correction_limit: 0.3,
             residual_limit: 0.3,
         };

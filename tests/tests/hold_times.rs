@@ -105,6 +105,8 @@ proptest! {
             observer,
             bias_rate: 0.02,
             integral_rate: 0.01,
+            settled: 0.2,
+            play: 0.01,
             correction_limit: 0.5,
             residual_limit: 0.5,
         };

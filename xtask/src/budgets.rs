@@ -17,6 +17,8 @@ struct Budgets {
     stack_bytes: f64,
     board_flash_bytes: f64,
     instructions_per_step: BTreeMap<String, f64>,
+    /// Of single samples, for some cases.
+    most_instructions: BTreeMap<String, f64>,
 }
 
 /// The budget of all cases whose names begin so and that have none of their own.
@@ -66,13 +68,22 @@ fn exceeded(budgets: &Budgets, outcome: &Outcome, board: Size) -> Vec<String> {
         let limit = limits.get(case).or_else(of_all).copied();
         rows.push((case, *mean, limit));
     }
-    rows.into_iter()
+    let rows = rows
+        .into_iter()
         .filter_map(|(name, found, limit)| match limit {
             Some(limit) if found <= limit * (1.0 + budgets.tolerance) => None,
             Some(limit) => Some(format!("{name} {found:.0} of {limit:.0}")),
             None => Some(format!("{name} has no budget")),
-        })
-        .collect()
+        });
+    // Without tolerance: what does not fit into its sample does not fit.
+    let worst = budgets
+        .most_instructions
+        .iter()
+        .filter_map(|(case, limit)| {
+            let found = outcome.most.get(case).copied().unwrap_or(f64::INFINITY);
+            (found > *limit).then(|| format!("{case}'s worst sample {found:.0} of {limit:.0}"))
+        });
+    rows.chain(worst).collect()
 }
 
 #[cfg(test)]
@@ -90,6 +101,9 @@ mod tests {
             instructions_per_step: [("base", 10.0), (EFFECT, 20.0), ("effect_own", 30.0)]
                 .map(|(name, limit)| (name.to_owned(), limit))
                 .into(),
+            most_instructions: [("base", 20.0), ("law", 40.0)]
+                .map(|(name, limit)| (name.to_owned(), limit))
+                .into(),
         };
         let means = [
             ("base", 10.9),
@@ -99,6 +113,9 @@ mod tests {
         ];
         let outcome = Outcome {
             cases: means.map(|(name, mean)| (name.to_owned(), mean)).into(),
+            most: [("base", 20.0), ("law", 41.0)]
+                .map(|(name, most)| (name.to_owned(), most))
+                .into(),
             stack: 110.0,
             size: Size { flash: 111, ram: 5 },
         };
@@ -108,7 +125,8 @@ mod tests {
                 "flash_bytes 111 of 100",
                 "board_flash_bytes 112 of 100",
                 "effect_new 23 of 20",
-                "law has no budget"
+                "law has no budget",
+                "law's worst sample 41 of 40"
             ]
         );
     }

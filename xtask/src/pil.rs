@@ -21,6 +21,8 @@ pub(crate) const TASK: Task = Task {
 pub(crate) struct Outcome {
     /// Mean instructions of each case.
     pub(crate) cases: BTreeMap<String, f64>,
+    /// Most instructions of a sample of each case.
+    pub(crate) most: BTreeMap<String, f64>,
     /// Deepest stack, bytes.
     pub(crate) stack: f64,
     /// Flash and RAM.
@@ -33,6 +35,7 @@ pub(crate) struct Outcome {
 struct Report {
     stack_bytes: f64,
     instructions_per_step: BTreeMap<String, f64>,
+    most_instructions: BTreeMap<String, f64>,
 }
 
 pub(crate) fn pil(arguments: &[String]) -> Result<Outcome> {
@@ -76,6 +79,7 @@ pub(crate) fn pil(arguments: &[String]) -> Result<Outcome> {
     let report: Report = toml::from_str(&text).with_context(|| report.display().to_string())?;
     Ok(Outcome {
         cases: report.instructions_per_step,
+        most: report.most_instructions,
         stack: report.stack_bytes,
         size,
     })

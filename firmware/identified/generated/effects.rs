@@ -218,6 +218,8 @@ pub const LAW: Law = model_core::control::Tracking {
     observer: 0.0056497175,
     bias_rate: 0.0006382979,
     integral_rate: 0.0008510638,
+    play: 0.0,
+    settled: 1.0,
     correction_limit: 0.27418208,
     residual_limit: 0.9139403,
 };
@@ -234,5 +236,5 @@ const _: () = {
 /// What the law decides in its golden run, bit for bit, as the host computed it.
 pub const LAW_GOLDEN: GoldenLaw = GoldenLaw {
     samples: 4096,
-    expected: 0xccfd_f767,
+    expected: 0xba1a_d5af,
 };

@@ -189,6 +189,8 @@ pub const LAW: Law = model_core::control::Tracking {
     observer: 0.0054054055,
     bias_rate: 0.0006382979,
     integral_rate: 0.0008510638,
+    play: 0.0,
+    settled: 1.0,
     correction_limit: 0.31998372,
     residual_limit: 1.0666124,
 };
@@ -205,5 +207,5 @@ const _: () = {
 /// What the law decides in its golden run, bit for bit, as the host computed it.
 pub const LAW_GOLDEN: GoldenLaw = GoldenLaw {
     samples: 4096,
-    expected: 0xe05b_eb6b,
+    expected: 0x251b_faa8,
 };

@@ -82,12 +82,16 @@ fn tracking(law: &Track) -> TokenStream {
         observer,
         bias_rate,
         integral_rate,
+        play,
+        settled,
         correction_limit,
         residual_limit,
     ] = [
         law.observer,
         law.bias_rate,
         law.integral_rate,
+        law.play,
+        law.settled,
         law.correction_limit,
         law.residual_limit,
     ]
@@ -110,6 +114,8 @@ fn tracking(law: &Track) -> TokenStream {
             observer: #observer,
             bias_rate: #bias_rate,
             integral_rate: #integral_rate,
+            play: #play,
+            settled: #settled,
             correction_limit: #correction_limit,
             residual_limit: #residual_limit,
         };

@@ -53,6 +53,9 @@ pub(crate) struct Args {
     /// With `--calibrate`: how long steady flow is waited for, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 4.0, value_parser = positive, requires = "calibrate")]
     steady: f64,
+    /// With `--calibrate`: pulses of each length that is tried; fewer see short ones less surely.
+    #[arg(long, value_name = "COUNT", default_value_t = 24, value_parser = clap::value_parser!(u32).range(3..), requires = "calibrate")]
+    pulses: u32,
     /// Take note of a latched fault, or disarm the law, first.
     #[arg(long)]
     disarm: bool,
@@ -222,6 +225,7 @@ fn calibrate(
 ) -> anyhow::Result<()> {
     let plan = calibrate::Plan {
         steady_s: args.steady,
+        pulses: args.pulses,
         ..calibrate::Plan::default()
     };
     let bar = console.progress(0, "{spinner} {msg} ({elapsed})");

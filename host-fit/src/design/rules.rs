@@ -26,7 +26,7 @@ rules! {
     sure_pulse: u32 = 3, "samples", "theory 3.2: k − h advances by 0 to 2 a sample";
     /// The observer weighs the sensor's noise against a model that misses the flow by this: with less the estimate is the
     /// model's alone; with more it follows the noise …
-    model_error: f64 = 0.01, "share of what can be reached", "chosen on plants other than those of docs/law.md";
+    model_error: f64 = 0.005, "share of what can be reached", "chosen on plants other than those of docs/law.md";
     /// … of this size, averaged over 64 samples, where the rig has not been measured …
     usual_slow_noise: f64 = 0.025, "y", "a hot film: white 0.03, coloured 0.035 with 20 ms";
     /// … and corrects no more than this at once.
@@ -34,12 +34,18 @@ rules! {
     /// The bias of the estimate follows so much of a residual in a delay: slow, so that neither noise nor a wrong delay
     /// turns corrections into an oscillation …
     bias_in_a_delay: f64 = 0.03, "share of the residual", "chosen on the plants of docs/law.md";
+    /// … and is believed only where it leaves what is believed already by so many standard deviations of the noise in it …
+    play: f64 = 3.0, "standard deviations", "chosen on plants other than those of docs/law.md";
     /// … in a delay of at least this.
     bias_delay: u16 = 10, "samples", "judgement";
     /// The integral correction follows so much of an offset in a delay …
     integral_in_a_delay: f64 = 0.04, "share of the offset", "judgement";
     /// … of at least this.
     integral_delay: u16 = 20, "samples", "judgement";
+    /// While the bias stays the integral slows down until it lets through noise of this share of the ripple that cannot be avoided …
+    noise_beside_ripple: f64 = 0.2, "share of the ripple", "chosen on plants other than those of docs/law.md";
+    /// … but keeps this much of its rate: what drifts has to be followed.
+    least_settled: f64 = 0.1, "share of its rate", "judgement";
     /// Corrections go no further than this.
     correction: f64 = 0.3, "share of what can be reached", "judgement";
     /// Switches that may be saved up: with less than two pulses' worth a valve that has been open for long would have to

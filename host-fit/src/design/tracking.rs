@@ -153,11 +153,15 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
 
     let lead = shortest.max(1);
     let range = reachable.high - reachable.low;
+    // The noise's density where it is slow, y²·s.
+    let slow_noise = request.slow_noise.unwrap_or(RULES.usual_slow_noise);
+    let density = 64.0 * SAMPLE_PERIOD_S * slow_noise.powi(2);
     let observer = observer(
         time_constants(model, natural.friction, blown.friction),
-        request.slow_noise.unwrap_or(RULES.usual_slow_noise),
+        density,
         range,
     );
+    let bias_rate = RULES.bias_in_a_delay / f64::from(lead.max(RULES.bias_delay));
     let mut law = Track {
         reference: request.target,
         reachable: [reachable.low, reachable.high],
@@ -175,8 +179,10 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
             .saturating_add(half(hold))
             .saturating_add(3),
         observer,
-        bias_rate: RULES.bias_in_a_delay / f64::from(lead.max(RULES.bias_delay)),
+        bias_rate,
         integral_rate: RULES.integral_in_a_delay / f64::from(lead.max(RULES.integral_delay)),
+        play: RULES.play * passed(bias_rate, density),
+        settled: 1.0,
         correction_limit: RULES.correction * range,
         // A wild reading moves the estimate by the observer's share of the whole range.
         residual_limit: range,
@@ -206,6 +212,8 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
             }
         }
     }
+    let ripple = duty_of(&law)?.rms;
+    law.settled = settled(law.integral_rate, ripple, density);
     if let Some(allowed) = request.air
         && duty > allowed + RULES.air_margin
     {
@@ -234,15 +242,29 @@ fn equivalent_duty(model: &Model, reference: f64) -> f64 {
 
 /// The share of each residual that corrects the estimate: the stationary Kalman gain of a flow that forgets within its
 /// faster time constant τ and that the model misses by σ = `model_error` of the `range`. With
-/// q = 2σ²/τ, what pushes it away from the model, and S = 64 samples × (`slow_noise`)², the noise's density where
-/// it is slow, the estimate follows the sensor at √(1/τ² + q/S) − 1/τ per second.
-fn observer(time_constants_s: [f64; 2], slow_noise: f64, range: f64) -> f64 {
+/// q = 2σ²/τ, what pushes it away from the model, and S, the noise's `density`
+/// (y²·s), the estimate follows the sensor at √(1/τ² + q/S) − 1/τ per second.
+fn observer(time_constants_s: [f64; 2], density: f64, range: f64) -> f64 {
     let tau = time_constants_s[0].min(time_constants_s[1]);
     let pushed = 2.0 * (RULES.model_error * range).powi(2) / tau;
-    let density = 64.0 * SAMPLE_PERIOD_S * slow_noise.powi(2);
     let rate = (tau.powi(-2) + pushed / density).sqrt() - 1.0 / tau;
     // Without noise nothing is to be smoothed, and the rate is no number.
     (rate * SAMPLE_PERIOD_S).min(RULES.observer_most)
+}
+
+/// What a first-order filter of `rate` (1 per sample) lets through of noise of `density` (y²·s): √(S·g/2), y rms.
+fn passed(rate: f64, density: f64) -> f64 {
+    (density * rate / SAMPLE_PERIOD_S / 2.0).sqrt()
+}
+
+/// What is left of an integral `rate` (1 per sample) in the long run: it lets through noise of a given share of the
+/// `ripple` (y rms) that the valve's times enforce anyway.
+fn settled(rate: f64, ripple: f64, density: f64) -> f64 {
+    if density <= 0.0 {
+        return 1.0;
+    }
+    let share = RULES.noise_beside_ripple * ripple / passed(rate, density);
+    share.powi(2).clamp(RULES.least_settled, 1.0)
 }
 
 /// `law` with no more than `rate` switches per second, for a flow that takes `duty`.

@@ -477,6 +477,8 @@ mod tests {
             observer: 0.03,
             bias_rate: 0.002,
             integral_rate: 0.001,
+            settled: 0.5,
+            play: 0.01,
             correction_limit: 0.3,
             residual_limit: 0.25,
             lost: Vec::new(),

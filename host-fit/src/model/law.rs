@@ -57,6 +57,12 @@ pub struct Track {
     pub bias_rate: f64,
     /// Integral action, 1 per sample.
     pub integral_rate: f64,
+    /// How far the averaged prediction error may be from what is believed of it, y; files without it have 0.
+    #[serde(default)]
+    pub play: f64,
+    /// What is left of the integral's rate in the long run, above 0 and at most 1; files without it keep the whole.
+    #[serde(default = "whole")]
+    pub settled: f64,
     /// Limit of bias and integral, y.
     pub correction_limit: f64,
     /// Limit of a residual, y.
@@ -64,6 +70,10 @@ pub struct Track {
     /// Trials of the law in which attachment was lost: it was written all the same.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lost: Vec<String>,
+}
+
+fn whole() -> f64 {
+    1.0
 }
 
 /// A pulse train; times in samples.
@@ -110,6 +120,8 @@ impl Track {
             observer: number(self.observer),
             bias_rate: number(self.bias_rate),
             integral_rate: number(self.integral_rate),
+            play: number(self.play),
+            settled: number(self.settled),
             correction_limit: number(self.correction_limit),
             residual_limit: number(self.residual_limit),
         }
@@ -164,10 +176,14 @@ impl Law {
                 if let Some((key, _)) = shares.iter().find(|(_, x)| !(0.0..=1.0).contains(x)) {
                     return fault(key, "must lie between 0 and 1");
                 }
+                if !(law.settled > 0.0 && law.settled <= 1.0) {
+                    return fault("settled", "must be above 0 and at most 1");
+                }
                 let limits = [
                     ("correction_limit", law.correction_limit),
                     ("residual_limit", law.residual_limit),
                     ("slope", law.slope),
+                    ("play", law.play),
                 ];
                 if let Some((key, _)) = limits.iter().find(|(_, x)| !(x.is_finite() && *x >= 0.0)) {
                     return fault(key, "must be a finite number, 0 or above");

@@ -66,6 +66,15 @@ impl<T: Real> Foreknown<T> {
         }
     }
 
+    /// Takes in the past of the first sample; whether this was it.
+    pub(crate) fn begin(&mut self, recursion: &Bilinear<'_, T>, outputs: &impl Past<T>) -> bool {
+        let begins = !self.complete;
+        if begins {
+            self.advance(recursion, outputs);
+        }
+        begins
+    }
+
     /// Moves on to a new present sample, whose past is `outputs`.
     #[inline(always)]
     fn advance(&mut self, recursion: &Bilinear<'_, T>, outputs: &impl Past<T>) {

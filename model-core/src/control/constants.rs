@@ -31,6 +31,13 @@ pub struct Tracking<T> {
     pub bias_rate: T,
     /// Integral action, 1 per sample.
     pub integral_rate: T,
+    /// How far the averaged prediction error may be from what is believed of it, y: as far as noise alone carries it.
+    /// 0 believes every average.
+    pub play: T,
+    /// What is left of the integral's rate in the long run, above 0 and at most 1. It begins whole and falls as the
+    /// readings add up, as the gain of a Kalman filter does that knows a constant better and better, and begins
+    /// anew when the prediction error leaves its play or the reference changes; 1 keeps it.
+    pub settled: T,
     /// Neither bias nor integral corrects more than this, y.
     pub correction_limit: T,
     /// A residual counts as no more than this, y: one bad reading does no harm.

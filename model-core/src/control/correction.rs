@@ -1,6 +1,8 @@
 //! What makes a tracking law hold on a flow that is not its model: the error of
 //! predictions made a delay ago, low-pass filtered, is added to those made now
-//! (Smith's correction), and a slow integral removes what remains.
+//! (Smith's correction), and a slow integral removes what remains. Both stand still
+//! where what they see may be the sensor's noise: the bias follows its average only as
+//! far as the noise does not explain, and the integral slows down as long as it stays.
 
 use crate::control::constants::Tracking;
 use crate::history::{DelayLine, Memory, Past};
@@ -9,8 +11,10 @@ use crate::real::Real;
 /// Bias and integral of a law that predicts fewer than `A` samples ahead.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Correction<T, const A: usize> {
-    /// Filtered error of past predictions.
+    /// What of the filtered error of past predictions is believed.
     pub(crate) bias: T,
+    /// Filtered error of past predictions.
+    missed: T,
     pub(crate) integral: T,
     /// Consecutive samples without a reading, saturating.
     pub(crate) lost: u32,
@@ -18,6 +22,10 @@ pub(crate) struct Correction<T, const A: usize> {
     predictions: DelayLine<T, A>,
     /// Samples since the start, saturating.
     age: u32,
+    /// What is left of the integral's rate.
+    share: T,
+    /// The reference that it has been learning for.
+    reference: T,
 }
 
 impl<T: Real, const A: usize> Correction<T, A> {
@@ -25,10 +33,13 @@ impl<T: Real, const A: usize> Correction<T, A> {
     pub(crate) fn none() -> Self {
         Self {
             bias: T::ZERO,
+            missed: T::ZERO,
             integral: T::ZERO,
             lost: 0,
             predictions: DelayLine::new(),
             age: 0,
+            share: T::ONE,
+            reference: T::ZERO,
         }
     }
 
@@ -57,16 +68,34 @@ impl<T: Real, const A: usize> Correction<T, A> {
         }
         let flow = estimate + residual;
         let missed = flow - self.predictions.back(usize::from(law.lead));
-        let bias = self.bias + law.bias_rate * (missed - self.bias);
-        self.bias = limited(bias, law.correction_limit);
+        if reference != self.reference {
+            // A model is wrong by something else at another level.
+            self.reference = reference;
+            self.share = T::ONE;
+        }
+        let integral_rate = self.share * law.integral_rate;
+        let missed = self.missed + law.bias_rate * (missed - self.missed);
+        self.missed = limited(missed, law.correction_limit);
+        let bias = self
+            .bias
+            .at_least(self.missed - law.play)
+            .at_most(self.missed + law.play);
+        if bias != self.bias {
+            // The model errs by something else than it did: the integral has to learn again, too.
+            self.bias = bias;
+            self.share = T::ONE;
+        }
         // A valve that stands still and is already where the integral pushes it
         // can give no more: the integral waits.
         let error = reference - flow;
         let pushes_on = error > T::ZERO;
         let still = since >= 4 * u32::from(law.lead);
         if !(still && pushes_on == on) {
-            let integral = self.integral + law.integral_rate * error;
+            let integral = self.integral + integral_rate * error;
             self.integral = limited(integral, law.correction_limit);
+            // The Riccati equation of an offset that drifts: dg/dt = settled gain squared − g².
+            let falls = self.share * self.share - law.settled * law.settled;
+            self.share = self.share - law.integral_rate * falls;
         }
     }
 }
@@ -101,6 +130,8 @@ mod tests {
         observer: 0.0,
         bias_rate: 0.5,
         integral_rate: 0.01,
+        settled: 1.0,
+        play: 0.0,
         correction_limit: 0.3,
         residual_limit: 1.0,
     };
@@ -128,6 +159,43 @@ mod tests {
         // Too much flow, and the valve has long been closed; not so where it is open.
         assert_eq!(after(1000, 12, false).integral, 0.0);
         assert_eq!(after(1000, 12, true).integral, -0.3);
+    }
+
+    /// The share after so many samples of predictions that are wrong by `missed`, give or take a wobble of 0.01.
+    fn learnt(law: &Tracking<f64>, samples: u32, missed: f64) -> Correction<f64, 8> {
+        let mut correction = Correction::none();
+        for k in 0..samples {
+            let wobble = if k / 20 % 2 == 0 { 0.01 } else { -0.01 };
+            let residual = Some(missed + wobble);
+            correction.update(law, law.reference, 0.5, residual, 0.5, (true, 0));
+        }
+        correction
+    }
+
+    #[test]
+    fn what_noise_explains_moves_no_bias_and_slows_the_integral_to_its_share() {
+        let law = Tracking {
+            play: 0.02,
+            settled: 0.2,
+            ..LAW
+        };
+        let quiet = learnt(&law, 3000, 0.0);
+        assert_eq!(quiet.bias, 0.0);
+        // Riccati: towards the share that stays, and not below it.
+        assert!((quiet.share - 0.2).abs() < 0.005, "{}", quiet.share);
+        // A model that has become wrong is believed, but for the play, and the integral starts again.
+        let mut wrong = quiet;
+        for _ in 0..20 {
+            wrong.update(&law, law.reference, 0.6, Some(0.0), 0.5, (true, 0));
+        }
+        assert!((wrong.bias - 0.08).abs() < 1e-3, "{}", wrong.bias);
+        assert!(wrong.share > 0.8, "{}", wrong.share);
+        // Another reference does so too.
+        let mut other = quiet;
+        other.update(&law, 0.6, 0.6, Some(0.0), 0.6, (true, 0));
+        assert!(other.share > 0.98, "{}", other.share);
+        // Without play every average is believed.
+        assert!(learnt(&LAW, 3000, 0.0).bias != 0.0);
     }
 
     #[test]

@@ -99,10 +99,14 @@ impl<T: Real> Tracking<T> {
             ("correction_limit", self.correction_limit),
             ("residual_limit", self.residual_limit),
             ("slope", self.slope),
+            ("play", self.play),
         ] {
             if !(limit >= T::ZERO && limit.value() < f64::MAX) {
                 return Err(Unusable::Constant(name));
             }
+        }
+        if !(self.settled > T::ZERO && self.settled <= T::ONE) {
+            return Err(Unusable::Constant("settled"));
         }
         if self.lead == 0 {
             return Err(Unusable::Constant("lead"));
@@ -138,7 +142,7 @@ impl<T: Real> Tracking<T> {
         Ok(())
     }
 
-    /// One sample: decides the valve's position with all that is known, then
+    /// One sample: decides the valve's position with all that is known (at the first one nothing is: the valve stays shut), then
     /// takes in the reading. The reading of a sample therefore acts one sample
     /// later, and the decision does not wait for the converter.
     ///
@@ -160,9 +164,17 @@ impl<T: Real> Tracking<T> {
         let was_on = state.hold.is_on();
         let target = state.reference + state.correction.integral - state.correction.bias;
         let may_switch = state.hold.may_switch(&self.hold);
+        // At the first sample the past is summed up instead, as long a piece of work as looking ahead: nothing is decided.
+        let looks = !state
+            .foreknown
+            .begin(&model.recursion(), &state.model.outputs);
         // The position to judge: the other one, where the valve is free to take it.
-        let look = self.look_ahead(model, state, was_on != may_switch, channels);
-        let wanted = if !may_switch {
+        let look = if looks {
+            self.look_ahead(model, state, was_on != may_switch, channels)
+        } else {
+            Look::none(state.model.outputs.back(0))
+        };
+        let wanted = if !may_switch || !looks {
             was_on
         } else if was_on {
             look.foreseen <= target
@@ -230,11 +242,7 @@ impl<T: Real> Tracking<T> {
             channels,
         };
         let flow = state.model.outputs.back(0);
-        let mut look = Look {
-            foreseen: flow,
-            at_lead: flow,
-            delay: 0,
-        };
+        let mut look = Look::none(flow);
         let lead = usize::from(self.lead);
         let mut arrived_for = 0;
         ahead::run(
@@ -279,6 +287,17 @@ struct Look<T> {
     delay: u16,
 }
 
+impl<T: Copy> Look<T> {
+    /// No farther than the present `flow`.
+    fn none(flow: T) -> Self {
+        Self {
+            foreseen: flow,
+            at_lead: flow,
+            delay: 0,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -309,6 +328,8 @@ mod tests {
             observer: T::from_f64(0.1),
             bias_rate: T::from_f64(0.005),
             integral_rate: T::ZERO,
+            settled: T::ONE,
+            play: T::ZERO,
             correction_limit: T::from_f64(0.3),
             residual_limit: T::from_f64(0.15),
         }

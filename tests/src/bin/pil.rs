@@ -95,7 +95,7 @@ fn run(
     (per_tick, unit): (f64, &str),
 ) -> Result<String> {
     let started = Instant::now();
-    let mut means = BTreeMap::new();
+    let (mut means, mut most) = (BTreeMap::new(), BTreeMap::new());
     let (mut stack, mut base) = (0, None);
     println!(
         "{:<30} {:>6} {:>8} {:>6} {:>7} {:>7}  law, effects",
@@ -121,6 +121,7 @@ fn run(
         }
         stack = report.stack;
         means.insert(&case.name, mean);
+        most.insert(&case.name, f64::from(report.most) * per_tick);
     }
     println!(
         "link: {} bytes lost on purpose, {} requests repeated, none slipped; {:.1} s",
@@ -133,6 +134,10 @@ fn run(
     let mut text = format!("stack_bytes = {stack}\n\n[instructions_per_step]\n");
     for (name, mean) in means {
         text.push_str(&format!("{name} = {mean:.1}\n"));
+    }
+    text.push_str("\n[most_instructions]\n");
+    for (name, most) in most {
+        text.push_str(&format!("{name} = {most:.1}\n"));
     }
     Ok(text)
 }

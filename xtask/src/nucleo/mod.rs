@@ -39,7 +39,7 @@ const QUIET: Duration = Duration::from_millis(300);
 /// What a sample leaves the program for its line.
 const BETWEEN: Duration = Duration::from_millis(2);
 
-fn nucleo() -> Result<()> {
+pub(crate) fn nucleo() -> Result<()> {
     let elf = build("nucleo-f446re", "nucleo-f446re", &[], None)?;
     let mut board = Board::start(&elf)?;
     board.begin()?;

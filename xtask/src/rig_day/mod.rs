@@ -16,18 +16,56 @@ use std::time::Instant;
 
 pub(crate) const TASK: Task = Task {
     name: "rig-day",
-    does: "the whole circle at a simulated rig behind the board under QEMU: --short, --page writes docs/rig-day.md",
+    does: "the whole circle at a simulated rig behind the board under QEMU: --short, --brief (as CI), --page writes docs/rig-day.md",
     run: rig_day,
 };
 
 /// What the rig hides, and which rig it is.
 const HIDDEN: &str = "echo-path";
 const RIG: &str = "7";
-/// Commands of the bundled set: to identify on, and held out. The short form plays the first ones.
-const IDENTIFY: [&str; 5] = ["step", "sq4-50", "random-a", "sq8-50", "sq4-80"];
-const VALIDATE: [&str; 3] = ["sq2-30", "random-b", "sq8-80"];
-/// The one of them that the page shows.
-const SHOWN: &str = VALIDATE[0];
+/// How much is recorded and watched. Commands are those of the bundled set.
+struct Form {
+    /// To identify on.
+    identify: &'static [&'static str],
+    /// Held out; the page shows the first.
+    validate: &'static [&'static str],
+    /// Seconds of the commands that are played, the last of them shut.
+    period: &'static str,
+    repeats: &'static str,
+    /// More words for the calibration.
+    calibration: &'static [&'static str],
+    /// Of the law at work, and of it until the model is judged.
+    watched: [&'static str; 2],
+}
+
+const LONG: Form = Form {
+    identify: &["step", "sq4-50", "random-a", "sq8-50", "sq4-80"],
+    validate: &["sq2-30", "random-b", "sq8-80"],
+    period: "10",
+    repeats: "8",
+    calibration: &[],
+    watched: ["90", "30"],
+};
+/// The page's.
+const SHORT: Form = Form {
+    identify: &["step", "sq4-50", "random-a"],
+    validate: &["sq2-30", "random-b"],
+    repeats: "3",
+    watched: ["25", "10"],
+    ..LONG
+};
+/// As little as names the effect: CI's.
+const BRIEF: Form = Form {
+    identify: &["step", "random-a"],
+    validate: &["random-b"],
+    period: "5",
+    repeats: "2",
+    calibration: &["--steady", "1.5", "--pulses", "8"],
+    watched: ["12", "5"],
+};
+/// Where a command that is cut is shut for the rest: no bundled one has an edge shortly before.
+const CUT_MS: usize = 450;
+
 /// What the law is to hold.
 const TARGET: &str = "0.5";
 /// Of the noise floor that the held-out error may be at most.
@@ -43,24 +81,23 @@ struct Day {
 }
 
 pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
-    let (mut short, mut page) = (false, false);
+    let (mut form, mut page) = (&LONG, false);
     for argument in arguments {
         match argument.as_str() {
-            "--short" => short = true,
+            "--short" => form = &SHORT,
+            "--brief" => form = &BRIEF,
             "--page" => page = true,
-            other => bail!("unknown option {other}; there are --short and --page"),
+            other => bail!("unknown option {other}; there are --short, --brief and --page"),
         }
     }
-    let (repeats, seconds, learn) = if short {
-        ("3", "25", "10")
-    } else {
-        ("8", "90", "30")
-    };
-    let (identify, validate) = if short {
-        (&IDENTIFY[..3], &VALIDATE[..2])
-    } else {
-        (&IDENTIFY[..], &VALIDATE[..])
-    };
+    let Form {
+        identify,
+        validate,
+        period,
+        repeats,
+        calibration,
+        watched: [seconds, learn],
+    } = form;
     run(&mut cargo(&[
         "build",
         "--release",
@@ -80,25 +117,28 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         started: Instant::now(),
         times: Vec::new(),
     };
-    for name in identify.iter().chain(validate) {
+    for name in identify.iter().chain(*validate) {
         let file = format!("{name}.csv");
-        std::fs::copy(
-            root().join("data/hidden-ramp").join(&file),
-            day.folder.join("commands").join(&file),
-        )?;
+        let text = std::fs::read_to_string(root().join("data/hidden-ramp").join(&file))?;
+        let samples = 1000 * period.parse::<usize>()?;
+        std::fs::write(day.folder.join("commands").join(&file), cut(&text, samples))?;
     }
 
     day.say("## 1. What is this rig?\n\nThe board comes with the bundled firmware: it knows neither the rig nor a model of it. The rig is measured first.");
     day.firmware("first", None, false)?;
     day.fit(
         "calibrate",
-        &port("record", "first", &["--calibrate", "-o", "rig.toml"]),
+        &port(
+            "record",
+            "first",
+            &[&["--calibrate", "-o", "rig.toml"], *calibration].concat(),
+        ),
     )?;
 
     day.say("## 2. Recordings\n\nCommands are played, each from rest; the board streams every sample. The rig file says what its counts mean.");
     let commands: Vec<String> = identify
         .iter()
-        .chain(validate)
+        .chain(*validate)
         .map(|n| format!("--command=commands/{n}.csv"))
         .collect();
     let mut line = port(
@@ -108,11 +148,11 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
     );
     line.extend(commands);
     day.fit("record", &line)?;
-    let mut line = words(&["average", "--period", "10", "--out", "set"]);
+    let mut line = words(&["average", "--period", period, "--out", "set"]);
     line.extend(
         identify
             .iter()
-            .chain(validate)
+            .chain(*validate)
             .map(|n| format!("raw/{n}.csv")),
     );
     line.extend(validate.iter().map(|n| format!("--validate={n}")));
@@ -189,7 +229,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
     let effects = effects(&day.folder.join("better.toml"))?;
     for model in ["model", "better"] {
         let (model, run) = (format!("{model}.toml"), format!("{model}-run.csv"));
-        let record = format!("set/{SHOWN}.csv");
+        let record = format!("set/{}.csv", validate[0]);
         day.quietly(&words(&["simulate", &model, &record, "-o", &run]))?;
     }
 
@@ -278,7 +318,10 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         "the law did not become better: rms {before} before, {after} after"
     );
     if page {
-        std::fs::write(root().join("docs/rig-day.svg"), picture::draw(&day.folder)?)?;
+        std::fs::write(
+            root().join("docs/rig-day.svg"),
+            picture::draw(&day.folder, validate[0])?,
+        )?;
         std::fs::write(
             root().join("docs/rig-day.md"),
             format!("{HEAD}{}", day.page),
@@ -292,6 +335,24 @@ const HEAD: &str = "# A day at the rig\n\n\
 serial line between it and the program. With a board at a port it is `--port /dev/ttyACM0` instead of `--port qemu …`, and the\n\
 program is flashed (`firmware/README.md`). What is printed below is what the commands printed.\n\n\
 ![A held-out record and both models; the reading under both laws](rig-day.svg)\n\n";
+
+/// The first `samples` of a recording, with the valve shut at the end.
+fn cut(text: &str, samples: usize) -> String {
+    let mut lines = text.lines();
+    let mut cut = lines.next().unwrap_or_default().to_owned() + "\n";
+    let whole = text.lines().count() - 1;
+    for (k, line) in lines.take(samples).enumerate() {
+        match line.splitn(3, ',').collect::<Vec<_>>()[..] {
+            [t, _, rest] if samples < whole && k >= samples - CUT_MS => {
+                let _ = writeln!(cut, "{t},0,{rest}");
+            }
+            _ => {
+                let _ = writeln!(cut, "{line}");
+            }
+        }
+    }
+    cut
+}
 
 fn words(line: &[&str]) -> Vec<String> {
     line.iter().map(|word| (*word).to_owned()).collect()

@@ -1,7 +1,7 @@
 //! The page's picture: a held-out record beside both models, and the reading under
 //! both laws.
 
-use super::{SHOWN, TARGET};
+use super::TARGET;
 use anyhow::{Context, Result};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -16,7 +16,7 @@ const BEFORE: &str = "#D55E00";
 const AFTER: &str = "#0072B2";
 
 /// Draws the files of a day.
-pub(super) fn draw(folder: &Path) -> Result<String> {
+pub(super) fn draw(folder: &Path, shown: &str) -> Result<String> {
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"900\" height=\"{}\" viewBox=\"0 0 900 {0}\" role=\"img\" \
          font-family=\"Helvetica, Arial, sans-serif\">\n<title>A held-out record and both models; the reading under both \
@@ -25,12 +25,12 @@ pub(super) fn draw(folder: &Path) -> Result<String> {
     );
     let read = |file: &str, from: usize| means(&folder.join(file), from);
     let record = [
-        (read(&format!("set/{SHOWN}.csv"), 0)?, GREY),
+        (read(&format!("set/{shown}.csv"), 0)?, GREY),
         (read("model-run.csv", 0)?, BEFORE),
         (read("better-run.csv", 0)?, AFTER),
     ];
     let words = format!(
-        "{SHOWN}, held out, 4 s: measured (grey), the model before (orange) and after (blue) the effect was known"
+        "{shown}, held out, 4 s: measured (grey), the model before (orange) and after (blue) the effect was known"
     );
     panel(&mut svg, 0, &words, &record, None);
     for (i, (name, colour)) in [("before", BEFORE), ("after", AFTER)]

@@ -104,6 +104,11 @@ const STEPS: &[Step] = &[
     ("pil", crate::budgets::check),
     // The whole way: what the demo found is built for the board and runs there.
     ("demo on board", demo_on_board),
+    ("nucleo", || crate::nucleo::nucleo(&[])),
+    // The whole circle, unattended.
+    ("rig-day", || {
+        crate::rig_day::rig_day(&["--brief".to_owned()])
+    }),
 ];
 
 fn demo_on_board() -> Result<()> {

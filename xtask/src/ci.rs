@@ -104,7 +104,7 @@ const STEPS: &[Step] = &[
     ("pil", crate::budgets::check),
     // The whole way: what the demo found is built for the board and runs there.
     ("demo on board", demo_on_board),
-    ("nucleo", || crate::nucleo::nucleo(&[])),
+    ("nucleo", crate::nucleo::nucleo),
     // The whole circle, unattended.
     ("rig-day", || {
         crate::rig_day::rig_day(&["--brief".to_owned()])

@@ -31,7 +31,7 @@ pub(crate) struct Args {
     /// Most effects that are added one after the other.
     #[arg(long, value_name = "COUNT", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=12))]
     most_effects: u32,
-    /// Seed of the decoys.
+    /// Seed of the signs that stand for noise.
     #[arg(long, default_value_t = 0)]
     seed: u64,
     #[command(flatten)]

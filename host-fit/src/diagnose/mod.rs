@@ -55,7 +55,7 @@ pub enum DiagnoseError {
 pub struct Options {
     /// Most effects added one after the other.
     pub most_effects: usize,
-    /// Seed of the decoys.
+    /// Seed of the signs that stand for noise.
     pub seed: u64,
 }
 

@@ -4,6 +4,7 @@ use crate::data::Record;
 use crate::model::{Delay, Footprint, Model, Prepared, Rounding, Start};
 use crate::ring::Ring;
 use crate::rules;
+use model_core::effects::SLOW_WAKE;
 use model_core::model::{StateOf, observe};
 use model_core::{Input, Output, Parts, Real, State};
 use std::ops::ControlFlow;
@@ -213,7 +214,8 @@ impl<T: Real> Simulator<T> {
             return;
         };
         let window = self.prepared.averaging().window;
-        for _ in 0..self.memory.outputs.max(self.memory.jets) {
+        let full = self.memory.outputs.max(self.memory.jets);
+        for _ in 0..full.max(self.followed) {
             state.advance(T::from_f64(*y), window);
             self.observe(signals, state, channels, 0, *u);
         }
@@ -227,7 +229,13 @@ impl Model {
     pub fn warm_up(&self) -> usize {
         match self.start {
             Start::Rest => 0,
-            Start::Measured => self.longest_lag().max(self.longest_delay()) + 1,
+            Start::Measured => {
+                // Nobody knows the wake of a flow that was blown before: it has to fade.
+                let wake = self.effects.iter().find(|e| e.name == SLOW_WAKE.name);
+                let fades_s = wake.and_then(|e| e.parameters.first()).unwrap_or(&0.0);
+                let fades = (fades_s / self.sample_period_s).ceil() as usize;
+                self.longest_lag().max(self.longest_delay()).max(fades) + 1
+            }
         }
     }
 

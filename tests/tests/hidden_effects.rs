@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use firmware_sim::family::{Family, Units};
+use firmware_sim::family::{Family, Nuisance, Units};
 use scenarios::campaign::{Case, Given, Group, Program, Row, run};
 
 fn diagnosed(group: Group, family: Family, hidden: &[&str], seed: u64) -> Row {
@@ -52,6 +52,36 @@ fn bad_delays_in_the_given_model_are_no_missing_effect() {
 fn a_memory_of_the_flow_is_no_missing_effect() {
     let row = asked(&Case::new(Group::Nothing, Family::Memory1, &[], 713));
     is_found(&row);
+}
+
+/// What `identify` makes of the rig alone is at the noise floor: a wake that nobody saw begin, and a delay
+/// that shortens up to a level only.
+#[test]
+fn the_default_model_reaches_the_floor_in_mid_run_and_under_other_laws() {
+    let in_mid_run = Case {
+        nuisances: vec![Nuisance::MidRun],
+        ..Case::new(Group::Nothing, Family::Wake, &[], 2_026_200_179)
+    };
+    let saturating = Case::new(Group::Nothing, Family::RateOfY, &[], 3_131_200_114);
+    for case in [in_mid_run, saturating] {
+        let row = asked(&case);
+        assert_eq!(row.verdict, "nothing-missing", "{case}");
+        assert!(
+            row.given_over_floor.is_some_and(|over| over < 1.05),
+            "{row:?}"
+        );
+    }
+}
+
+/// In the first round the edges' delay comes with a valve's lag at the end of its range, which hides it.
+#[test]
+fn what_was_added_with_a_stand_in_stays_without_it() {
+    let row = asked(&Case {
+        nuisances: vec![Nuisance::Offset],
+        ..Case::new(Group::Nothing, Family::RateOfY, &[], 2_026_200_144)
+    });
+    assert_eq!(row.missing, ["edge-dependent-delay"]);
+    assert!(row.is_at_floor(), "{:?}", row.over_floor);
 }
 
 #[test]

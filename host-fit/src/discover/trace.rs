@@ -114,7 +114,8 @@ struct Explained {
     change: Vec<f64>,
 }
 
-/// The trace of what `judged` lacks; `None` where its free run diverges.
+/// The trace of what `judged` lacks; `None` where its free run diverges, or no place
+/// could be traced.
 pub(super) fn trace(judge: &Judge, judged: &Judged, units: &Units) -> Option<Trace> {
     let model = judged.model();
     let records = judge.first_fold();
@@ -127,12 +128,13 @@ pub(super) fn trace(judge: &Judge, judged: &Judged, units: &Units) -> Option<Tra
         })
         .collect::<Option<_>>()?;
     let knots: Vec<Vec<f64>> = records.iter().map(|r| knots(model, r)).collect();
+    let free = judge.free(model);
     let entries: Vec<Option<(Vec<Part>, Explained)>> = TRACED
         .into_par_iter()
         .map(|entry| {
             let parts: Option<Vec<Part>> = (0..records.len())
                 .into_par_iter()
-                .map(|i| Part::of(entry, model, records[i], &errors[i], &knots[i]))
+                .map(|i| Part::of(entry, model, &free, records[i], &errors[i], &knots[i]))
                 .collect();
             let parts = parts?;
             let energy: f64 = errors.iter().map(|e| dot(e, e)).sum();
@@ -141,11 +143,8 @@ pub(super) fn trace(judge: &Judge, judged: &Judged, units: &Units) -> Option<Tra
             Some((parts, explained))
         })
         .collect();
-    let best = entries
-        .iter()
-        .flatten()
-        .map(|(_, e)| e.log_likelihood)
-        .fold(f64::MIN, f64::max);
+    let traced = entries.iter().flatten();
+    let best = traced.map(|(_, e)| e.log_likelihood).reduce(f64::max)?;
     let weight = |entry: &Option<(Vec<Part>, Explained)>| {
         entry
             .as_ref()
@@ -230,6 +229,7 @@ impl Part {
     fn of(
         entry: Entry,
         model: &Model,
+        free: &[usize],
         record: &Record,
         error: &[f64],
         knots: &[f64],
@@ -243,13 +243,7 @@ impl Part {
             let indices: Vec<usize> = (0..coordinates.len()).filter(own).collect();
             columns.extend(sensitivities(&with, record, &indices)?.1);
         }
-        let coordinates = model.coordinates();
-        let moves = |i: &usize| {
-            let fixed = coordinates[*i].parameter().is_some_and(|p| p.low >= p.high);
-            !fixed && (*i > 0 || model.constant != 0.0)
-        };
-        let indices: Vec<usize> = (0..coordinates.len()).filter(moves).collect();
-        let own = sensitivities(model, record, &indices)?.1;
+        let own = sensitivities(model, record, free)?.1;
         let products = |a: &[Vec<f64>], b: &[Vec<f64>]| -> Vec<f64> {
             let cells = a.iter().flat_map(|a| b.iter().map(move |b| dot(a, b)));
             cells.collect()

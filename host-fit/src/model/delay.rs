@@ -100,6 +100,16 @@ impl Delay {
         }
     }
 
+    /// Whether another follows the same law.
+    #[must_use]
+    pub fn is_alike(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Fixed { .. }, Self::Fixed { .. }) => true,
+            (Self::Law(own), Self::Law(other)) => own.spec.name == other.spec.name,
+            _ => false,
+        }
+    }
+
     /// The name of the law in the catalogue of effects; none if base models have it.
     #[must_use]
     pub fn effect_name(&self) -> Option<&'static str> {

@@ -4,11 +4,18 @@
 use super::bench::Bench;
 use super::judge::{Judge, Judged};
 use super::search::{Hypothesis, Search};
+use super::term::take_delay_law;
 use super::{Known, RULES};
 use crate::data::Record;
 use crate::model::{Delay, Model};
 use crate::simulate::SimulateError;
-use std::sync::atomic::AtomicBool;
+use model_core::effects::SaturatingDelay;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// From which level of y on, in inner units, a delay is tried as that of the attached flow …
+const LEVEL: f64 = 0.6;
+/// … and by how many samples at least it differs from that at rest.
+const LEAST_RISE: f64 = 4.0;
 
 /// A base model and what its search took.
 #[derive(Clone, Debug)]
@@ -59,25 +66,47 @@ pub fn base_model(
         delay: law.clone(),
         ..given.clone()
     };
-    let mut best: Option<(f64, Hypothesis)> = None;
+    let mut roots: Vec<Hypothesis> = Vec::new();
     let mut refused = None;
     for law in laws {
         progress("the leanest model");
         match search.root(&with_law(law), mid_run) {
-            Ok(root) => {
-                let parameters = root.judged.model().coordinates().len() as f64;
-                let score = root.judged.rmse().ln() + RULES.price * parameters;
-                if best.as_ref().is_none_or(|(least, _)| score < *least) {
-                    best = Some((score, root));
-                }
-            }
+            Ok(root) => roots.push(root),
             Err(error) => refused = Some(error),
         }
     }
-    let Some((_, root)) = best else {
+    let by_score = |a: &&Hypothesis, b: &&Hypothesis| score(&a.judged).total_cmp(&score(&b.judged));
+    let Some(root) = roots.iter().min_by(by_score) else {
         return refused.map(Err);
     };
-    let found = search.run(root, || None);
+    let mut found = search.run(root.clone(), || None);
+    // With the lags that were found another law may do better than the one that was chosen without them.
+    let mut others: Vec<Delay> = roots
+        .iter()
+        .map(|root| root.judged.model().delay.clone())
+        .collect();
+    if laws.len() > 1 {
+        others.push(saturating(found.best.judged.model()));
+    }
+    for law in &others {
+        let mut model = found.best.judged.model().clone();
+        if model.delay.is_alike(law) || interrupt.load(Ordering::Relaxed) {
+            continue;
+        }
+        take_delay_law(&mut model, law);
+        let Ok(judged) = judge.refitted(&model) else {
+            continue;
+        };
+        if score(&judged) < score(&found.best.judged) {
+            let start = Hypothesis {
+                terms: found.best.terms.clone(),
+                ..Hypothesis::new(judged)
+            };
+            let tried = found.tried;
+            found = search.run(start, || None);
+            found.tried += tried;
+        }
+    }
     let judged = if always {
         found.best.judged
     } else {
@@ -87,6 +116,20 @@ pub fn base_model(
         model: units.model_out(&judge.final_fit(&judged).model),
         tried: found.tried,
     }))
+}
+
+/// The law that ends at a level, about as the law of `model` is.
+fn saturating(model: &Model) -> Delay {
+    let at = |level: f64| model.delay.present(level, model.sample_period_s);
+    let rise = at(0.0) - at(LEVEL);
+    let rise = if rise.abs() < 1.0 { LEAST_RISE } else { rise };
+    let parameters = [at(0.0) - rise, rise, LEVEL, 0.0];
+    Delay::of::<SaturatingDelay<f64>>(&parameters, model.delay.factors(), true)
+}
+
+/// ln of the held-out error, and the price of all parameters: models with several laws are compared so.
+fn score(judged: &Judged) -> f64 {
+    judged.rmse().ln() + RULES.price * judged.model().coordinates().len() as f64
 }
 
 /// The model with its delays rounded to samples, as eq. (4) has them, if the held-out

@@ -6,7 +6,7 @@ use super::screen::Screen;
 use super::search::{Hypothesis, Search, count_effects, score};
 use super::table::Table;
 use super::term::Term;
-use crate::fit::Fit;
+use crate::fit::{Fit, FitOptions, fit};
 use crate::model::Model;
 use rayon::prelude::*;
 
@@ -34,13 +34,12 @@ impl Search<'_> {
             return Vec::new();
         };
         let table = Table::of(&screen, &self.known, true);
-        let kind = |term: &Term| term.with_lag(0).name();
-        let (mut met, mut effects) = (vec![kind(taken)], 0);
+        let (mut met, mut effects) = (vec![taken.kind()], 0);
         let leading: Vec<_> = table
             .candidates
             .iter()
             .filter(|candidate| {
-                let kind = kind(&candidate.term);
+                let kind = candidate.term.kind();
                 if met.contains(&kind) || !wanted(&candidate.term) {
                     return false;
                 }
@@ -84,6 +83,7 @@ impl Search<'_> {
             && !self.interrupted()
         {
             let term = &hypothesis.terms[index];
+            (self.progress)(&format!("what could stand in the place of {}", term.name()));
             done.push(term.name());
             let effects = count_effects(&hypothesis.terms);
             let others = effects - count_effects(std::slice::from_ref(term));
@@ -98,7 +98,7 @@ impl Search<'_> {
                 done.push(other.term.name());
                 let mut terms = hypothesis.terms.clone();
                 terms[index] = other.term;
-                self.finish(terms, other.fit)
+                self.finish(terms, other.fit, hypothesis.terms.len())
             });
             let Some(other) = other else { continue };
             // A further name says something only if no base does as well.
@@ -116,24 +116,58 @@ impl Search<'_> {
         hypothesis
     }
 
-    /// Drops what the other terms make needless.
+    /// Drops what the other terms make needless. What is needed beside more terms is needed
+    /// beside fewer, and is not asked again.
     pub(super) fn pruned(&self, mut hypothesis: Hypothesis, root: &Hypothesis) -> Hypothesis {
-        loop {
-            let without: Vec<Option<Hypothesis>> = (0..hypothesis.terms.len())
-                .into_par_iter()
-                .map(|index| self.without(&hypothesis, index, root))
+        let mut open: Vec<usize> = (0..hypothesis.terms.len()).collect();
+        while !open.is_empty() && !self.interrupted() {
+            let without: Vec<Option<(usize, Hypothesis)>> = open
+                .par_iter()
+                .map(|index| Some((*index, self.as_well_without(&hypothesis, *index, root)?)))
                 .collect();
-            let needless = without.into_iter().flatten().filter(|lesser| {
-                let loss = (lesser.judged.rmse() / hypothesis.judged.rmse()).ln();
-                let cost = (hypothesis.cost() - lesser.cost()).max(RULES.head_start) as f64;
-                let p = p_value(&lesser.judged.held_out, &hypothesis.judged.held_out);
-                loss < RULES.price * cost || p > RULES.level
-            });
-            let by_score = |a: &Hypothesis, b: &Hypothesis| a.score().total_cmp(&b.score());
-            match needless.min_by(by_score) {
-                Some(lesser) if !self.interrupted() => hypothesis = lesser,
-                _ => return hypothesis,
-            }
+            let needless: Vec<(usize, Hypothesis)> = without.into_iter().flatten().collect();
+            open = needless.iter().map(|(index, _)| *index).collect();
+            let by_score = |a: &(usize, Hypothesis), b: &(usize, Hypothesis)| {
+                a.1.score().total_cmp(&b.1.score())
+            };
+            let Some((dropped, lesser)) = needless.into_iter().min_by(by_score) else {
+                break;
+            };
+            hypothesis = lesser;
+            open.retain(|index| *index != dropped);
+            let moved = open.iter_mut().filter(|index| **index > dropped);
+            moved.for_each(|index| *index -= 1);
         }
+        hypothesis
+    }
+
+    /// The hypothesis refitted without one of its terms, if that is needless.
+    fn as_well_without(
+        &self,
+        hypothesis: &Hypothesis,
+        index: usize,
+        root: &Hypothesis,
+    ) -> Option<Hypothesis> {
+        let own = hypothesis.judged.rmse();
+        let price = |cost: usize| RULES.price * cost.max(RULES.head_start) as f64;
+        let cost = hypothesis.terms[index].cost();
+        // A few steps tell what is far from needless.
+        let model =
+            hypothesis.terms[index].taken_from(hypothesis.judged.model(), root.judged.model());
+        let options = FitOptions {
+            iterations: RULES.brief,
+            ..self.judge.options_for(&model)
+        };
+        let brief = fit(&model, &self.judge.learning(0), &options).ok()?;
+        let after = self.judge.held_out(|_| &brief.model).ok()?;
+        if (after.rmse() / own).ln() > RULES.far_from_needless * price(cost)
+            && p_value(&after, &hypothesis.judged.held_out) <= RULES.level
+        {
+            return None;
+        }
+        let lesser = self.less(hypothesis, index, &brief.model)?;
+        let p = p_value(&lesser.judged.held_out, &hypothesis.judged.held_out);
+        let loss = (lesser.judged.rmse() / own).ln();
+        (loss < price(cost) || p > RULES.level).then_some(lesser)
     }
 }

@@ -138,6 +138,17 @@ impl Judge {
         }
     }
 
+    /// Places of the coordinates of `model` that a fit moves.
+    pub(crate) fn free(&self, model: &Model) -> Vec<usize> {
+        let constant = self.options_for(model).constant;
+        let coordinates = model.coordinates();
+        let moves = |i: &usize| {
+            let fixed = coordinates[*i].parameter().is_some_and(|p| p.low >= p.high);
+            !fixed && (*i > 0 || constant)
+        };
+        (0..coordinates.len()).filter(moves).collect()
+    }
+
     /// y − y_sim from a sample on; a run that diverges is far off everywhere.
     fn error(model: &Model, record: &Record, from: usize) -> Result<Vec<f64>, SimulateError> {
         let from = from.max(model.warm_up());

@@ -21,7 +21,7 @@ rules! {
     /// Rounds of screening and refitting.
     rounds: usize = 6, "", "two effects and two memories take three";
     /// Rounds without a gain that end the search.
-    patience: usize = 3, "rounds", "judgement";
+    patience: usize = 2, "rounds", "judgement: for the time it takes";
     /// Proposals with effects that are refitted per model …
     with_effects: usize = 5, "", "the truth was within the first three on 80 rigs of six families";
     /// … and proposals without.
@@ -38,6 +38,8 @@ rules! {
     as_well: f64 = 0.01, "share of the rms error", "a lag of the film and a second lag of the flow are one model where the delay is fixed, and the second costs a parameter more";
     /// Steps that every proposal is followed for.
     brief: usize = 6, "iterations", "fewer leave thresholds where they were";
+    /// What costs this many times its price after those steps without it is needed.
+    far_from_needless: f64 = 5.0, "times the price", "judgement: the steps that follow take half of the loss at most";
     /// Level of the tests.
     level: f64 = 0.05, "p-value", "convention";
     /// The base that effects have to beat must have been given this many more parameters than they have.

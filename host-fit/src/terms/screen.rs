@@ -13,7 +13,6 @@
 
 use super::RULES;
 use super::judge::Judge;
-use super::table::Table;
 use super::term::Term;
 use crate::data::Record;
 use crate::fit::{channel_reference, sensitivities};
@@ -33,24 +32,6 @@ pub(crate) struct Tangent {
     pub(crate) held_out: f64,
     /// What they change in the free run, as far as the model itself cannot.
     pub(crate) direction: Vec<f64>,
-}
-
-/// What a change of the model shows in the free run, on what is held out.
-#[derive(Clone, Debug)]
-pub(crate) struct Shown {
-    /// Energy of the error.
-    pub(crate) error: f64,
-    /// What is left of the change beside ever more terms without a name; first, beside none.
-    pub(crate) beside: Vec<Left>,
-}
-
-/// What is left of a change.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Left {
-    /// Its energy.
-    pub(crate) energy: f64,
-    /// Standard deviation of it times the error.
-    pub(crate) deviation: f64,
 }
 
 /// A fitted model, ready to be asked what a change would do.
@@ -86,13 +67,7 @@ impl<'a> Screen<'a> {
             .collect();
         let samples: usize = records.iter().map(|r| r.len()).sum();
         let stride = samples.div_ceil(RULES.longest_series).max(1);
-        let constant = judge.options_for(model).constant;
-        let coordinates = model.coordinates();
-        let moves = |(index, coordinate): (usize, &crate::model::Coordinate)| {
-            let fixed = coordinate.parameter().is_some_and(|p| p.low >= p.high);
-            (!fixed && (index > 0 || constant)).then_some(index)
-        };
-        let indices: Vec<usize> = coordinates.iter().enumerate().filter_map(moves).collect();
+        let indices = judge.free(model);
         let each: Option<Vec<_>> = records
             .par_iter()
             .map(|record| sensitivities(model, record, &indices))
@@ -160,6 +135,11 @@ impl<'a> Screen<'a> {
         blocks
     }
 
+    /// How many of the records are learned from.
+    pub(super) fn learning(&self) -> usize {
+        self.judge.folds[0].learning.len()
+    }
+
     /// Records that are learned from, then those that are judged.
     pub(crate) fn records(&self) -> &[&'a Record] {
         &self.records
@@ -172,8 +152,13 @@ impl<'a> Screen<'a> {
 
     /// Judged samples of all records, joined and averaged over neighbours.
     pub(super) fn joined<'s>(&self, series: impl Iterator<Item = &'s [f64]>) -> Vec<f64> {
+        self.joined_from(0, series)
+    }
+
+    /// The same of the records from one on.
+    fn joined_from<'s>(&self, first: usize, series: impl Iterator<Item = &'s [f64]>) -> Vec<f64> {
         let mut all = Vec::new();
-        for (series, from) in series.zip(&self.from) {
+        for (series, from) in series.zip(&self.from[first..]) {
             let judged = series.get(*from..).unwrap_or(&[]).chunks_exact(self.stride);
             all.extend(judged.map(|chunk| chunk.iter().sum::<f64>() / self.stride as f64));
         }
@@ -213,27 +198,36 @@ impl<'a> Screen<'a> {
         dot(&column[..self.learned], &column[..self.learned])
     }
 
-    /// Takes away what the model's own parameters can do, to first order.
-    pub(super) fn residualise(&self, column: &mut [f64]) {
-        for direction in &self.basis {
+    /// Takes away what the model's own parameters can do, to first order, and says how much of each
+    /// direction that was: of a column that ends with what is learned from, the rest has to lose as much.
+    pub(super) fn residualise(&self, column: &mut [f64]) -> Vec<f64> {
+        let taken = self.basis.iter().map(|direction| {
             let along = dot(&direction[..self.learned], &column[..self.learned]);
             let pairs = column.iter_mut().zip(direction);
             pairs.for_each(|(x, d)| *x -= along * d);
-        }
+            along
+        });
+        taken.collect()
     }
 
     /// What another model changes in the free run; `None` if it diverges.
     pub(super) fn change(&self, other: &Model) -> Option<Vec<f64>> {
-        let changes: Option<Vec<Vec<f64>>> = self
-            .records
+        self.change_on(0..self.records.len(), other)
+    }
+
+    /// The same on some of the records.
+    pub(super) fn change_on(&self, which: Range<usize>, other: &Model) -> Option<Vec<f64>> {
+        let pairs = self.records[which.clone()]
             .iter()
-            .zip(&self.runs)
+            .zip(&self.runs[which.clone()]);
+        let changes: Option<Vec<Vec<f64>>> = pairs
             .map(|(record, run)| {
                 let own = other.free_run(record).ok()?;
                 Some(own.iter().zip(run).map(|(a, b)| a - b).collect())
             })
             .collect();
-        let joined = self.joined(changes?.iter().map(Vec::as_slice));
+        let changes = changes?;
+        let joined = self.joined_from(which.start, changes.iter().map(Vec::as_slice));
         joined.iter().all(|x| x.is_finite()).then_some(joined)
     }
 
@@ -272,7 +266,7 @@ impl<'a> Screen<'a> {
     }
 
     /// What columns fitted to a series leave of it.
-    fn rest_of(&self, series: &[f64], columns: &[&[f64]]) -> Option<Vec<f64>> {
+    pub(super) fn rest_of(&self, series: &[f64], columns: &[&[f64]]) -> Option<Vec<f64>> {
         let scale = self.coefficients(series, columns, 0.0)?;
         Some(less(series, columns, &scale))
     }
@@ -337,55 +331,6 @@ impl<'a> Screen<'a> {
             held_out: 1.0 - held_out,
             direction,
         })
-    }
-
-    /// What `other` changes that this model's own parameters cannot do in its place, nor up to `most`
-    /// columns of `unnamed`, the best first; `block` samples of the error are independent of the next.
-    /// `None` if it diverges or changes nothing.
-    pub(crate) fn shown(
-        &self,
-        unnamed: &Table,
-        other: &Model,
-        block: usize,
-        most: usize,
-    ) -> Option<Shown> {
-        let mut change = self.change(other)?;
-        self.residualise(&mut change);
-        let blocks: Vec<Range<usize>> = self.blocks(block);
-        let left = |series: &[f64]| {
-            let held_out = &series[self.learned..];
-            let judged = blocks.iter().filter(|block| block.start >= self.learned);
-            let each = judged.map(|b| dot(&series[b.clone()], &self.error[b.clone()]).powi(2));
-            Left {
-                energy: dot(held_out, held_out),
-                deviation: each.sum::<f64>().sqrt(),
-            }
-        };
-        let held_out = &self.error[self.learned..];
-        let mut shown = Shown {
-            error: dot(held_out, held_out),
-            beside: vec![left(&change)],
-        };
-        let mut rest = change.clone();
-        let mut chosen: Vec<&[f64]> = Vec::new();
-        while chosen.len() < most {
-            let takes = |column: &&Vec<f64>| {
-                let (own, rest) = (&column[..self.learned], &rest[..self.learned]);
-                dot(own, rest).powi(2) / dot(own, own).max(f64::MIN_POSITIVE)
-            };
-            let best = unnamed
-                .columns
-                .iter()
-                .max_by(|a, b| takes(a).total_cmp(&takes(b)));
-            let Some(best) = best else { break };
-            chosen.push(best);
-            let Some(less) = self.rest_of(&change, &chosen) else {
-                break;
-            };
-            rest = less;
-            shown.beside.push(left(&rest));
-        }
-        (shown.beside.last()?.energy > 0.0).then_some(shown)
     }
 
     /// Whether an effect cannot be tried here, and why.

@@ -240,7 +240,9 @@ impl Search<'_> {
             }
             let mut finished = self.refitted(&all, &pool);
             finished.extend(self.regraded(&finished));
-            all.extend(finished);
+            for hypothesis in finished {
+                keep(&mut all, hypothesis);
+            }
             let after = all[best(&all, |_| true)].score();
             if after > before - RULES.price {
                 stalled += 1;
@@ -260,6 +262,7 @@ impl Search<'_> {
         let bare = if bare_end == end {
             found.clone()
         } else {
+            (self.progress)("the same for the best without effects");
             self.pruned(all[bare_end].clone(), &root)
         };
         let found = self.exchanged(found, &root);
@@ -366,14 +369,17 @@ impl Search<'_> {
             .collect();
         let mut brief: Vec<(f64, usize, Fit)> = brief.into_iter().flatten().collect();
         brief.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // One without effects is among those that are followed to the end.
+        // One without effects is among those that are followed to the end; what ends as another does is not.
         let mut leading: Vec<(usize, Fit)> = Vec::new();
-        let mut has_bare = false;
+        let (mut has_bare, mut met): (bool, Vec<Vec<Term>>) = (false, Vec::new());
         for (_, at, fit) in brief {
             let (index, proposal) = &pool[at];
             let bare = all[*index].is_bare() && count_effects(&proposal.terms) == 0;
-            if leading.len() < RULES.finished || (bare && !has_bare) {
+            let terms = [all[*index].terms.clone(), proposal.terms.clone()].concat();
+            let again = met.iter().any(|other| Term::are_alike(other, &terms));
+            if !again && (leading.len() < RULES.finished || (bare && !has_bare)) {
                 has_bare |= bare;
+                met.push(terms);
                 leading.push((at, fit));
             }
         }
@@ -383,7 +389,7 @@ impl Search<'_> {
                 let (index, proposal) = &pool[at];
                 let terms = [all[*index].terms.clone(), proposal.terms.clone()].concat();
                 let from_given = all[*index].from_given;
-                let finished = self.finish(terms, fit)?;
+                let finished = self.finish(terms, fit, all[*index].terms.len() + 1)?;
                 Some(Hypothesis {
                     from_given,
                     ..finished
@@ -423,9 +429,9 @@ impl Search<'_> {
             return None;
         }
         let graded = |term: &Term| term.with_grading(least.model.grading);
-        let terms = leader.terms.iter().map(graded).collect();
-        let from_given = leader.from_given;
-        let finished = self.finish(terms, least)?;
+        let terms: Vec<Term> = leader.terms.iter().map(graded).collect();
+        let (from_given, count) = (leader.from_given, terms.len());
+        let finished = self.finish(terms, least, count)?;
         Some(Hypothesis {
             from_given,
             ..finished
@@ -481,19 +487,36 @@ impl Search<'_> {
     }
 
     /// A fit followed to the end: lags and fixed delays where they leave least, all
-    /// folds fitted and judged.
-    pub(crate) fn finish(&self, mut terms: Vec<Term>, brief: Fit) -> Option<Hypothesis> {
+    /// folds fitted and judged. Effects that are bent as far as they can be are left out,
+    /// as what they were added with may be right all the same; `None` if fewer than
+    /// `least` terms stay.
+    pub(crate) fn finish(
+        &self,
+        mut terms: Vec<Term>,
+        brief: Fit,
+        least: usize,
+    ) -> Option<Hypothesis> {
         let learning = self.judge.learning(0);
         let options = self.judge.options_for(&brief.model);
         let fitted = fit(&brief.model, &learning, &options).ok()?;
         let fitted = self.settle_lags(fitted, &mut terms);
         let fitted = settle_fixed_delay(fitted, &learning, &options).ok()?;
-        if at_a_bound(&fitted.model, &terms) {
+        let end = &fitted.model;
+        let (bent, kept): (Vec<Term>, Vec<Term>) =
+            terms.into_iter().partition(|term| at_a_bound(end, term));
+        if kept.len() < least {
             return None;
+        }
+        if !bent.is_empty() {
+            let rest = bent
+                .iter()
+                .fold(end.clone(), |m, term| term.taken_from(&m, end));
+            let options = self.judge.options_for(&rest);
+            return self.finish(kept, fit(&rest, &learning, &options).ok()?, least);
         }
         let judged = self.judge.judged_from(fitted).ok()?;
         Some(Hypothesis {
-            terms,
+            terms: kept,
             ..Hypothesis::new(judged)
         })
     }
@@ -559,12 +582,23 @@ impl Search<'_> {
         index: usize,
         root: &Hypothesis,
     ) -> Option<Hypothesis> {
-        let mut terms = hypothesis.terms.clone();
-        let term = terms.remove(index);
+        let term = &hypothesis.terms[index];
         let model = term.taken_from(hypothesis.judged.model(), root.judged.model());
+        self.less(hypothesis, index, &model)
+    }
+
+    /// The same from `model`, which is without the term.
+    pub(super) fn less(
+        &self,
+        hypothesis: &Hypothesis,
+        index: usize,
+        model: &Model,
+    ) -> Option<Hypothesis> {
+        let mut terms = hypothesis.terms.clone();
+        terms.remove(index);
         Some(Hypothesis {
             terms,
-            judged: self.judge.refitted(&model).ok()?,
+            judged: self.judge.refitted(model).ok()?,
             expanded: true,
             from_given: hypothesis.from_given,
         })
@@ -573,20 +607,35 @@ impl Search<'_> {
 
 /// Whether an effect was bent as far as its card lets it: it stands in for something
 /// else then. Delay laws are exempt: levels that y hardly visits leave them open.
-fn at_a_bound(model: &Model, terms: &[Term]) -> bool {
-    terms.iter().filter_map(Term::effect).any(|spec| {
-        let added = model.effects.iter().find(|added| added.name == spec.name);
-        let values = added.map_or(&[][..], |added| &added.parameters);
-        values.iter().zip(spec.parameters).any(|(value, card)| {
-            let place = |x: f64| if card.is_logarithmic() { x.ln() } else { x };
-            let (low, high) = (place(card.low), place(card.high));
-            let near = RULES.bound * (high - low);
-            // An amplitude may be small.
-            let low_end = card.is_logarithmic() || card.low != 0.0;
-            let at_low = low_end && place(*value) < low + near;
-            card.low < card.high && (place(*value) > high - near || at_low)
-        })
+fn at_a_bound(model: &Model, term: &Term) -> bool {
+    let Some(spec) = term.effect() else {
+        return false;
+    };
+    let added = model.effects.iter().find(|added| added.name == spec.name);
+    let values = added.map_or(&[][..], |added| &added.parameters);
+    values.iter().zip(spec.parameters).any(|(value, card)| {
+        let place = |x: f64| if card.is_logarithmic() { x.ln() } else { x };
+        let (low, high) = (place(card.low), place(card.high));
+        let near = RULES.bound * (high - low);
+        // An amplitude may be small.
+        let low_end = card.is_logarithmic() || card.low != 0.0;
+        let at_low = low_end && place(*value) < low + near;
+        card.low < card.high && (place(*value) > high - near || at_low)
     })
+}
+
+/// Adds a hypothesis, or puts it in the place of one that it is alike but for its error.
+fn keep(all: &mut Vec<Hypothesis>, mut hypothesis: Hypothesis) {
+    let alike = |other: &&mut Hypothesis| Term::are_alike(&other.terms, &hypothesis.terms);
+    let Some(other) = all.iter_mut().find(alike) else {
+        all.push(hypothesis);
+        return;
+    };
+    if hypothesis.score() < other.score() {
+        // What follows from it was looked at, unless it has become another model.
+        hypothesis.expanded = other.expanded && hypothesis.score() > other.score() - RULES.price;
+        *other = hypothesis;
+    }
 }
 
 /// What the key of a term looks like.

@@ -29,6 +29,21 @@ pub struct Candidate {
     pub(super) columns: Vec<usize>,
 }
 
+/// An effect as it was screened.
+struct Rated {
+    term: Term,
+    /// The model with it.
+    with: Model,
+    /// What it changes, as far as the model itself cannot, at least where it is learned.
+    column: Vec<f64>,
+    /// How much of each direction that the model can follow was taken away.
+    along: Vec<f64>,
+    /// How many times that fits the error best.
+    scale: f64,
+    /// Share of the error energy that it takes where it was learned.
+    learned: f64,
+}
+
 /// Everything that could be added, and its changes to the free run.
 pub struct Table {
     /// The candidates, the best held-out share first.
@@ -154,14 +169,18 @@ impl Screen<'_> {
 
     /// Changes by a slow wake, per pull.
     fn wakes(&self) -> Vec<(Term, Vec<f64>)> {
-        // Nobody knows the wake of a flow that was blown before.
-        let present = self.model.has_effect(SLOW_WAKE.name);
-        if present || self.model.start == Start::Measured {
+        if self.model.has_effect(SLOW_WAKE.name) {
             return Vec::new();
         }
         let changes = RULES.wakes_s.into_par_iter().filter_map(|time_constant| {
             let term = Term::Wake(time_constant);
             let mut column = self.change(&term.added_to(self.model, &[RULES.slope]))?;
+            if self.model.start == Start::Measured {
+                // With a wake, free runs follow the measurement for longer, which is no merit of it.
+                let followed = self.change(&term.added_to(self.model, &[0.0]))?;
+                let pairs = column.iter_mut().zip(followed);
+                pairs.for_each(|(x, y)| *x -= y);
+            }
             column.iter_mut().for_each(|x| *x /= RULES.slope);
             self.residualise(&mut column);
             Some((term, column))
@@ -287,42 +306,71 @@ impl Screen<'_> {
         term
     }
 
-    /// Effects with what they change, best first; those that make no sense left out. What each
-    /// takes of noise alone is added to `by_chance`.
+    /// Effects with what they change where it is learned, best first; those that make no sense left out.
+    /// What each takes of noise alone is added to `by_chance`; for that, and only for that, every
+    /// free run goes over what is held out too.
     fn rated(
         &self,
         terms: Vec<Term>,
         noise: Option<&Noise>,
         by_chance: &mut Vec<(String, Vec<Taken>)>,
-    ) -> Vec<(Candidate, Vec<f64>)> {
+    ) -> Vec<Rated> {
         let rated = terms.into_par_iter().map(|term| {
-            let mut column = self.change(&term.added_to(self.model, &[]))?;
+            let with = term.added_to(self.model, &[]);
+            let mut column = match noise {
+                Some(_) => self.change(&with)?,
+                None => self.change_on(0..self.learning(), &with)?,
+            };
             let before = self.learned_square(&column);
-            self.residualise(&mut column);
+            let along = self.residualise(&mut column);
             let after = self.learned_square(&column);
             let shows = after > 1e-10 * before && after > 0.0;
-            let (scale, learned, held_out) = self.regress(&[&column]).filter(|_| shows)?;
+            let (scale, learned, _) = self.regress(&[&column]).filter(|_| shows)?;
             let makes_sense = |scale: f64| Self::is_feasible(&term, scale);
             let taken = noise.map(|noise| noise.taken(self, &column, makes_sense));
             let feasible = makes_sense(scale[0]);
-            let candidate = Candidate {
+            let rated = Rated {
                 learned: 1.0 - learned,
-                held_out: 1.0 - held_out,
-                columns: Vec::new(),
+                scale: scale[0],
+                column,
+                along,
+                with,
                 term,
             };
-            Some((candidate, column, feasible, taken))
+            Some((rated, feasible, taken))
         });
         let all: Vec<_> = rated.collect();
         let mut rated = Vec::new();
-        for (candidate, column, feasible, taken) in all.into_iter().flatten() {
-            by_chance.extend(taken.map(|taken| (candidate.term.name(), taken)));
+        for (one, feasible, taken) in all.into_iter().flatten() {
+            by_chance.extend(taken.map(|taken| (one.term.name(), taken)));
             if feasible {
-                rated.push((candidate, column));
+                rated.push(one);
             }
         }
-        rated.sort_by(|a, b| b.0.learned.total_cmp(&a.0.learned));
+        rated.sort_by(|a, b| b.learned.total_cmp(&a.learned));
         rated
+    }
+
+    /// A rated effect with what it changes on what is held out; `None` if it diverges there.
+    fn held_out(&self, rated: Rated) -> Option<(Candidate, Vec<f64>)> {
+        let mut changed = rated.column;
+        if changed.len() < self.error.len() {
+            let mut others = self.change_on(self.learning()..self.records.len(), &rated.with)?;
+            for (direction, along) in self.basis.iter().zip(&rated.along) {
+                let pairs = others.iter_mut().zip(&direction[self.learned..]);
+                pairs.for_each(|(x, d)| *x -= along * d);
+            }
+            changed.append(&mut others);
+        }
+        let (error, own) = (&self.error[self.learned..], &changed[self.learned..]);
+        let gain = rated.scale * (2.0 * dot(own, error) - rated.scale * dot(own, own));
+        let candidate = Candidate {
+            learned: rated.learned,
+            held_out: gain / dot(error, error).max(f64::MIN_POSITIVE),
+            columns: Vec::new(),
+            term: rated.term,
+        };
+        Some((candidate, changed))
     }
 
     fn effect_candidates(
@@ -355,10 +403,10 @@ impl Screen<'_> {
         if self.judge.on_off && !has_jet_effect(self.model) {
             let mut met: Vec<&str> = Vec::new();
             let mut others = Vec::new();
-            for (candidate, _) in &rated {
+            for one in &rated {
                 let Term::Effect {
                     spec, parameters, ..
-                } = &candidate.term
+                } = &one.term
                 else {
                     continue;
                 };
@@ -373,18 +421,22 @@ impl Screen<'_> {
                 others.extend(gradings.map(|g| with_grading(spec, parameters.clone(), g)));
             }
             rated.extend(self.rated(others, noise, &mut by_chance));
-            rated.sort_by(|a, b| b.0.learned.total_cmp(&a.0.learned));
+            rated.sort_by(|a, b| b.learned.total_cmp(&a.learned));
         }
         let mut met = Vec::new();
+        rated.retain(|one| {
+            let key = one.term.key();
+            let first = met.iter().filter(|m| **m == key).count() < RULES.kept_points;
+            met.push(key);
+            first
+        });
+        let judged = rated.into_par_iter().map(|one| self.held_out(one));
+        let judged: Vec<Option<_>> = judged.collect();
         let mut kept = Vec::new();
-        for (mut candidate, column) in rated {
-            let key = candidate.term.key();
-            if met.iter().filter(|m| **m == key).count() < RULES.kept_points {
-                met.push(key);
-                candidate.columns = vec![columns.len()];
-                columns.push(column);
-                kept.push(candidate);
-            }
+        for (mut candidate, column) in judged.into_iter().flatten() {
+            candidate.columns = vec![columns.len()];
+            columns.push(column);
+            kept.push(candidate);
         }
         (kept, Chance::of(by_chance))
     }

@@ -167,6 +167,31 @@ impl Term {
         }
     }
 
+    /// What sort of term it is: its name, wherever its lag is.
+    #[must_use]
+    pub fn kind(&self) -> String {
+        self.with_lag(0).name()
+    }
+
+    /// Whether two lists of terms make the same model once it is fitted, for lags settle.
+    #[must_use]
+    pub(super) fn are_alike(one: &[Self], other: &[Self]) -> bool {
+        let sorted = |terms: &[Self]| {
+            let mut all: Vec<(String, u16)> = terms
+                .iter()
+                .map(|term| (term.kind(), term.lag().unwrap_or(0)))
+                .collect();
+            all.sort();
+            all
+        };
+        let (one, other) = (sorted(one), sorted(other));
+        one.len() == other.len()
+            && one
+                .iter()
+                .zip(&other)
+                .all(|(a, b)| a.0 == b.0 && usize::from(a.1.abs_diff(b.1)) <= RULES.lags_apart)
+    }
+
     fn reads_states(&self) -> bool {
         matches!(self, Self::Memory(_) | Self::State(_))
     }
@@ -239,12 +264,7 @@ impl Term {
         let mut model = model.clone();
         match self {
             Self::Effect { spec, .. } if spec.place == Place::Delay => {
-                // The base's law about where this one was: it may have been fitted
-                // beside quite other terms.
-                let level = |delay: &Delay| delay.present(RULES.middle, base.sample_period_s);
-                let later = level(&model.delay) - level(&base.delay);
-                model.delay = base.delay.clone();
-                model.delay_later(later);
+                take_delay_law(&mut model, &base.delay);
             }
             Self::Effect { spec, .. } => model.effects.retain(|e| e.name != spec.name),
             Self::Offset => model.effects.retain(|e| e.name != ZERO_OFFSET.name),
@@ -293,6 +313,15 @@ impl Term {
         shift(&mut model.product_lags, self.reads_products())?;
         Some(model)
     }
+}
+
+/// Gives a model another's delay law, about where its own was: the other may have been fitted
+/// beside quite other terms.
+pub(super) fn take_delay_law(model: &mut Model, law: &Delay) {
+    let level = |delay: &Delay| delay.present(RULES.middle, model.sample_period_s);
+    let later = level(&model.delay) - level(law);
+    model.delay = law.clone();
+    model.delay_later(later);
 }
 
 /// The newest lag, and the one before.
@@ -408,6 +437,22 @@ mod tests {
             assert_ne!(with, model, "{term:?}");
             assert_eq!(with.coordinates().len(), with.values().len());
             assert_eq!(term.taken_from(&with, &model), model, "{term:?}");
+        }
+    }
+
+    #[test]
+    fn lists_with_lags_that_settle_are_alike() {
+        let one = [Term::Memory(200), Term::Product(60), Term::Offset];
+        assert!(Term::are_alike(
+            &one,
+            &[Term::Offset, Term::Memory(212), Term::Product(55)]
+        ));
+        for other in [
+            vec![Term::Memory(200), Term::Product(60)],
+            vec![Term::Memory(200), Term::Product(90), Term::Offset],
+            vec![Term::State(200), Term::Product(60), Term::Offset],
+        ] {
+            assert!(!Term::are_alike(&one, &other), "{other:?}");
         }
     }
 

@@ -22,6 +22,7 @@ pub mod level_rate;
 pub mod plenum_droop;
 pub mod quadratic_drag;
 pub mod rectifying_sensor;
+pub mod saturating_delay;
 pub mod sensor_saturation;
 pub mod slow_wake;
 pub mod starting_vortex;
@@ -176,6 +177,7 @@ macro_rules! catalogue {
 delay_laws! {
     constant_delay::ConstantDelay,
     state_dependent_delay::StateDependentDelay,
+    saturating_delay::SaturatingDelay,
     edge_dependent_delay::EdgeDependentDelay,
 }
 
@@ -319,7 +321,13 @@ mod tests {
         names.retain(|name| !lacking.contains(name));
         assert_eq!(
             names,
-            ["level-rate", "slow-wake", "zero-offset", "constant-delay"],
+            [
+                "level-rate",
+                "slow-wake",
+                "zero-offset",
+                "constant-delay",
+                "saturating-delay"
+            ],
             "of base models"
         );
         assert!(spec("constant-delay").is_none() && law("constant-delay").is_some());

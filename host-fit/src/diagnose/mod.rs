@@ -79,7 +79,9 @@ pub fn diagnose(
     interrupt: &AtomicBool,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis, DiagnoseError> {
-    let (chosen_by, kept) = quoted::kept_back(records);
+    let Some((chosen_by, kept)) = quoted::kept_back(records) else {
+        return chosen(given, records, options, interrupt, progress);
+    };
     let diagnosis = chosen(given, &chosen_by, options, interrupt, progress)?;
     let quoted = Quoted::of(given, &diagnosis.model, &kept);
     Ok(Diagnosis {

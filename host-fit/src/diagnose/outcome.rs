@@ -28,6 +28,7 @@ pub(super) struct Conclusion {
     /// The model that is handed over, inner units.
     pub(super) model: Hypothesis,
     pub(super) effects: Vec<&'static Spec>,
+    pub(super) p_value: Option<f64>,
 }
 
 /// Held-out error after adding effects.
@@ -85,7 +86,7 @@ pub struct Ranked {
     pub p_value: f64,
     /// By how much noise alone lets the best of all effects lower the held-out error in one
     /// case of twenty, %.
-    pub best_decoy_percent: f64,
+    pub by_chance_percent: f64,
     /// Fitted parameters by name.
     pub parameters: BTreeMap<String, ParameterEstimate>,
     /// Candidates that the held-out records cannot tell from it.
@@ -149,6 +150,9 @@ pub struct Diagnosis {
     pub not_tried: Vec<NotTried>,
     /// The experiment for effects that the data cannot tell apart.
     pub separation: Option<Separation>,
+    /// p-value of the whole search by which the effects were named or stand in; none where none are, or where
+    /// they do only as well as lags, with fewer parameters.
+    pub p_value: Option<f64>,
     /// The final model.
     pub model: Model,
     /// The base model that effects were added to.

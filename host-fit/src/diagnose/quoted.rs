@@ -19,30 +19,29 @@ pub struct Quoted {
     pub noise_rmse: Option<f64>,
 }
 
-/// Records to choose by, and `validate` records that are kept back to quote on: every third, if there are
-/// enough of them.
-pub(super) fn kept_back(records: &[Record]) -> (Vec<Record>, Vec<Record>) {
+/// Records to choose by, and every third `validate` record, kept back to quote on; `None` where there are
+/// too few of them.
+pub(super) fn kept_back(records: &[Record]) -> Option<(Vec<Record>, Vec<Record>)> {
     let held_out = records.iter().filter(|r| r.role == Use::Validate).count();
+    if held_out < RULES.enough_to_quote {
+        return None;
+    }
     let (mut chosen_by, mut kept) = (Vec::new(), Vec::new());
     let mut met = 0;
     for record in records {
         met += usize::from(record.role == Use::Validate);
-        let third = record.role == Use::Validate && met % 3 == 0;
-        if third && held_out >= RULES.enough_to_quote {
+        if record.role == Use::Validate && met % 3 == 0 {
             kept.push(record.clone());
         } else {
             chosen_by.push(record.clone());
         }
     }
-    (chosen_by, kept)
+    Some((chosen_by, kept))
 }
 
 impl Quoted {
-    /// What both models do on `kept`; `None` of no records, or where one diverges.
+    /// What both models do on `kept`; `None` where one diverges.
     pub(super) fn of(given: &Model, last: &Model, kept: &[Record]) -> Option<Self> {
-        if kept.is_empty() {
-            return None;
-        }
         let (before, after) = (score(given, kept).ok()?.0, score(last, kept).ok()?.0);
         Some(Self {
             records: kept.iter().map(|record| record.name.clone()).collect(),
@@ -73,9 +72,10 @@ mod tests {
         let names = |records: &[Record]| -> Vec<String> {
             records.iter().map(|r| r.name.clone()).collect()
         };
-        let (chosen_by, kept) = kept_back(&set(3));
-        assert_eq!((chosen_by.len(), kept.len()), (4, 0));
-        let (chosen_by, kept) = kept_back(&set(6));
+        assert!(kept_back(&set(3)).is_none());
+        let (_, kept) = kept_back(&set(4)).expect("enough to quote on");
+        assert_eq!(names(&kept), ["c"]);
+        let (chosen_by, kept) = kept_back(&set(6)).expect("enough to quote on");
         assert_eq!(names(&kept), ["c", "f"]);
         assert_eq!(names(&chosen_by), ["own", "a", "b", "d", "e"]);
     }

@@ -98,7 +98,8 @@ fn refitted(
             let brief =
                 search.set_out(context.judged.model(), &proposal, crate::terms::RULES.brief)?;
             let terms = [context.terms.clone(), proposal.terms].concat();
-            Some(search.finish(terms, brief)?.judged)
+            let count = terms.len();
+            Some(search.finish(terms, brief, count)?.judged)
         },
     )
 }
@@ -174,7 +175,7 @@ pub(super) fn ranked(units: &Units, before: f64, rivals: &[Rival], chance: &Chan
                 validate_rmse: after * units.y,
                 error_reduction_percent: 100.0 * gain,
                 p_value: p,
-                best_decoy_percent: 100.0 * by_chance,
+                by_chance_percent: 100.0 * by_chance,
                 parameters: rival
                     .judged
                     .as_ref()

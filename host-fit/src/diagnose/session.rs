@@ -71,6 +71,7 @@ impl Session<'_> {
             verdict,
             model: last,
             effects,
+            p_value,
         } = self.conclusion(&found, as_given);
         (search.progress)("what else it could be");
         let mut context = last.clone();
@@ -162,6 +163,7 @@ impl Session<'_> {
             parameters,
             not_tried: not_tried(search, found.root.judged.model()),
             separation,
+            p_value,
             base: units.model_out(&judge.final_fit(&found.bare.judged).model),
             model,
         }

@@ -61,6 +61,7 @@ impl Session<'_> {
             parameters: BTreeMap::new(),
             not_tried: not_tried(self.search, given_inside),
             separation: None,
+            p_value: None,
             model: given.clone(),
             base: given.clone(),
         })
@@ -125,9 +126,9 @@ impl Session<'_> {
             .any(|place| place.explained_fraction > RULES.depends)
     }
 
-    /// Whether effects have earned to be named or to stand in: they beat what lags can
-    /// do, or do as well with fewer parameters.
-    fn earned(&self, best: &Hypothesis, bare: &Hypothesis) -> bool {
+    /// How effects have earned to be named or to stand in: they beat what lags can
+    /// do, or do as well with fewer parameters. `None` if they have not.
+    fn earned(&self, best: &Hypothesis, bare: &Hypothesis) -> Option<Earned> {
         let (with, without) = (best.judged.rmse(), bare.judged.rmse());
         let scatter = self.judge().noise_source == NoiseSource::Scatter;
         let in_the_dark = scatter && self.fits(&bare.judged);
@@ -138,19 +139,25 @@ impl Session<'_> {
         };
         // What is at the floor has nothing to gain.
         let open = self.judge().over_noise(without) > TERMS.at_the_floor;
-        let better = open && with < (1.0 - worthwhile) * without && {
+        if self.judge().drifts_more(&best.judged, &bare.judged) {
+            return None;
+        }
+        if open && with < (1.0 - worthwhile) * without {
             // The best of so many alternatives is often good by chance. Where the base
             // errs far beyond what scatters from sample to sample, records are few and
             // short as a rule: one test for each effect has to do.
-            let p = p_value(&bare.judged.held_out, &best.judged.held_out);
-            match scatter && !in_the_dark {
-                true => p * (best.judged.model().candidates().count() as f64) < RULES.level,
-                false => self.by_chance(best, bare) <= RULES.level_of_search,
+            let (p, level) = if scatter && !in_the_dark {
+                let one = p_value(&bare.judged.held_out, &best.judged.held_out);
+                let effects = best.judged.model().candidates().count();
+                (f64::min(one * effects as f64, 1.0), RULES.level)
+            } else {
+                (self.by_chance(best, bare), RULES.level_of_search)
+            };
+            if p <= level {
+                return Some(Earned { p_value: Some(p) });
             }
-        };
-        let leaner = is_leaner(best, bare);
-        let drifts = self.judge().drifts_more(&best.judged, &bare.judged);
-        (better || (leaner && !scatter)) && !drifts
+        }
+        (is_leaner(best, bare) && !scatter).then_some(Earned { p_value: None })
     }
 
     /// How often noise alone, as `best` leaves it, lets one of all effects lower the error of `bare` as far
@@ -208,21 +215,24 @@ impl Session<'_> {
         let (best, bare) = (&pared, &found.bare);
         let effects: Vec<&'static Spec> = best.terms.iter().filter_map(Term::effect).collect();
         let judge = self.judge();
-        let of = |verdict: Verdict, model: &Hypothesis, effects: Vec<&'static Spec>| Conclusion {
-            verdict,
-            model: model.clone(),
-            effects,
-        };
-        let of_bare = if self.fits(&bare.judged) {
-            Verdict::NothingMissing
-        } else {
-            Verdict::Unexplained
+        let of_bare = || Conclusion {
+            verdict: if self.fits(&bare.judged) {
+                Verdict::NothingMissing
+            } else {
+                Verdict::Unexplained
+            },
+            model: bare.clone(),
+            effects: Vec::new(),
+            p_value: None,
         };
         // Effects on a base that is worse than what was given explain nothing.
         let no_better = best.judged.rmse() >= as_given.rmse();
-        if effects.is_empty() || no_better || !self.earned(best, bare) {
-            return of(of_bare, bare, Vec::new());
+        if effects.is_empty() || no_better {
+            return of_bare();
         }
+        let Some(earned) = self.earned(best, bare) else {
+            return of_bare();
+        };
         let left = judge.excess(&best.judged.held_out)
             / judge.excess(&bare.judged.held_out).max(f64::MIN_POSITIVE);
         let taken = 1.0 - left;
@@ -235,15 +245,27 @@ impl Session<'_> {
         };
         let leaner = is_leaner(best, bare);
         let known = judge.noise_source != NoiseSource::Scatter;
-        match () {
-            // Near a known floor anything fits that takes a little.
-            () if taken < RULES.stands_in && !(fits && (leaner || !known)) => {
-                of(of_bare, bare, Vec::new())
-            }
-            () if fits || explained => of(Verdict::EffectMissing, best, effects),
-            () => of(Verdict::PartlyExplained, best, effects),
+        // Near a known floor anything fits that takes a little.
+        if taken < RULES.stands_in && !(fits && (leaner || !known)) {
+            return of_bare();
+        }
+        Conclusion {
+            verdict: if fits || explained {
+                Verdict::EffectMissing
+            } else {
+                Verdict::PartlyExplained
+            },
+            model: best.clone(),
+            effects,
+            p_value: earned.p_value,
         }
     }
+}
+
+/// That effects have earned to be named.
+struct Earned {
+    /// p-value of the search; none where they are only leaner.
+    p_value: Option<f64>,
 }
 
 /// Whether effects do as well as what lags can do, with fewer parameters.

@@ -148,21 +148,18 @@ fn finding(diagnosis: &Diagnosis) -> (String, String) {
                 significant(first, 3),
                 significant(last, 3)
             );
-            let least = diagnosis
-                .ranking
-                .iter()
-                .map(|r| r.p_value)
-                .fold(1.0, f64::min);
-            meaning.push_str(&format!(
-                " Noise alone would make one of {} alternatives do as much with p {} {}.",
-                diagnosis.alternatives,
-                if least > 1.0 / (TERMS.draws + 1) as f64 {
-                    "="
-                } else {
-                    "≤"
-                },
-                significant(least, 2)
-            ));
+            if let Some(p) = diagnosis.p_value {
+                meaning.push_str(&format!(
+                    " Noise alone would make one of {} alternatives do as much with p {} {}.",
+                    diagnosis.alternatives,
+                    if p > 1.0 / (TERMS.draws + 1) as f64 {
+                        "="
+                    } else {
+                        "≤"
+                    },
+                    significant(p, 2)
+                ));
+            }
             let found = diagnosis
                 .ranking
                 .iter()

@@ -92,24 +92,26 @@ pub fn calibration(seed: u64, rows: &[Row]) -> String {
             "92–97 %",
         );
     }
-    text += "\n## Put in as large as is said to be seen\n\n| effect | named | said instead |\n|---|---|---|\n";
-    let mut effects: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
-    for row in &seen {
-        effects.entry(&row.label).or_default().push(row);
-    }
-    for (effect, rows) in &effects {
-        let named = rows.iter().filter(|row| row.is_found()).count();
-        let others = rows
-            .iter()
-            .filter(|row| !row.is_found())
-            .map(|row| row.said());
-        let others: Vec<String> = others.collect();
-        let _ = writeln!(
-            text,
-            "| {effect} | {named} of {} | {} |",
-            rows.len(),
-            others.join("; ")
-        );
+    if !seen.is_empty() {
+        text += "\n## Put in as large as is said to be seen\n\n| effect | named | said instead |\n|---|---|---|\n";
+        let mut effects: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
+        for row in &seen {
+            effects.entry(&row.label).or_default().push(row);
+        }
+        for (effect, rows) in &effects {
+            let named = rows.iter().filter(|row| row.is_found()).count();
+            let others = rows
+                .iter()
+                .filter(|row| !row.is_found())
+                .map(|row| row.said());
+            let others: Vec<String> = others.collect();
+            let _ = writeln!(
+                text,
+                "| {effect} | {named} of {} | {} |",
+                rows.len(),
+                others.join("; ")
+            );
+        }
     }
     let failed = rows.iter().filter(|row| row.failure.is_some());
     let failed: Vec<&Row> = failed.collect();

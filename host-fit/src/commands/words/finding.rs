@@ -97,7 +97,7 @@ pub(in super::super) fn ranking_rows(ranked: &[Ranked]) -> Vec<Vec<String>> {
             r.effect.clone(),
             if r.significant { "yes" } else { "no" }.to_owned(),
             format!("{:.1} %", r.error_reduction_percent),
-            format!("{:.1} %", r.best_decoy_percent),
+            format!("{:.1} %", r.by_chance_percent),
             format!("{:.3}", r.p_value),
             said,
         ]

@@ -4,12 +4,20 @@ use model_core::Real;
 use model_core::history::{Memory, Past};
 
 /// A ring buffer with a size chosen at run time: the host's counterpart of
-/// `model_core::history::DelayLine`.
+/// `model_core::history::DelayLine`. It knows where its signal changed last, so that a delay
+/// law need not be asked while what it could point at is all the same.
 #[derive(Clone, Debug)]
 pub struct Ring<T> {
     samples: Vec<T>,
     newest: usize,
+    /// Samples that were pushed.
+    count: i64,
+    /// Which of them differed from the one before, the last ones first.
+    changes: [i64; CHANGES],
 }
+
+/// Changes that are remembered: jets switch a few times within a delay at most.
+const CHANGES: usize = 4;
 
 impl<T: Real> Ring<T> {
     /// A ring that reaches back at least `lag` samples.
@@ -18,6 +26,8 @@ impl<T: Real> Ring<T> {
         Self {
             samples: vec![T::ZERO; (lag + 1).next_power_of_two()],
             newest: 0,
+            count: 0,
+            changes: [i64::MIN; CHANGES],
         }
     }
 }
@@ -36,11 +46,54 @@ impl<T: Real> Past<T> for Ring<T> {
 impl<T: Real> Memory<T> for Ring<T> {
     #[inline]
     fn push(&mut self, value: T) {
+        self.count += 1;
+        if value != self.samples[self.newest] {
+            self.changes.rotate_right(1);
+            self.changes[0] = self.count;
+        }
         self.newest = (self.newest + 1) & (self.samples.len() - 1);
         self.samples[self.newest] = value;
     }
     #[inline]
+    fn steady(&self, from: usize, to: usize) -> Option<T> {
+        let (newest, oldest) = (self.count - from as i64, self.count - to as i64);
+        let last = self.changes.iter().find(|change| **change <= newest)?;
+        (*last <= oldest).then(|| self.back(from))
+    }
+    #[inline]
     fn capacity(&self) -> usize {
         self.samples.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_says_steady_only_of_what_is() {
+        let mut ring = Ring::<f64>::reaching(40);
+        let (mut said, mut switch) = (0, 0u32);
+        for k in 0..400_u32 {
+            switch = switch.wrapping_mul(1_664_525).wrapping_add(k);
+            // Blowing with pulses of all lengths, and a valve that opens slowly.
+            let value = match k / 100 {
+                0 | 1 => f64::from(k / (3 + k / 40) % 2),
+                2 => f64::from(switch >> 31),
+                _ => f64::from(k % 50).min(20.0) / 20.0,
+            };
+            ring.push(value);
+            for (from, to) in [(0, 5), (3, 3), (10, 18), (25, 40)] {
+                if let Some(level) = ring.steady(from, to) {
+                    said += 1;
+                    assert!(
+                        (from..=to).all(|lag| ring.back(lag) == level),
+                        "{k} {from} {to}"
+                    );
+                }
+            }
+        }
+        assert!(said > 300, "{said}");
+        assert_eq!(Ring::<f64>::reaching(8).steady(2, 6), Some(0.0));
     }
 }

@@ -115,8 +115,8 @@ pub trait DelayLaw<T: Real> {
         T::ZERO
     }
 
-    /// The shortest and the longest tap of input `l` for outputs that are
-    /// numbers ≥ 0, where all its taps are on samples and that is known.
+    /// The nearest and the farthest sample that taps of input `l` read for outputs
+    /// that are numbers ≥ 0, where that is known.
     #[inline]
     fn range(&self, _l: usize) -> Option<(usize, usize)> {
         None

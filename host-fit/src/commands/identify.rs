@@ -37,7 +37,7 @@ pub(crate) struct Args {
 #[derive(Debug, Clone, clap::Args)]
 struct Request {
     /// Input delays: constant, eq. (3), or falling with the averaged output, eq. (4) [default: what does better on
-    /// held-out records; fixed where counts of lags are given].
+    /// held-out records, a fall that ends at a level of y included; fixed where counts of lags are given].
     #[arg(long, value_enum)]
     delay: Option<Delay>,
     /// Keep delays between samples even where that pays little; with a structure that is chosen.

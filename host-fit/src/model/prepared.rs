@@ -78,6 +78,8 @@ pub enum AnyDelay<T: Real> {
         factors: Vec<T>,
         /// Whether its delays are rounded to whole samples.
         rounded: bool,
+        /// For each input the nearest and the farthest sample that it can point at, where that is known.
+        ranges: Vec<Option<(usize, usize)>>,
     },
 }
 
@@ -105,6 +107,13 @@ impl<T: Real> DelayLaw<T> for AnyDelay<T> {
         }
     }
     #[inline]
+    fn range(&self, l: usize) -> Option<(usize, usize)> {
+        match self {
+            Self::Fixed(_) => None,
+            Self::Law { ranges, .. } => *ranges.get(l)?,
+        }
+    }
+    #[inline]
     fn tap(&self, l: usize, evaluated: T) -> Tap<T> {
         match self {
             Self::Fixed(law) => law.tap(l, evaluated),
@@ -116,6 +125,15 @@ impl<T: Real> DelayLaw<T> for AnyDelay<T> {
             }
         }
     }
+}
+
+/// The nearest and the farthest sample that an input with this factor can point at, rounded or between
+/// samples; `None` where the law has no such bounds.
+fn range<T: Real>(law: &AnyTransport<T>, factor: f64) -> Option<(usize, usize)> {
+    let [shortest, longest] = law.bounds()?.map(|delay| factor * delay.value());
+    let known = shortest >= 0.0 && longest.is_finite();
+    // One sample more on either side: single precision may round across a whole one.
+    known.then(|| ((shortest as usize).saturating_sub(1), longest as usize + 2))
 }
 
 impl Model {
@@ -148,6 +166,7 @@ impl Model {
                 let factors = chosen.factors.iter().map(|f| T::from_f64(*f));
                 match law {
                     Some(law) => AnyDelay::Law {
+                        ranges: chosen.factors.iter().map(|f| range(&law, *f)).collect(),
                         law,
                         factors: factors.collect(),
                         rounded: !chosen.interpolated && rounding == Rounding::Samples,

@@ -28,7 +28,9 @@ impl<T: Real> Transport<T> for SaturatingDelay<T> {
     #[inline]
     fn delay(&self, output: T) -> T {
         let x = (output / self.level).at_most(T::ONE);
-        self.floor + self.rise * (T::ONE - x) * (T::ONE + self.bend * x)
+        // Rounding must not carry it beyond its bounds.
+        let share = ((T::ONE - x) * (T::ONE + self.bend * x)).at_most(T::ONE);
+        self.floor + self.rise * share
     }
     /// A bend within ±1 leaves the law monotone.
     #[inline]

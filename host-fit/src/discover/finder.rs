@@ -29,6 +29,14 @@ fn sized(rmse: f64, model: &Model) -> f64 {
     rmse.ln() + crate::terms::RULES.price * model.coordinates().len() as f64
 }
 
+/// A term beside a base, followed for a few steps.
+struct Tried {
+    term: Term,
+    brief: Fit,
+    /// The terms of the base: what the flow remembers.
+    memory: Vec<crate::terms::Term>,
+}
+
 /// The search for terms and what it works on.
 pub(super) struct Finder<'a> {
     pub(super) search: &'a Search<'a>,
@@ -41,35 +49,34 @@ impl Finder<'_> {
         self.search.interrupt.load(Ordering::Relaxed)
     }
 
-    /// The best term for any of the `contexts`, if it does better than `base` does.
+    /// The best term for any of the `contexts`, the richest first, if it does better than
+    /// `base` does.
     pub(super) fn next(&self, contexts: &[Hypothesis], base: &Hypothesis, number: usize) -> Round {
         let progress = self.search.progress;
         progress(&format!("term {number}: screening curves"));
-        let mut pool: Vec<(usize, Screened)> = Vec::new();
-        let mut smallest = BTreeMap::new();
-        for (index, context) in contexts.iter().enumerate() {
-            let model = context.judged.model();
-            let context = Context::new(self.search, model, number);
-            let curves = context.map_or_else(Vec::new, |context| context.all());
-            if index == 0 {
+        let mut pool: Vec<(&Hypothesis, Screened)> = Vec::new();
+        let (mut looked_at, mut smallest) = (0, BTreeMap::new());
+        for (index, beside) in contexts.iter().enumerate() {
+            let context = Context::new(self.search, beside.judged.model(), number);
+            let mut curves = context.map_or_else(Vec::new, |context| context.all());
+            looked_at += curves.len();
+            let most = if index == 0 {
                 smallest = self.smallest(&curves);
-            }
-            pool.extend(curves.into_iter().map(|curve| (index, curve)));
+                // To first order a term promises less than it does: half of what is asked is enough to try it.
+                let wanted = (1.0 - RULES.promised * RULES.worthwhile) * base.judged.rmse();
+                let left = |curve: &Screened| (1.0 - curve.held_out).max(0.0).sqrt();
+                curves.retain(|curve| left(curve) * beside.judged.rmse() < wanted);
+                RULES.tried
+            } else {
+                RULES.tried_leaner
+            };
+            let curves = diverse(curves, most, |curve| &curve.term);
+            pool.extend(curves.into_iter().map(|curve| (beside, curve)));
         }
-        let looked_at = pool.len();
-        let promised = |(index, curve): &(usize, Screened)| size(&contexts[*index]) + curve.score;
-        pool.sort_by(|a, b| promised(a).total_cmp(&promised(b)));
-        // To first order a term promises less than it does: half of what is asked is enough to try it.
-        let wanted = (1.0 - RULES.promised * RULES.worthwhile) * base.judged.rmse();
-        pool.retain(|(index, curve)| {
-            let left = (1.0 - curve.held_out).max(0.0).sqrt();
-            left * contexts[*index].judged.rmse() < wanted
-        });
-        let pool = diverse(pool, RULES.tried, |(_, curve)| &curve.term);
         progress(&format!("term {number}: refitting {} curves", pool.len()));
-        let tried: Vec<(Term, Fit)> = pool
+        let tried: Vec<Tried> = pool
             .into_par_iter()
-            .filter_map(|(index, curve)| self.brief_of(contexts[index].judged.model(), curve))
+            .filter_map(|(beside, curve)| self.brief_of(beside, curve))
             .collect();
         let mut finished = self.finished(tried);
         let by_size =
@@ -88,7 +95,7 @@ impl Finder<'_> {
             }
         }
         for (term, hypothesis) in leading {
-            let found = self.search.run(Hypothesis::new(hypothesis.judged), || None);
+            let found = self.search.run(hypothesis, || None);
             let over = self.search.judge.over_noise(found.best.judged.rmse());
             finished.push((term, found.best));
             // At the floor there is nothing to gain from others; what is as good is asked below.
@@ -147,34 +154,37 @@ impl Finder<'_> {
     }
 
     /// A curve beside a model, followed for a few steps.
-    fn brief_of(&self, model: &Model, curve: Screened) -> Option<(Term, Fit)> {
-        let brief = self.fitted(model, &curve.term, crate::terms::RULES.brief)?;
-        Some((curve.term, brief))
+    fn brief_of(&self, beside: &Hypothesis, curve: Screened) -> Option<Tried> {
+        let model = beside.judged.model();
+        Some(Tried {
+            brief: self.fitted(model, &curve.term, crate::terms::RULES.brief)?,
+            term: curve.term,
+            memory: beside.terms.clone(),
+        })
     }
 
-    fn brief(&self, model: &Model, curves: Vec<Screened>) -> Vec<(Term, Fit)> {
+    fn brief(&self, beside: &Hypothesis, curves: Vec<Screened>) -> Vec<Tried> {
         let curves = curves.into_par_iter();
         curves
-            .filter_map(|curve| self.brief_of(model, curve))
+            .filter_map(|curve| self.brief_of(beside, curve))
             .collect()
     }
 
-    /// The best of some brief fits, followed to the end.
-    fn finished(&self, tried: Vec<(Term, Fit)>) -> Vec<(Term, Hypothesis)> {
+    /// The best of some brief fits, followed to the end: the base bent to stand in for what
+    /// was missing, and its lags move back.
+    fn finished(&self, tried: Vec<Tried>) -> Vec<(Term, Hypothesis)> {
         let judge = self.search.judge;
-        let rated = tried.into_par_iter().filter_map(|(term, fit)| {
-            let rmse = judge.held_out(|_| &fit.model).ok()?.rmse();
-            Some((sized(rmse, &fit.model), term, fit))
+        let rated = tried.into_par_iter().filter_map(|tried| {
+            let rmse = judge.held_out(|_| &tried.brief.model).ok()?.rmse();
+            Some((sized(rmse, &tried.brief.model), tried))
         });
-        let mut rated: Vec<(f64, Term, Fit)> = rated.collect();
+        let mut rated: Vec<(f64, Tried)> = rated.collect();
         rated.sort_by(|a, b| a.0.total_cmp(&b.0));
         rated.truncate(RULES.finished);
-        let finished = rated.into_par_iter().filter_map(|(_, term, brief)| {
-            let learning = judge.learning(0);
-            let options = judge.options_for(&brief.model);
-            let fitted = fit(&brief.model, &learning, &options).ok()?;
-            let judged = judge.judged_from(fitted).ok()?;
-            Some((term, Hypothesis::new(judged)))
+        let finished = rated.into_par_iter().filter_map(|(_, tried)| {
+            let least = tried.memory.len();
+            let finished = self.search.finish(tried.memory, tried.brief, least)?;
+            Some((tried.term, finished))
         });
         finished.collect()
     }
@@ -190,15 +200,17 @@ impl Finder<'_> {
         let judge = self.search.judge;
         let progress = self.search.progress;
         progress(&format!("term {number}: what else it could be"));
-        let without = judge.refitted(&term.taken_from(with.judged.model())).ok()?;
-        let context = Context::new(self.search, without.model(), number)?;
+        let bare = term.taken_from(with.judged.model());
+        let mut without = Hypothesis::new(judge.refitted(&bare).ok()?);
+        without.terms.clone_from(&with.terms);
+        let context = Context::new(self.search, without.judged.model(), number)?;
         let kind = |other: &Term| (other.entry, other.coordinate.slug());
         let own = kind(&term);
         let others = context.all().into_iter().filter(|c| kind(&c.term) != own);
         let others = diverse(others.collect(), RULES.tried, |curve| &curve.term);
         let near = context.near(&term).into_iter().take(RULES.of_a_kind);
-        let mut all = self.finished(self.brief(without.model(), others));
-        all.extend(self.finished(self.brief(without.model(), near.collect())));
+        let mut all = self.finished(self.brief(&without, others));
+        all.extend(self.finished(self.brief(&without, near.collect())));
         // Beside the final base another one may do better.
         let (mut term, mut with) = (term, with);
         let better = (0..all.len()).min_by(|a, b| size(&all[*a].1).total_cmp(&size(&all[*b].1)));
@@ -234,13 +246,13 @@ impl Finder<'_> {
             self.resembling(context.screen(), &direction)
         });
         let excess = |judged: &Judged| judge.excess(&judged.held_out);
-        let taken = 1.0 - excess(&with.judged) / excess(&without).max(f64::MIN_POSITIVE);
+        let taken = 1.0 - excess(&with.judged) / excess(&without.judged).max(f64::MIN_POSITIVE);
         Some(Found {
             curve: term.clone(),
             errors,
             term,
             with,
-            without,
+            without: without.judged,
             p: p.min(1.0),
             taken,
             formula_taken: taken,

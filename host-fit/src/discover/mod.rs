@@ -27,7 +27,7 @@ pub use trace::{Signal, TRACED, Trace, TracedRecord};
 use crate::data::Record;
 use crate::diagnose::{DiagnoseError, Rung};
 use crate::model::Model;
-use crate::terms::{Bench, Hypothesis, Known, Search};
+use crate::terms::{Bench, Found as Searched, Hypothesis, Known, Search};
 use finder::{Finder, size};
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -83,6 +83,15 @@ pub fn glance(model: &Model, records: &[Record], interrupt: &AtomicBool) -> Opti
     })
 }
 
+/// The best base with half as many terms as the best one at most, but some: a rich one has
+/// bent to stand in for what is missing, and a bare one is far from the flow.
+fn halfway(found: &Searched) -> Option<Hypothesis> {
+    let most = found.best.terms.len() / 2;
+    let all = found.all.iter();
+    let leaner = all.filter(|other| (1..=most).contains(&other.terms.len()));
+    leaner.min_by(|a, b| size(a).total_cmp(&size(b))).cloned()
+}
+
 /// Looks for the terms that `given` lacks on `records`. `progress` is told what is
 /// being tried.
 ///
@@ -124,18 +133,22 @@ pub fn discover(
         return Err(DiagnoseError::Interrupted);
     }
     let mut bases = vec![root.clone()];
-    bases.push(search.run(root, || None).best);
-    if let Ok(judged) = judge.refitted(&bench.given) {
-        bases.push(Hypothesis::new(judged));
-    }
+    let given = search.second_root(&bench.given, &root);
+    let refitted = || Some(Hypothesis::new(judge.refitted(&bench.given).ok()?));
+    bases.extend(given.or_else(refitted));
+    let found = search.run(root, || None);
+    let half = halfway(&found);
+    bases.push(found.best);
     let leanest = bases[0].clone();
     let by_size = |a: &Hypothesis, b: &Hypothesis| size(a).total_cmp(&size(b));
     let base = bases.into_iter().min_by(by_size).unwrap_or(leanest.clone());
     ladder.push(rung(&base, &[], "the best base without a new term"));
     let mut current = base.clone();
     let mut contexts = vec![current.clone()];
-    if size(&leanest) > size(&current) {
-        contexts.push(leanest);
+    let leaner = half.into_iter().chain([leanest]);
+    let missing = |rmse: f64| judge.over_noise(rmse) > crate::terms::RULES.at_the_floor;
+    if missing(base.judged.rmse()) {
+        contexts.extend(leaner.filter(|leaner| size(leaner) > size(&base)));
     }
     let mut found = Vec::new();
     let mut smallest = None;
@@ -151,14 +164,13 @@ pub fn discover(
         ladder.push(rung(&current, &names, &step));
         contexts = vec![current.clone()];
         found.push(term);
-        if judge.over_noise(current.judged.rmse()) <= crate::terms::RULES.at_the_floor {
+        if !missing(current.judged.rmse()) {
             break;
         }
     }
     // Beside the base that the first term needs: the best one without may have bent to stand in for it.
     let lacking = found.first().map_or(&base.judged, |found| &found.without);
-    let missing = judge.over_noise(lacking.rmse()) > crate::terms::RULES.at_the_floor;
-    let trace = missing
+    let trace = missing(lacking.rmse())
         .then(|| {
             progress("the trace of what is missing");
             trace::trace(judge, lacking, units)

@@ -15,6 +15,7 @@ use crate::model::{Model, Training};
 use crate::power::{Detectable, detectable};
 use crate::residual::{Failures, NoiseSource, Where, where_it_fails};
 use crate::simulate::SimulateError;
+use crate::terms::MovingZero;
 
 /// A diagnosis with all that is said of it. Serialises to the keys of `diagnose --json`.
 #[derive(Clone, Debug)]
@@ -172,6 +173,13 @@ pub fn diagnose(
     let (headline, mut meaning) = verdict::words(&diagnosis);
     if let Some(beyond) = &beyond {
         meaning += &verdict::beyond(beyond);
+    }
+    let open = matches!(
+        diagnosis.verdict,
+        Verdict::PartlyExplained | Verdict::Unexplained
+    );
+    if let Some(moving) = MovingZero::of(&records).filter(|_| open) {
+        meaning += &format!(" {moving}");
     }
     Ok(Finding {
         model: Model {

@@ -15,7 +15,7 @@ use crate::identify::{
 use crate::indicators::{Scores, one_step_norm, score_new};
 use crate::model::{Delay, Model, Start};
 use crate::search::{Settings, StopReason};
-use crate::terms::base_model;
+use crate::terms::{MovingZero, base_model};
 use crate::user_effect::Definition;
 use model_core::effects::StateDependentDelay;
 use model_core::recursion::LagConvention;
@@ -429,7 +429,8 @@ fn automatic(
     });
     let found = found.ok_or(ExcitationError::NoIdentifyRecord)??;
     let records = found.model.targets(&set.records);
-    let mut remarks = Vec::new();
+    let moving = MovingZero::of(&set.records);
+    let mut remarks: Vec<String> = moving.iter().map(ToString::to_string).collect();
     let (mut model, scores) = with_effects(found.model, &records, request, onlooker, &mut remarks)?;
     model.training = trained_in_free_run(set, &scores, request.seed);
     let objective_value = model.training.objective_value;

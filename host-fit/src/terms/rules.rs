@@ -70,6 +70,8 @@ rules! {
     quiet_pieces: usize = 5, "pieces", "judgement";
     /// … and 0 unless it is off by so much.
     off_zero: f64 = 5.0, "standard errors", "convention";
+    /// The zero moves if records rest further apart than this, and than chance.
+    moving_zero: f64 = 0.03, "share of the range of y", "judgement: what slow noise makes of the mean of half a second stays below it";
     /// Where records do not begin at rest, 0 is the level of rest unless it is further from all of y than this.
     far: f64 = 1.0, "times the range of y", "judgement";
 

@@ -5,6 +5,7 @@
 //! back: names stay, parameters change with their units.
 
 use super::RULES;
+use super::rest::level_of_rest;
 use crate::data::Record;
 use crate::model::{Delay, Model, Start};
 use model_core::effect::Spec;
@@ -166,27 +167,6 @@ pub fn begins_in_mid_run(record: &Record) -> bool {
     let first = record.y.len().min(RULES.beginning);
     let mean = record.y[..first].iter().sum::<f64>() / first.max(1) as f64;
     mean.abs() > RULES.at_rest
-}
-
-/// Mean y of the records before the first command, 0 where it is that but for chance;
-/// none where they do not rest before it.
-fn level_of_rest(records: &[Record]) -> Option<f64> {
-    let mut pieces: Vec<f64> = Vec::new();
-    for record in records {
-        let blown = record.u.iter().position(|u| *u != 0.0);
-        let quiet = &record.y[..blown.unwrap_or(record.len())];
-        for piece in quiet.chunks_exact(RULES.quiet_piece) {
-            pieces.push(piece.iter().sum::<f64>() / piece.len() as f64);
-        }
-    }
-    if pieces.len() < RULES.quiet_pieces {
-        return None;
-    }
-    let n = pieces.len() as f64;
-    let mean = pieces.iter().sum::<f64>() / n;
-    let variance = pieces.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    let is_off = mean.abs() > RULES.off_zero * (variance / n).sqrt() && mean.abs() > 1e-12;
-    Some(if is_off { mean } else { 0.0 })
 }
 
 /// 0, or the mean of y where 0 is far from all of them.

@@ -1,0 +1,124 @@
+//! Where y rests before anything is blown: the sensor's zero, and whether it moves.
+
+use super::RULES;
+use crate::data::Record;
+use std::fmt;
+
+/// The means of the pieces of a record before its first command.
+fn quiet_pieces(record: &Record) -> Vec<f64> {
+    let blown = record.u.iter().position(|u| *u != 0.0);
+    let quiet = &record.y[..blown.unwrap_or(record.len())];
+    let pieces = quiet.chunks_exact(RULES.quiet_piece);
+    pieces.map(mean).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Mean of some pieces, and its standard error; none of fewer than count.
+fn level(pieces: &[f64]) -> Option<(f64, f64)> {
+    if pieces.len() < RULES.quiet_pieces {
+        return None;
+    }
+    let (n, mean) = (pieces.len() as f64, mean(pieces));
+    let variance = pieces.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    Some((mean, (variance / n).sqrt()))
+}
+
+/// Mean y of the records before the first command, 0 where it is that but for chance;
+/// none where they do not rest before it.
+pub(super) fn level_of_rest(records: &[Record]) -> Option<f64> {
+    let pieces: Vec<f64> = records.iter().flat_map(quiet_pieces).collect();
+    let (mean, error) = level(&pieces)?;
+    let is_off = mean.abs() > RULES.off_zero * error && mean.abs() > 1e-12;
+    Some(if is_off { mean } else { 0.0 })
+}
+
+/// A zero of the sensor that is not the same in all records.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MovingZero {
+    /// The record that rests lowest, and where, y.
+    pub lowest: (String, f64),
+    /// The record that rests highest, and where, y.
+    pub highest: (String, f64),
+}
+
+impl MovingZero {
+    /// Whether records rest at different levels before their first command: by more than chance, and by
+    /// more than a small share of all that y does.
+    #[must_use]
+    pub fn of(records: &[Record]) -> Option<Self> {
+        let levels = records
+            .iter()
+            .filter_map(|record| Some((record, level(&quiet_pieces(record))?)));
+        let levels: Vec<(&Record, (f64, f64))> = levels.collect();
+        let by_level =
+            |a: &&(&Record, (f64, f64)), b: &&(&Record, (f64, f64))| a.1.0.total_cmp(&b.1.0);
+        let lowest = levels.iter().min_by(by_level)?;
+        let highest = levels.iter().max_by(by_level)?;
+        let apart = highest.1.0 - lowest.1.0;
+        let y = || records.iter().flat_map(|record| record.y.iter().copied());
+        let range = y().fold(f64::MIN, f64::max) - y().fold(f64::MAX, f64::min);
+        let error = lowest.1.1.hypot(highest.1.1);
+        let moves = apart > RULES.off_zero * error && apart > RULES.moving_zero * range;
+        let named = |of: &(&Record, (f64, f64))| (of.0.name.clone(), of.1.0);
+        moves.then(|| Self {
+            lowest: named(lowest),
+            highest: named(highest),
+        })
+    }
+}
+
+impl fmt::Display for MovingZero {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ((low, lowest), (high, highest)) = (&self.lowest, &self.highest);
+        write!(
+            f,
+            "The sensor's zero moves: before the first blowing `{low}` rests at {lowest:.3} and `{high}` at {highest:.3}. A model has one zero \
+             for all records: subtract each record's own first (`import` has `--y-offset`), or the error that it makes hides the rest."
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Use;
+
+    fn resting(name: &str, zero: f64) -> Record {
+        let u: Vec<f64> = (0..2000).map(|k| f64::from(u8::from(k > 600))).collect();
+        let y = (0..2000_u32).map(|k| {
+            let noise = f64::from(k.wrapping_mul(2_654_435_761) >> 8) / f64::from(1 << 24) - 0.5;
+            zero + 0.02 * noise + f64::from(u8::from(k > 640))
+        });
+        Record::new(name, Use::Identify, 0.001, u, y.collect())
+    }
+
+    #[test]
+    fn a_zero_that_moves_is_told_and_one_that_is_off_is_not() {
+        assert_eq!(
+            MovingZero::of(&[resting("a", 0.05), resting("b", 0.05)]),
+            None
+        );
+        let found = MovingZero::of(&[resting("a", 0.0), resting("b", 0.08), resting("c", 0.03)]);
+        let found = found.expect("0.08 of a range of 1");
+        assert_eq!(
+            (found.lowest.0.as_str(), found.highest.0.as_str()),
+            ("a", "b")
+        );
+        assert!(
+            (found.highest.1 - found.lowest.1 - 0.08).abs() < 0.005,
+            "{found:?}"
+        );
+        assert!(found.to_string().contains("--y-offset"));
+    }
+
+    #[test]
+    fn records_that_are_blown_from_the_start_say_nothing() {
+        let mut record = resting("a", 0.3);
+        record.u.fill(1.0);
+        assert_eq!(MovingZero::of(&[record.clone(), resting("b", 0.0)]), None);
+        assert_eq!(level_of_rest(&[record]), None);
+    }
+}

@@ -54,7 +54,7 @@ impl Session<'_> {
                     &owned
                 };
                 for rival in others {
-                    let Some(judged) = &rival.judged else {
+                    let Some(judged) = rival.judged() else {
                         continue;
                     };
                     let present = order.iter().any(|s| s.name == rival.name);

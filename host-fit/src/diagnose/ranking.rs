@@ -26,14 +26,19 @@ pub(super) struct Rival {
     /// Its name: an effect's, or what a memory or a lag of the flow is called.
     pub(super) name: String,
     pub(super) spec: Option<&'static Spec>,
-    pub(super) judged: Option<Judged>,
+    pub(super) refitted: Option<Hypothesis>,
     /// Held-out rms error as screened, inner units.
     pub(super) promised: f64,
 }
 
 impl Rival {
     pub(super) fn rmse(&self) -> f64 {
-        self.judged.as_ref().map_or(self.promised, Judged::rmse)
+        self.judged().map_or(self.promised, Judged::rmse)
+    }
+
+    /// Its fits, if it was refitted.
+    pub(super) fn judged(&self) -> Option<&Judged> {
+        Some(&self.refitted.as_ref()?.judged)
     }
 }
 
@@ -99,7 +104,7 @@ fn refitted(
                 search.set_out(context.judged.model(), &proposal, crate::terms::RULES.brief)?;
             let terms = [context.terms.clone(), proposal.terms].concat();
             let count = terms.len();
-            Some(search.finish(terms, brief, count)?.judged)
+            search.finish(terms, brief, count)
         },
     )
 }
@@ -108,7 +113,7 @@ fn rated(
     screen: &Screen<'_>,
     table: &Table,
     before: f64,
-    refit: impl Fn(usize, &str, &Candidate) -> Option<Judged> + Sync,
+    refit: impl Fn(usize, &str, &Candidate) -> Option<Hypothesis> + Sync,
 ) -> Vec<Rival> {
     // The best of each kind, in the order of what they promise.
     let mut best: Vec<(String, &Candidate)> = Vec::new();
@@ -131,7 +136,7 @@ fn rated(
         .map(|(place, (name, candidate))| Rival {
             name: name.clone(),
             spec: candidate.term.effect(),
-            judged: refit(place, name, candidate),
+            refitted: refit(place, name, candidate),
             promised: before * (1.0 - candidate.held_out).max(0.0).sqrt(),
         })
         .collect();
@@ -142,12 +147,12 @@ fn rated(
     rated.extend(useless.map(|spec| Rival {
         name: spec.name.to_owned(),
         spec: Some(spec),
-        judged: None,
+        refitted: None,
         promised: before,
     }));
     // What was fitted comes before what is only promised.
     rated.sort_by(|a, b| {
-        let fitted = a.judged.is_none().cmp(&b.judged.is_none());
+        let fitted = a.refitted.is_none().cmp(&b.refitted.is_none());
         fitted.then(a.rmse().total_cmp(&b.rmse()))
     });
     rated
@@ -164,7 +169,7 @@ pub(super) fn ranked(units: &Units, before: f64, rivals: &[Rival], chance: &Chan
             let gain = 1.0 - after / before;
             let p = chance.p_value(1.0 - (after / before).powi(2));
             let others = effects().filter(|(other, _)| {
-                let both = (other.judged.as_ref(), rival.judged.as_ref());
+                let both = (other.judged(), rival.judged());
                 let (Some(a), Some(b)) = both else {
                     return false;
                 };
@@ -177,13 +182,14 @@ pub(super) fn ranked(units: &Units, before: f64, rivals: &[Rival], chance: &Chan
                 p_value: p,
                 by_chance_percent: 100.0 * by_chance,
                 parameters: rival
-                    .judged
-                    .as_ref()
+                    .judged()
                     .map(|judged| estimates(&judged.fits[0], spec, units))
                     .unwrap_or_default(),
                 confounded_with: others.map(|(other, _)| other.name.clone()).collect(),
-                significant: rival.judged.is_some() && p <= RULES.level && gain > RULES.worthwhile,
-                refitted: rival.judged.is_some(),
+                significant: rival.refitted.is_some()
+                    && p <= RULES.level
+                    && gain > RULES.worthwhile,
+                refitted: rival.refitted.is_some(),
             }
         })
         .collect()

@@ -3,10 +3,12 @@
 use super::estimate::estimates_among;
 use super::memory::memory;
 use super::outcome::Conclusion;
-use super::ranking::{not_tried, ranked, rivals_and_chance};
+use super::ranking::{Rival, not_tried, ranked, rivals_and_chance};
 use super::{DiagnoseError, Diagnosis, Options, RULES, Rung, Verdict};
 use crate::model::Model;
-use crate::terms::{Found, HeldOut, Hypothesis, Judge, Judged, Search, Term, Units, p_value};
+use crate::terms::{
+    Chance, Found, HeldOut, Hypothesis, Judge, Judged, Search, Term, Units, p_value,
+};
 use model_core::effect::Spec;
 use std::collections::BTreeMap;
 
@@ -15,6 +17,22 @@ pub(super) struct Session<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) units: Units,
     pub(super) options: &'a Options,
+}
+
+/// A model without effects, and what each of them does there.
+struct Compared {
+    context: Hypothesis,
+    others: Vec<Rival>,
+    chance: Chance,
+}
+
+impl Compared {
+    /// The best model with one effect.
+    fn best_alone(&self) -> Option<&Hypothesis> {
+        let effects = self.others.iter().filter(|rival| rival.spec.is_some());
+        let alone = effects.filter_map(|rival| rival.refitted.as_ref());
+        alone.min_by(|a, b| a.score().total_cmp(&b.score()))
+    }
 }
 
 impl Session<'_> {
@@ -67,23 +85,27 @@ impl Session<'_> {
         restarted_s: Option<f64>,
     ) -> Diagnosis {
         let (search, judge, units) = (self.search, self.judge(), &self.units);
+        let named = self.named(&found);
+        (search.progress)("what else it could be");
+        let mut compared = self.compared(&named, &found.root);
+        // One effect may do better than all that were found together.
+        let best = compared
+            .best_alone()
+            .filter(|alone| alone.score() < named.score());
         let Conclusion {
             verdict,
             model: last,
             effects,
             p_value,
-        } = self.conclusion(&found, as_given);
-        (search.progress)("what else it could be");
-        let mut context = last.clone();
-        while let Some(index) = context.terms.iter().rposition(|t| t.effect().is_some()) {
-            match search.without(&context, index, &found.root) {
-                Some(lesser) => context = lesser,
-                None => break,
-            }
+        } = self.concluded(best.unwrap_or(&named), &found.bare, as_given);
+        if effects.is_empty() && !named.is_bare() {
+            compared = self.compared(&last, &found.root);
         }
-        let names: Vec<&str> = effects.iter().map(|spec| spec.name).collect();
-        let (others, chance) =
-            rivals_and_chance(search, &context, &names, &last.judged, self.options.seed);
+        let Compared {
+            context,
+            others,
+            chance,
+        } = compared;
         let mut order = effects.clone();
         // The best single effect leads: the ladder falls as the ranking does.
         let place = |spec: &Spec| others.iter().position(|r| r.name == spec.name);
@@ -166,6 +188,26 @@ impl Session<'_> {
             p_value,
             base: units.model_out(&judge.final_fit(&found.bare.judged).model),
             model,
+        }
+    }
+
+    /// A hypothesis without its effects, and all candidates there.
+    fn compared(&self, with: &Hypothesis, root: &Hypothesis) -> Compared {
+        let effects = with.terms.iter().filter_map(Term::effect);
+        let names: Vec<&str> = effects.map(|spec| spec.name).collect();
+        let mut context = with.clone();
+        while let Some(index) = context.terms.iter().rposition(|t| t.effect().is_some()) {
+            match self.search.without(&context, index, root) {
+                Some(lesser) => context = lesser,
+                None => break,
+            }
+        }
+        let seed = self.options.seed;
+        let (others, chance) = rivals_and_chance(self.search, &context, &names, &with.judged, seed);
+        Compared {
+            context,
+            others,
+            chance,
         }
     }
 

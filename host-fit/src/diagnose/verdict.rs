@@ -193,26 +193,43 @@ impl Session<'_> {
         best
     }
 
-    pub(super) fn conclusion(&self, found: &Found, as_given: &HeldOut) -> Conclusion {
+    /// The best that was found, with the effects that have earned their names beside each other.
+    pub(super) fn named(&self, found: &Found) -> Hypothesis {
         let scatter = self.judge().noise_source == NoiseSource::Scatter;
         let dark = scatter
             && self.judge().unexplained_share(&found.bare.judged.held_out) <= RULES.too_much;
-        let pared = if dark {
+        if dark {
             // One test for each effect: more cannot be asked in the dark.
             self.pared(found, |lesser, best| {
                 let p = p_value(&lesser.judged.held_out, &best.judged.held_out);
                 best.judged.model().candidates().count() as f64 * p >= RULES.level
             })
         } else if found.best.terms.iter().filter_map(Term::effect).count() > 1 {
-            // Beside others, an effect is named for what it takes of the error.
-            self.pared(found, |lesser, best| {
-                let little = (1.0 - RULES.worthwhile) * lesser.judged.rmse();
-                best.judged.rmse() > little && self.fits(&lesser.judged)
-            })
+            self.pared(found, |lesser, best| self.is_beside_the_point(lesser, best))
         } else {
             found.best.clone()
-        };
-        let (best, bare) = (&pared, &found.bare);
+        }
+    }
+
+    /// Whether an effect beside others has not earned its name: where the model does without it,
+    /// it is named for what it takes of the error and of the excess; and noise alone seldom
+    /// lets any effect do as much there.
+    fn is_beside_the_point(&self, lesser: &Hypothesis, best: &Hypothesis) -> bool {
+        let judge = self.judge();
+        let excess = |hypothesis: &Hypothesis| judge.excess(&hypothesis.judged.held_out);
+        let little = best.judged.rmse() > (1.0 - RULES.worthwhile) * lesser.judged.rmse()
+            || excess(best) > (1.0 - RULES.stands_in) * excess(lesser);
+        (little && self.fits(&lesser.judged))
+            || self.by_chance(best, lesser) > RULES.level_of_search
+    }
+
+    /// What is said of `best` beside the best without effects.
+    pub(super) fn concluded(
+        &self,
+        best: &Hypothesis,
+        bare: &Hypothesis,
+        as_given: &HeldOut,
+    ) -> Conclusion {
         let effects: Vec<&'static Spec> = best.terms.iter().filter_map(Term::effect).collect();
         let judge = self.judge();
         let of_bare = || Conclusion {

@@ -17,4 +17,4 @@ pub use lean::{lean_base, settle_fixed_delay};
 pub use levenberg::FitStop;
 pub use rules::{RULES, Rules};
 pub use starts::Known;
-pub(crate) use starts::{combinations, rows};
+pub(crate) use starts::{combinations, rows, starts};

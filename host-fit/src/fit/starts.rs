@@ -64,7 +64,7 @@ impl Known {
 }
 
 /// Parameter vectors from which a fit of `base` with `spec` sets out.
-pub(super) fn starts(base: &Model, spec: &Spec, records: &[&Record]) -> Vec<Vec<f64>> {
+pub(crate) fn starts(base: &Model, spec: &Spec, records: &[&Record]) -> Vec<Vec<f64>> {
     let (y, u) = (
         size_of(records, |record| &record.y),
         size_of(records, |record| &record.u),

@@ -121,7 +121,7 @@ impl<T: Real> Effect<T> for Chain<T> {
     fn drive(&self, states: &mut Self::State, flow: &Flow<T>, at: &Instant<'_, T>) -> T {
         let each = self.effects.iter().zip(states);
         each.fold(T::ZERO, |sum, (effect, state)| {
-            sum + effect.drive(state, flow, at)
+            sum + effect.drive(state, &flow.driven_by(sum), at)
         })
     }
     #[inline]

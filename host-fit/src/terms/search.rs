@@ -7,9 +7,10 @@ use super::proposal::Proposal;
 use super::screen::Screen;
 use super::table::{Table, has_jet_effect};
 use super::term::Term;
-use crate::fit::{Fit, FitOptions, Known, fit, lean_base, settle_fixed_delay};
+use crate::fit::{Fit, FitOptions, Known, fit, lean_base, settle_fixed_delay, starts};
 use crate::model::{Model, Start};
 use crate::simulate::SimulateError;
+use model_core::effect::{Influence, Spec};
 use model_core::effects::NUISANCES;
 use model_core::recursion::Grading;
 use rayon::prelude::*;
@@ -348,7 +349,38 @@ impl Search<'_> {
             *count += 1;
             kept.push(proposal);
         }
+        if effects && hypothesis.is_bare() {
+            let unseen = self.stepwise(&screen);
+            kept.extend(unseen.filter(|proposal| {
+                let key = signature(&hypothesis.terms, &proposal.terms);
+                !tried.contains(&key) && !met.contains(&key)
+            }));
+        }
         kept
+    }
+
+    /// Effects that act in steps, whatever the screening says of them: where a threshold is never crossed,
+    /// or always at the wrong time, it promises nothing.
+    fn stepwise(&self, screen: &Screen<'_>) -> impl Iterator<Item = Proposal> {
+        let model = screen.model();
+        let specs = model
+            .candidates()
+            .filter(|spec| acts_in_steps(spec) && spec.channel.is_none());
+        let possible = specs.filter(|spec| screen.pointless(spec).is_none());
+        possible.map(|spec| {
+            let term = Term::Effect {
+                spec,
+                parameters: spec.parameters.iter().map(|p| p.starts[0]).collect(),
+                grading: model.grading,
+                reference: None,
+            };
+            Proposal {
+                terms: vec![term],
+                coefficients: vec![Vec::new()],
+                left: 1.0,
+                score: 0.0,
+            }
+        })
     }
 
     /// Every proposal for a few steps, the best of them to the end.
@@ -438,29 +470,47 @@ impl Search<'_> {
         })
     }
 
-    /// The fit of a proposal from where the screening puts it.
+    /// The fit of a proposal from where the screening puts it; from several points where the error
+    /// has more than one valley.
     pub(crate) fn set_out(
         &self,
         model: &Model,
         proposal: &Proposal,
         iterations: usize,
     ) -> Option<Fit> {
-        let is_inertia = |term: &Term| matches!(term, Term::Inertia(_));
-        if !proposal.terms.iter().any(is_inertia) {
-            return self.set_out_from(model, proposal, &proposal.terms, iterations);
-        }
-        // A second order has more than one valley: from several second lags.
-        let starts = RULES.second_lags.into_par_iter().filter_map(|samples| {
-            let other = |term: &Term| match term {
-                Term::Inertia(_) => Term::Inertia(samples),
-                term => term.clone(),
-            };
-            let terms: Vec<Term> = proposal.terms.iter().map(other).collect();
-            self.set_out_from(model, proposal, &terms, iterations)
-        });
-        let fits: Vec<Fit> = starts.collect();
+        let others = self.valleys(model, &proposal.terms);
+        let all: Vec<&[Term]> = match &others[..] {
+            [] => vec![&proposal.terms],
+            others => others.iter().map(Vec::as_slice).collect(),
+        };
+        let fits = all
+            .into_par_iter()
+            .filter_map(|terms| self.set_out_from(model, proposal, terms, iterations));
+        let fits: Vec<Fit> = fits.collect();
         fits.into_iter()
             .min_by(|a, b| a.mean_square().total_cmp(&b.mean_square()))
+    }
+
+    /// The terms from other starting points, none where one does.
+    fn valleys(&self, model: &Model, terms: &[Term]) -> Vec<Vec<Term>> {
+        if terms.iter().any(|term| matches!(term, Term::Inertia(_))) {
+            let second = RULES.second_lags.into_iter().map(|samples| {
+                let other = |term: &Term| match term {
+                    Term::Inertia(_) => Term::Inertia(samples),
+                    term => term.clone(),
+                };
+                terms.iter().map(other).collect()
+            });
+            return second.collect();
+        }
+        match terms {
+            [term @ Term::Effect { spec, .. }] if acts_in_steps(spec) => {
+                let starts = starts(model, spec, &self.judge.learning(0)).into_iter();
+                let others = starts.map(|start| vec![term.with_parameters(start)]);
+                std::iter::once(terms.to_vec()).chain(others).collect()
+            }
+            _ => Vec::new(),
+        }
     }
 
     fn set_out_from(
@@ -603,6 +653,12 @@ impl Search<'_> {
             from_given: hypothesis.from_given,
         })
     }
+}
+
+/// Whether a card has a parameter that acts in steps.
+fn acts_in_steps(spec: &Spec) -> bool {
+    let mut parameters = spec.parameters.iter();
+    parameters.any(|parameter| parameter.influence == Influence::Stepwise)
 }
 
 /// Whether an effect was bent as far as its card lets it: it stands in for something

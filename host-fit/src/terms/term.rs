@@ -124,6 +124,16 @@ impl Term {
         other
     }
 
+    /// The same from other values of an effect's parameters.
+    #[must_use]
+    pub fn with_parameters(&self, values: Vec<f64>) -> Self {
+        let mut other = self.clone();
+        if let Self::Effect { parameters, .. } = &mut other {
+            *parameters = values;
+        }
+        other
+    }
+
     /// What it costs: the parameters that are fitted and the places that are searched.
     #[must_use]
     pub fn cost(&self) -> usize {

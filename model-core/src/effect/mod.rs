@@ -51,11 +51,23 @@ pub struct Flow<T> {
     pub now: T,
     /// s_{k−1}.
     pub before: T,
-    /// s_{k+1} as it would be without flow effects: what resists a motion must
-    /// know the motion, or it chatters where it should hold still.
+    /// s_{k+1} as it would be with the flow effects that come before this one and no
+    /// others: what changes the rate of a motion, or resists it, must know the motion.
     pub next: T,
     /// 1 − Σa − Σc·j, per sample: turns an equilibrium level into a drive.
     pub relaxation: T,
+}
+
+impl<T: Real> Flow<T> {
+    /// The same with `drive` added to what comes next.
+    #[inline]
+    #[must_use]
+    pub fn driven_by(&self, drive: T) -> Self {
+        Self {
+            next: self.next + drive,
+            ..*self
+        }
+    }
 }
 
 /// A physical effect, prepared for a sample period.
@@ -137,7 +149,7 @@ impl<T: Real, A: Effect<T>, B: Effect<T>> Effect<T> for (A, B) {
     #[inline]
     fn drive(&self, state: &mut Self::State, flow: &Flow<T>, at: &Instant<'_, T>) -> T {
         let first = self.0.drive(&mut state.0, flow, at);
-        first + self.1.drive(&mut state.1, flow, at)
+        first + self.1.drive(&mut state.1, &flow.driven_by(first), at)
     }
     #[inline]
     fn sense(&self, state: &mut Self::State, signal: T, at: &Instant<'_, T>) -> T {

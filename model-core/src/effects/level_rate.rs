@@ -62,6 +62,7 @@ impl<T: Real> Physics<T> for LevelRate<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::AttachmentHysteresis;
     use crate::effects::bench::{flow, prepared};
 
     #[test]
@@ -84,5 +85,18 @@ mod tests {
         let name = LevelRate::<f64>::SPEC.name;
         assert!(crate::effects::SPECS.iter().all(|spec| spec.name != name));
         assert_eq!(crate::effects::spec(name).map(|spec| spec.name), Some(name));
+    }
+
+    /// A latch that is always on raises the level that the flow tends to, and that way is gone at
+    /// the same rate.
+    #[test]
+    fn it_is_the_rate_of_what_other_effects_drive_too() {
+        let latch: AttachmentHysteresis<f64> = prepared(&[-0.5, -0.6, 0.3]);
+        let rate: LevelRate<f64> = prepared(&[0.8, 0.8]);
+        let raised = flow(&(latch, rate), |_| 0.5);
+        let plain = flow(&rate, |_| 0.8);
+        for (raised, plain) in raised.iter().zip(&plain) {
+            assert!((raised - plain).abs() < 1e-12, "{raised} {plain}");
+        }
     }
 }

@@ -196,8 +196,8 @@ catalogue! {
     quadratic_drag::QuadraticDrag: QuadraticDrag<T>,
     bouc_wen_hysteresis::BoucWenHysteresis: BoucWenHysteresis<T>,
     vortex_shedding::VortexShedding: VortexShedding<T>,
-    level_rate::LevelRate: LevelRate<T>,
     slow_wake::SlowWake: SlowWake<T>,
+    level_rate::LevelRate: LevelRate<T>,
     rectifying_sensor::RectifyingSensor: RectifyingSensor,
     hot_film_nonlinearity::HotFilmNonlinearity: HotFilmNonlinearity<T>,
     hot_film_lag::HotFilmLag: HotFilmLag<T>,
@@ -221,8 +221,8 @@ pub const LEVEL_RATE: &Spec = &<LevelRate<f64> as Physics<f64>>::SPEC;
 /// The card of a slow wake: a third one.
 pub const SLOW_WAKE: &Spec = &<SlowWake<f64> as Physics<f64>>::SPEC;
 
-/// The nuisances that a base model may have.
-pub const NUISANCES: [&Spec; 3] = [LEVEL_RATE, SLOW_WAKE, ZERO_OFFSET];
+/// The nuisances that a base model may have, after all effects: a rate is that of every motion.
+pub const NUISANCES: [&Spec; 3] = [SLOW_WAKE, LEVEL_RATE, ZERO_OFFSET];
 
 /// How many of `specs` a model can lack.
 const fn lacking(specs: &[Spec]) -> usize {
@@ -322,8 +322,8 @@ mod tests {
         assert_eq!(
             names,
             [
-                "level-rate",
                 "slow-wake",
+                "level-rate",
                 "zero-offset",
                 "constant-delay",
                 "saturating-delay"

@@ -89,15 +89,18 @@ impl Session<'_> {
         (search.progress)("what else it could be");
         let mut compared = self.compared(&named, &found.root);
         // One effect may do better than all that were found together.
-        let best = compared
-            .best_alone()
-            .filter(|alone| alone.score() < named.score());
+        let alone = compared.best_alone();
+        let alone = alone.filter(|alone| alone.score() < named.score());
+        let concluded = |best: &Hypothesis| self.concluded(best, &found.bare, as_given);
         let Conclusion {
             verdict,
             model: last,
             effects,
             p_value,
-        } = self.concluded(best.unwrap_or(&named), &found.bare, as_given);
+        } = alone
+            .map(concluded)
+            .filter(|conclusion| !conclusion.effects.is_empty())
+            .unwrap_or_else(|| concluded(&named));
         if effects.is_empty() && !named.is_bare() {
             compared = self.compared(&last, &found.root);
         }

@@ -130,9 +130,7 @@ impl Session<'_> {
     /// do, or do as well with fewer parameters. `None` if they have not.
     fn earned(&self, best: &Hypothesis, bare: &Hypothesis) -> Option<Earned> {
         let (with, without) = (best.judged.rmse(), bare.judged.rmse());
-        let scatter = self.judge().noise_source == NoiseSource::Scatter;
-        let in_the_dark = scatter && self.fits(&bare.judged);
-        let worthwhile = if in_the_dark {
+        let worthwhile = if self.in_the_dark(bare) {
             RULES.worthwhile_in_the_dark
         } else {
             RULES.worthwhile
@@ -142,22 +140,35 @@ impl Session<'_> {
         if self.judge().drifts_more(&best.judged, &bare.judged) {
             return None;
         }
-        if open && with < (1.0 - worthwhile) * without {
-            // The best of so many alternatives is often good by chance. Where the base
-            // errs far beyond what scatters from sample to sample, records are few and
-            // short as a rule: one test for each effect has to do.
-            let (p, level) = if scatter && !in_the_dark {
-                let one = p_value(&bare.judged.held_out, &best.judged.held_out);
-                let effects = best.judged.model().candidates().count();
-                (f64::min(one * effects as f64, 1.0), RULES.level)
-            } else {
-                (self.by_chance(best, bare), RULES.level_of_search)
-            };
-            if p <= level {
-                return Some(Earned { p_value: Some(p) });
-            }
+        if open
+            && with < (1.0 - worthwhile) * without
+            && let Some(p) = self.more_than_chance(best, bare)
+        {
+            return Some(Earned { p_value: Some(p) });
         }
+        let scatter = self.judge().noise_source == NoiseSource::Scatter;
         (is_leaner(best, bare) && !scatter).then_some(Earned { p_value: None })
+    }
+
+    /// Whether neither the noise is known nor anything shows that a base errs.
+    fn in_the_dark(&self, bare: &Hypothesis) -> bool {
+        self.judge().noise_source == NoiseSource::Scatter && self.fits(&bare.judged)
+    }
+
+    /// The p-value of what `best` does better than `bare`, if that is more than chance does.
+    fn more_than_chance(&self, best: &Hypothesis, bare: &Hypothesis) -> Option<f64> {
+        let scatter = self.judge().noise_source == NoiseSource::Scatter;
+        // The best of so many alternatives is often good by chance. Where the base
+        // errs far beyond what scatters from sample to sample, records are few and
+        // short as a rule: one test for each effect has to do.
+        let (p, level) = if scatter && !self.in_the_dark(bare) {
+            let one = p_value(&bare.judged.held_out, &best.judged.held_out);
+            let effects = best.judged.model().candidates().count();
+            (f64::min(one * effects as f64, 1.0), RULES.level)
+        } else {
+            (self.by_chance(best, bare), RULES.level_of_search)
+        };
+        (p <= level).then_some(p)
     }
 
     /// How often noise alone, as `best` leaves it, lets one of all effects lower the error of `bare` as far
@@ -219,8 +230,7 @@ impl Session<'_> {
         let excess = |hypothesis: &Hypothesis| judge.excess(&hypothesis.judged.held_out);
         let little = best.judged.rmse() > (1.0 - RULES.worthwhile) * lesser.judged.rmse()
             || excess(best) > (1.0 - RULES.stands_in) * excess(lesser);
-        (little && self.fits(&lesser.judged))
-            || self.by_chance(best, lesser) > RULES.level_of_search
+        (little && self.fits(&lesser.judged)) || self.more_than_chance(best, lesser).is_none()
     }
 
     /// What is said of `best` beside the best without effects.

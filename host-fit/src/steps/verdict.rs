@@ -4,7 +4,7 @@ use crate::diagnose::{Diagnosis, FLOW_LAG, FLOW_MEMORY, HeldOutBy, Rung, Verdict
 use crate::discover::Glance;
 use crate::picture::significant;
 use crate::residual::NoiseSource;
-use crate::terms::RULES as TERMS;
+use crate::terms::{RULES as TERMS, second_lag_s};
 use model_core::effect::Place;
 use model_core::effects::spec;
 
@@ -27,6 +27,14 @@ pub(super) fn words(diagnosis: &Diagnosis) -> (String, String) {
         ));
     }
     meaning.push_str(bench_check(&diagnosis.sets));
+    let told = diagnosis.sets.iter().flatten().any(|name| name == FLOW_LAG);
+    if let Some(second) = second_lag_s(&diagnosis.model).filter(|_| !told) {
+        meaning.push_str(&format!(
+            " The model has a second lag of {} ms in series with the flow's: these records cannot tell whether it is the flow's own, a film's or a \
+             valve's. At the bench, with the tunnel off, the flow's goes.",
+            significant(1e3 * second, 2)
+        ));
+    }
     for memory in &diagnosis.memory {
         meaning.push_str(&format!(
             " The flow feels its own past of {} s, with {} without jets and {} under them.",

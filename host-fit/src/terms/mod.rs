@@ -42,4 +42,5 @@ pub use search::{Found, Hypothesis, Search};
 pub(crate) use shown::{Left, Shown};
 pub use table::{Candidate, Table};
 pub use term::Term;
+pub(crate) use term::second_lag_s;
 pub use units::{Units, begins_in_mid_run};

@@ -373,15 +373,11 @@ fn in_series(model: &mut Model, samples: f64) {
     model.delay_later(-samples);
 }
 
-/// Takes the faster of the two lags of a second order away; its delay goes back to the
-/// command.
-fn out_of_series(model: &mut Model) {
-    let at = |lags: &[u16], lag: u16| lags.iter().position(|l| *l == lag);
-    let (Some(first), Some(second)) =
-        (at(&model.state_lags, NEWEST), at(&model.state_lags, BEFORE))
-    else {
-        return;
-    };
+/// Where the newest lag and the one before stand among those of y, and what the faster of the
+/// two lags in series keeps of itself in a sample; none of a first order.
+fn faster(model: &Model) -> Option<(usize, usize, f64)> {
+    let at = |lag: u16| model.state_lags.iter().position(|l| *l == lag);
+    let (first, second) = (at(NEWEST)?, at(BEFORE)?);
     let (sum, product) = (model.a[first], -model.a[second]);
     // The roots of λ² − sum·λ + product; where they are complex, their size.
     let spread = sum * sum / 4.0 - product;
@@ -390,7 +386,23 @@ fn out_of_series(model: &mut Model) {
     } else {
         product.max(0.0).sqrt()
     };
-    let keep = keep.clamp(0.0, 0.99);
+    Some((first, second, keep.clamp(0.0, 0.99)))
+}
+
+/// The faster of the two lags in series of a flow of second order, s; none of a first order.
+pub(crate) fn second_lag_s(model: &Model) -> Option<f64> {
+    let (.., keep) = faster(model)?;
+    (keep > 0.0).then(|| -model.sample_period_s / keep.ln())
+}
+
+/// Takes the faster of the two lags of a second order away; its delay goes back to the
+/// command.
+fn out_of_series(model: &mut Model) {
+    let Some((first, second, keep)) = faster(model) else {
+        return;
+    };
+    let (sum, product) = (model.a[first], -model.a[second]);
+    let at = |lags: &[u16], lag: u16| lags.iter().position(|l| *l == lag);
     let scale = 1.0 - keep;
     model.a.iter_mut().for_each(|a| *a /= scale);
     model.a[first] = 1.0 - (1.0 - sum + product) / scale;
@@ -552,5 +564,17 @@ mod tests {
         let moved = Term::Memory(200).moved_in(&with, 205).unwrap();
         assert_eq!((moved.state_lags[1], moved.product_lags[1]), (205, 205));
         assert!(Term::Memory(200).moved_in(&with, 1).is_none());
+    }
+
+    #[test]
+    fn the_second_lag_of_a_flow_is_the_one_that_was_put_in_series() {
+        let mut model = base();
+        assert_eq!(second_lag_s(&model), None);
+        in_series(&mut model, 6.0);
+        let second = second_lag_s(&model).expect("a second order");
+        assert!(
+            (second - 6.0 * model.sample_period_s).abs() < 1e-9,
+            "{second}"
+        );
     }
 }

@@ -181,7 +181,7 @@ delay_laws! {
     edge_dependent_delay::EdgeDependentDelay,
 }
 
-// Within a place, in the order in which the physics runs.
+// Within a place, in the order in which the physics runs: what resists a motion comes after what drives it.
 catalogue! {
     valve_lag::ValveLag: ValveLag<T>,
     plenum_droop::PlenumDroop: PlenumDroop<T>,
@@ -192,10 +192,10 @@ catalogue! {
     stopping_vortex::StoppingVortex: StoppingVortex<T>,
     attachment_hysteresis::AttachmentHysteresis: AttachmentHysteresis<T>,
     amplitude_saturation::AmplitudeSaturation: AmplitudeSaturation<T>,
-    dry_friction::DryFriction: DryFriction<T>,
-    quadratic_drag::QuadraticDrag: QuadraticDrag<T>,
     bouc_wen_hysteresis::BoucWenHysteresis: BoucWenHysteresis<T>,
     vortex_shedding::VortexShedding: VortexShedding<T>,
+    dry_friction::DryFriction: DryFriction<T>,
+    quadratic_drag::QuadraticDrag: QuadraticDrag<T>,
     slow_wake::SlowWake: SlowWake<T>,
     level_rate::LevelRate: LevelRate<T>,
     rectifying_sensor::RectifyingSensor: RectifyingSensor,

@@ -162,10 +162,7 @@ fn chosen(
         }
     }
     let restarted_s = restarted.map(|samples| samples as f64 * given.sample_period_s);
-    Ok(session.conclude(
-        found,
-        [first, session.rung(&origin.judged, &[], step)],
-        &as_given,
-        restarted_s,
-    ))
+    let second = session.rung(&origin.judged, &[], step);
+    let concluded = session.conclude(found, [first.clone(), second], &as_given, restarted_s);
+    Ok(concluded.no_worse_than(given, first))
 }

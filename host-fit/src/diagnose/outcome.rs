@@ -1,5 +1,6 @@
 //! What a diagnosis hands over.
 
+use super::memory::memory;
 use super::{Memory, ParameterEstimate, Quoted, Separation};
 use crate::model::Model;
 use crate::residual::NoiseSource;
@@ -48,6 +49,26 @@ pub struct Rung {
     /// the terms have no names yet.
     #[serde(skip)]
     pub model: Option<Model>,
+}
+
+impl Diagnosis {
+    /// The same, with the model as it was given where nothing is named and the search ended
+    /// above what that leaves.
+    pub(super) fn no_worse_than(mut self, given: &Model, as_given: Rung) -> Self {
+        let named = !self.missing.is_empty() || !self.stand_ins.is_empty();
+        let last = self.ladder.last().map_or(0.0, |rung| rung.validate_rmse);
+        if named || last <= as_given.validate_rmse {
+            return self;
+        }
+        self.memory = memory(given);
+        self.ladder.push(Rung {
+            step: "the model as given, which does better".to_owned(),
+            ..as_given
+        });
+        self.model = given.clone();
+        self.base = given.clone();
+        self
+    }
 }
 
 impl Rung {

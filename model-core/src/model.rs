@@ -304,11 +304,16 @@ where
     let mut strength = |l: usize| if l == 0 { first } else { arriving.jet(l).0 };
     let mut next = recursion.next_from(known, horizon, &state.outputs, &mut strength);
     if effects.drives() {
+        let relaxation = recursion.relaxation(&mut strength);
+        let separated = recursion.separated(first, relaxation);
+        let free = || recursion.next_from(known, horizon, &state.outputs, |_| T::ZERO) - flow;
         let flow = Flow {
             now: flow,
             before: state.outputs.back(1),
             next,
-            relaxation: recursion.relaxation(&mut strength),
+            relaxation,
+            separated,
+            released: recursion.released(next - flow, separated, first, &free),
         };
         next = next + effects.drive(&mut state.effects, &flow, &at);
     }

@@ -42,7 +42,7 @@ pub enum Grading {
 
 /// The jet strengths between which [`Grading::Switched`] goes over, as a slope
 /// around one half: steep, but not a jump, so that a fit has a derivative.
-const SWITCHING_SLOPE: f64 = 10.0;
+const SWITCHING_SLOPE: f64 = 50.0;
 
 impl Grading {
     /// Every response.
@@ -235,6 +235,29 @@ impl<T: Real> Bilinear<'_, T> {
         rate
     }
 
+    /// The separated flow's share of [`relaxation`](Self::relaxation), `rate`, under the first input's jet.
+    #[inline(always)]
+    pub(crate) fn separated(&self, jet: T, rate: T) -> T {
+        let share = self.grading.share(jet);
+        // On/off jets, and rates that cannot be shared out.
+        if share == T::ZERO || share == T::ONE || rate == T::ZERO {
+            return T::ONE - share;
+        }
+        (T::ONE - share) * self.state_relaxation() / rate
+    }
+
+    /// Of a motion, s_{k+1} − s_k, what the separated flow makes, its share of the rate being `separated`:
+    /// where jets act in proportion, the two flows move side by side, and `free` is how it moves without jets.
+    #[inline(always)]
+    pub(crate) fn released(&self, motion: T, separated: T, jet: T, free: &impl Fn() -> T) -> T {
+        let part = jet != T::ZERO && jet != T::ONE;
+        if part && self.grading == Grading::Proportional {
+            (T::ONE - jet) * free()
+        } else {
+            separated * motion
+        }
+    }
+
     /// 1 − Σ a_i.
     fn state_relaxation(&self) -> T {
         self.a.iter().fold(T::ONE, |rate, a| rate - *a)
@@ -245,5 +268,50 @@ impl<T: Real> Bilinear<'_, T> {
     fn column(&self, l: usize) -> &[T] {
         let lags = self.product_lags.len();
         self.c.get(l * lags..(l + 1) * lags).unwrap_or(&[])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::history::{DelayLine, Memory};
+
+    /// A flow at 0.3 that separates at 0.02 a sample and attaches at 0.05 towards 0.8.
+    fn motion(grading: Grading, jet: f64) -> [f64; 2] {
+        let flow = Bilinear {
+            convention: LagConvention::OneStep,
+            grading,
+            constant: 0.0,
+            state_lags: &[1],
+            a: &[0.98],
+            product_lags: &[1],
+            b: &[0.04],
+            c: &[-0.03],
+        };
+        let mut y = DelayLine::<f64, 2>::new();
+        y.push(0.3);
+        let motion = flow.next(&y, |_| jet) - 0.3;
+        let separated = flow.separated(jet, flow.relaxation(|_| jet));
+        let free = || flow.next(&y, |_| 0.0) - 0.3;
+        [motion, flow.released(motion, separated, jet, &free)]
+    }
+
+    #[test]
+    fn a_motion_is_shared_out_between_the_separated_and_the_attached_flow() {
+        for grading in Grading::ALL {
+            let [motion, released] = self::motion(grading, 0.0);
+            assert!((motion + 0.02 * 0.3).abs() < 1e-12 && released == motion);
+            let [motion, released] = self::motion(grading, 1.0);
+            assert!((motion - 0.05 * (0.8 - 0.3)).abs() < 1e-12 && released == 0.0);
+        }
+        // Side by side, each for its part of the jet.
+        let [_, released] = self::motion(Grading::Proportional, 0.4);
+        assert!((released + 0.6 * 0.02 * 0.3).abs() < 1e-12);
+        // One flow of a rate between: 0.6 of 0.02 beside 0.4 of 0.05.
+        let [motion, released] = self::motion(Grading::Interpolated, 0.4);
+        assert!((released - motion * 0.012 / 0.032).abs() < 1e-12);
+        // One flow or the other.
+        let [motion, released] = self::motion(Grading::Switched, 0.4);
+        assert!(motion > 0.0 && released == motion);
     }
 }

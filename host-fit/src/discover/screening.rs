@@ -9,7 +9,7 @@ use crate::data::Record;
 use crate::model::Model;
 use crate::terms::{Screen, Search, Tangent};
 use crate::user_effect::Definition;
-use model_core::effects::{NUISANCES, ZERO_OFFSET};
+use model_core::effects::ZERO_OFFSET;
 use rayon::prelude::*;
 
 /// A curve that was screened.
@@ -39,9 +39,8 @@ const SHOWN: usize = 20_000;
 /// cannot be had there.
 fn values_of(coordinate: &Coordinate, model: &Model, records: &[&Record]) -> Option<Vec<Vec<f64>>> {
     let mut probe = model.clone();
-    // What comes after the probe would be added to it.
-    let after = |name: &str| NUISANCES.iter().any(|spec| spec.name == name);
-    probe.effects.retain(|added| !after(&added.name));
+    // It comes after the probe and would be added to it.
+    probe.effects.retain(|added| added.name != ZERO_OFFSET.name);
     let mut text = format!(
         "name = \"probe-of-a-coordinate\"\nplace = \"sensor\"\nsummary = \"a coordinate\"\nexpression = \"{}\"\n",
         coordinate.expression()

@@ -26,7 +26,7 @@ impl<'de> Deserialize<'de> for DelayTable {
 }
 
 /// What a law is called in a file: its name without "-delay".
-fn name_of(spec: &Spec) -> &'static str {
+pub(super) fn name_of(spec: &Spec) -> &'static str {
     spec.name.strip_suffix("-delay").unwrap_or(spec.name)
 }
 

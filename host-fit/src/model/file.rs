@@ -1,10 +1,10 @@
 //! The model file `model.toml`.
 
-use super::delay_table::DelayTable;
+use super::delay_table::{self, DelayTable};
 use super::{Added, Law, Model, Start, Training};
 use crate::output::{self, OutputError};
 use crate::user_effect::{Definition, DefinitionError, Source};
-use model_core::effect::Spec;
+use model_core::effect::{Place, Spec};
 use model_core::model::Averaging;
 use model_core::recursion::{Grading, LagConvention};
 use serde::{Deserialize, Serialize};
@@ -370,6 +370,7 @@ impl File {
             let added = table.into_added(&model)?;
             model.effects.push(added);
         }
+        model.order_effects();
         Ok(model)
     }
 }
@@ -394,6 +395,13 @@ impl EffectTable {
             let problem = "no such effect in the catalogue (`host-fit effects` lists them), nor under `[[definition]]`";
             return Err((key, problem.to_owned()));
         };
+        if spec.place == Place::Delay {
+            let problem = format!(
+                "it is a law of the delay: write `law = \"{}\"` and its parameters under [delay]",
+                delay_table::name_of(spec)
+            );
+            return Err((key, problem));
+        }
         if spec.channel.is_some() && (self.channel.is_none() || self.reference.is_none()) {
             let problem = "this effect needs `channel` and `reference`".to_owned();
             return Err((key, problem));
@@ -462,6 +470,29 @@ mod tests {
     }
 
     #[test]
+    fn effects_stand_in_the_order_of_the_physics() {
+        let order = [
+            "valve-lag",
+            "starting-vortex",
+            "slow-wake",
+            "level-rate",
+            "dry-friction",
+            "zero-offset",
+        ];
+        let mut model = Model::default();
+        for name in [3, 5, 1, 4, 0, 2].map(|i: usize| order[i]) {
+            let spec = model.spec(name).expect("known");
+            let values: Vec<f64> = spec.parameters.iter().map(|p| p.starts[0]).collect();
+            model.add(spec, &values, None);
+        }
+        assert_eq!(model.effect_names(), order);
+        // By hand, as it comes.
+        model.effects.reverse();
+        let read = Model::from_toml(&model.to_toml(), "m").expect("whole");
+        assert_eq!(read.effect_names(), order);
+    }
+
+    #[test]
     fn a_law_survives_and_its_faults_are_named() {
         let law = Track {
             reference: 0.8,
@@ -517,6 +548,7 @@ mod tests {
             ("window = 250", "windoe = 250", "windoe"),
             ("valve-lag", "valve-lug", "effect.valve-lug"),
             ("opening_time", "opening_tim", "opening_tim"),
+            ("valve-lag", "edge-dependent-delay", "under [delay]"),
             (
                 "sample_period_s = 0.001",
                 "sample_period_s = -1.0",

@@ -371,11 +371,16 @@ impl Model {
             channel: spec.channel.map(str::to_owned),
             reference,
         });
-        // By place, within a place as the catalogue has them, the user's last.
-        let order: Vec<(Place, &str)> = self.known().map(|spec| (spec.place, spec.name)).collect();
+        self.order_effects();
+    }
+
+    /// Brings the effects in the order of the physics: by place; of the flow, what resists a motion after what
+    /// drives it; otherwise as the catalogue has them, the user's after those, nuisances last.
+    pub(crate) fn order_effects(&mut self) {
+        let order: Vec<_> = self.known().collect();
         let rank = |added: &Added| {
-            let index = order.iter().position(|(_, name)| *name == added.name);
-            (index.map(|index| order[index].0), index)
+            let index = order.iter().position(|spec| spec.name == added.name);
+            index.map(|index| (order[index].place, order[index].resists, index))
         };
         self.effects.sort_by_key(rank);
     }

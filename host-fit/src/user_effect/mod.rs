@@ -326,6 +326,8 @@ starts = [0.1]
                     before,
                     next: y,
                     relaxation: T::from_f64(0.05),
+                    separated: T::ONE - u,
+                    released: T::ZERO,
                 };
                 let jet = effect.jet(&mut state, u, &at);
                 let reading = effect.sense(&mut state, y, &at);

@@ -202,8 +202,6 @@ pub enum Needs {
     Nothing,
     /// An input with more than two levels.
     GradedInput,
-    /// An input with two levels.
-    OnOffInput,
 }
 
 impl Needs {
@@ -214,7 +212,6 @@ impl Needs {
             Self::GradedInput if on_off => {
                 Some("the input has two levels only, which any static curve maps on two")
             }
-            Self::OnOffInput if !on_off => Some("the input is not on/off: it has no edges"),
             _ => None,
         }
     }
@@ -344,6 +341,8 @@ pub struct Spec {
     /// Whether it belongs to base models, so that it is never what one lacks: a
     /// constant delay, the sensor's zero.
     pub base: bool,
+    /// Whether it acts against a motion: it comes after all that drives the flow, or sets its rate.
+    pub resists: bool,
     /// Delay laws: what else is known of them.
     pub law: Option<LawCard>,
     /// Where to read more.
@@ -366,6 +365,7 @@ impl Spec {
         channel: None,
         needs: Needs::Nothing,
         base: false,
+        resists: false,
         law: None,
         source: "",
     };
@@ -426,6 +426,5 @@ mod tests {
         assert_eq!(Needs::Nothing.unmet(true), None);
         assert!(Needs::GradedInput.unmet(true).is_some());
         assert_eq!(Needs::GradedInput.unmet(false), None);
-        assert!(Needs::OnOffInput.unmet(false).is_some());
     }
 }

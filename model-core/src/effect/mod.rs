@@ -56,6 +56,10 @@ pub struct Flow<T> {
     pub next: T,
     /// 1 − Σa − Σc·j, per sample: turns an equilibrium level into a drive.
     pub relaxation: T,
+    /// The separated flow's share of `relaxation`: 1 without jets, 0 under full ones.
+    pub separated: T,
+    /// The separated flow's share of the motion, s_{k+1} − s_k.
+    pub released: T,
 }
 
 impl<T: Real> Flow<T> {
@@ -65,6 +69,7 @@ impl<T: Real> Flow<T> {
     pub fn driven_by(&self, drive: T) -> Self {
         Self {
             next: self.next + drive,
+            released: self.released + self.separated * drive,
             ..*self
         }
     }

@@ -63,6 +63,8 @@ pub(super) fn flow<E: Effect<f64>>(effect: &E, level: impl Fn(usize) -> f64) -> 
             before,
             next,
             relaxation: RELAXATION,
+            separated: 1.0,
+            released: next - now,
         };
         before = now;
         now = next + effect.drive(&mut state, &seen, &instant(0.0, &[]));
@@ -221,6 +223,8 @@ fn added(spec: &Spec, parameters: &[f64]) -> Vec<f64> {
             before,
             next,
             relaxation: 0.03,
+            separated: 1.0 - jet,
+            released: (1.0 - jet) * (next - now),
         };
         before = now;
         let shaped = effect.jet(&mut state, jet, &at) - jet;

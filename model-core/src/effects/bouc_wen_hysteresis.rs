@@ -98,6 +98,8 @@ mod tests {
                 before,
                 next: now,
                 relaxation: 1.0,
+                separated: 1.0,
+                released: 0.0,
             };
             before = now;
             effect.drive(&mut z, &seen, &at)

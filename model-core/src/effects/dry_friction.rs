@@ -40,6 +40,7 @@ impl<T: Real> Physics<T> for DryFriction<T> {
             &[0.001, 0.03, 0.3],
         )],
         amplitude: Some(Amplitude::new("level", "dry friction")),
+        resists: true,
         source: "Coulomb friction; Armstrong-Hélouvry et al., Automatica 30 (1994)",
         ..Spec::PLAIN
     };

@@ -3,7 +3,7 @@
 
 use crate::delay::Transport;
 use crate::effect::{
-    LawCard, Needs, Parameter, Physics, Place, Setting, Spec, StartValue, Starts, Unit, take,
+    LawCard, Parameter, Physics, Place, Setting, Spec, StartValue, Starts, Unit, take,
 };
 use crate::real::Real;
 
@@ -11,7 +11,8 @@ use crate::real::Real;
 ///
 /// The edge that travels longer is held back by the difference before the jets,
 /// and everything then travels for the shorter time; a pulse (or gap) shorter
-/// than the difference never arrives. Delays need not be whole samples: an edge
+/// than the difference never arrives, nor does a level of a graded command that
+/// changes again within it. Delays need not be whole samples: an edge
 /// between samples is a sample of part strength.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeDependentDelay<T> {
@@ -24,41 +25,51 @@ pub struct EdgeDependentDelay<T> {
 }
 
 /// How long the command has been what it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Run {
-    on: bool,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Run<T> {
+    /// Its level.
+    level: T,
+    /// What had got through when it changed to that level.
+    before: T,
+    /// What has got through.
+    through: T,
     samples: u32,
 }
 
-impl Default for Run {
+impl<T: Real> Transport<T> for EdgeDependentDelay<T> {
+    type State = Run<T>;
     /// Off for ever.
-    fn default() -> Self {
-        Self {
-            on: false,
+    fn start(&self) -> Run<T> {
+        Run {
+            level: T::ZERO,
+            before: T::ZERO,
+            through: T::ZERO,
             samples: u32::MAX,
         }
     }
-}
-
-impl<T: Real> Transport<T> for EdgeDependentDelay<T> {
-    type State = Run;
-    fn start(&self) -> Run {
-        Run::default()
-    }
 
     #[inline]
-    fn command(&self, run: &mut Run, command: T) -> T {
-        let on = command > T::from_f64(0.5);
-        if on == run.on {
+    fn command(&self, run: &mut Run<T>, command: T) -> T {
+        if command == run.level {
             run.samples = run.samples.saturating_add(1);
         } else {
-            *run = Run { on, samples: 1 };
+            *run = Run {
+                level: command,
+                before: run.through,
+                through: run.through,
+                samples: 1,
+            };
         }
         // Beyond 2²⁰ samples no edge is under way; the count stays exact in f32.
         let since = T::from_count(run.samples.min(1 << 20));
-        let hold = if on { self.hold_rise } else { self.hold_fall };
+        let hold = if run.level > run.before {
+            self.hold_rise
+        } else {
+            self.hold_fall
+        };
         let passed = (since - hold).at_least(T::ZERO).at_most(T::ONE);
-        if on { passed } else { T::ONE - passed }
+        run.through = run.before + (run.level - run.before) * passed;
+        run.through
     }
 
     #[inline]
@@ -92,7 +103,6 @@ impl<T: Real> Physics<T> for EdgeDependentDelay<T> {
             &[StartValue::Delay(18.0), StartValue::Delay(-18.0)],
             &[StartValue::Delay(1.0), StartValue::Delay(-1.0)],
         ]),
-        needs: Needs::OnOffInput,
         law: Some(LawCard {
             words: "{} after rising, {} after falling edges",
             shapes_command: true,
@@ -120,6 +130,10 @@ mod tests {
     use crate::delay::Tap;
 
     fn arrivals(rise: f64, fall: f64, command: impl Fn(usize) -> bool) -> [f64; 200] {
+        graded_arrivals(rise, fall, |k| f64::from(u8::from(command(k))))
+    }
+
+    fn graded_arrivals(rise: f64, fall: f64, command: impl Fn(usize) -> f64) -> [f64; 200] {
         let setting = Setting {
             period: 0.001,
             channel: 0,
@@ -127,8 +141,7 @@ mod tests {
         };
         let law = EdgeDependentDelay::new(&[rise, fall], &setting);
         let mut run = law.start();
-        let shaped: [f64; 200] =
-            core::array::from_fn(|k| law.command(&mut run, if command(k) { 1.0 } else { 0.0 }));
+        let shaped: [f64; 200] = core::array::from_fn(|k| law.command(&mut run, command(k)));
         core::array::from_fn(|k| {
             let tap = Tap::between(law.delay(0.0));
             let read = |lag: usize| if lag <= k { shaped[k - lag] } else { 0.0 };
@@ -160,6 +173,26 @@ mod tests {
         let arrived = arrivals(0.0304, 0.0201, |k| (10..100).contains(&k));
         let area: f64 = arrived.iter().sum();
         assert!((area - (90.0 - 10.3)).abs() < 1e-9, "{area}");
+    }
+
+    #[test]
+    fn every_level_of_a_graded_command_arrives_up_late_and_down_early() {
+        let command = |k: usize| match k {
+            10..60 => 0.4,
+            60..110 => 0.9,
+            110..150 => 0.2,
+            _ => 0.0,
+        };
+        let arrived = graded_arrivals(0.030, 0.020, command);
+        let expected = |k: usize| match k {
+            40..90 => 0.4,
+            90..130 => 0.9,
+            130..170 => 0.2,
+            _ => 0.0,
+        };
+        for (k, level) in arrived.iter().enumerate() {
+            assert!((level - expected(k)).abs() < 1e-9, "sample {k}: {level}");
+        }
     }
 
     #[test]

@@ -8,8 +8,8 @@ use crate::effect::{
 };
 use crate::real::Real;
 
-/// Multiplies the step of the flow by 1 + (p + (q − p)·j)·s: p where the jets are
-/// off, q under full jets.
+/// Multiplies what the separated flow has in the step of the flow by 1 + p·s and what the
+/// attached one has by 1 + q·s: all of it where the jets are off, or full.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevelRate<T> {
     separating: T,
@@ -24,9 +24,9 @@ impl<T: Real> Effect<T> for LevelRate<T> {
         true
     }
     #[inline]
-    fn drive(&self, _state: &mut (), flow: &Flow<T>, at: &Instant<'_, T>) -> T {
-        let slope = self.separating + (self.attaching - self.separating) * at.arrived;
-        slope * flow.now * (flow.next - flow.now)
+    fn drive(&self, _state: &mut (), flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
+        let attached = flow.next - flow.now - flow.released;
+        flow.now * (self.separating * flow.released + self.attaching * attached)
     }
 }
 
@@ -36,7 +36,7 @@ impl<T: Real> Physics<T> for LevelRate<T> {
         rust: "level_rate::LevelRate",
         place: Place::Flow,
         summary: "the rate of the flow depends on its level",
-        equation: "adds (p + (q − p)·j)·s_k·(s_{k+1} − s_k)",
+        equation: "adds s_k·(p·Δs_off + q·Δs_on), Δs_off + Δs_on being s_{k+1} − s_k",
         parameters: &[
             Parameter::new("separating", Unit::PerY, [-3.0, 3.0], &[0.0]),
             Parameter::new("attaching", Unit::PerY, [-3.0, 3.0], &[0.0]),

@@ -181,7 +181,7 @@ delay_laws! {
     edge_dependent_delay::EdgeDependentDelay,
 }
 
-// Within a place, in the order in which the physics runs: what resists a motion comes after what drives it.
+// Within a place, in the order in which the physics runs.
 catalogue! {
     valve_lag::ValveLag: ValveLag<T>,
     plenum_droop::PlenumDroop: PlenumDroop<T>,
@@ -221,7 +221,8 @@ pub const LEVEL_RATE: &Spec = &<LevelRate<f64> as Physics<f64>>::SPEC;
 /// The card of a slow wake: a third one.
 pub const SLOW_WAKE: &Spec = &<SlowWake<f64> as Physics<f64>>::SPEC;
 
-/// The nuisances that a base model may have, after all effects: a rate is that of every motion.
+/// The nuisances that a base model may have, after all effects but those that resist a motion: a rate is that of
+/// all that drives the flow.
 pub const NUISANCES: [&Spec; 3] = [SLOW_WAKE, LEVEL_RATE, ZERO_OFFSET];
 
 /// How many of `specs` a model can lack.

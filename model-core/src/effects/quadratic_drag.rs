@@ -40,6 +40,7 @@ impl<T: Real> Physics<T> for QuadraticDrag<T> {
             Parameter::new("coefficient", Unit::SamplesPerY, [-1000.0, 1000.0], &[1.0]).positive(),
         ],
         amplitude: Some(Amplitude::new("coefficient", "quadratic drag")),
+        resists: true,
         source: "Morison et al. (1950)",
         ..Spec::PLAIN
     };

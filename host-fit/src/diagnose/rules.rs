@@ -17,6 +17,8 @@ rules! {
     level_of_search: f64 = 0.02, "p-value", "three false names in a hundred are too many";
     /// What promises to be named on a given model at the noise floor is looked at from this p-value on.
     worth_a_search: f64 = 0.1, "p-value", "judgement: one null in ten costs a search";
+    /// Effects in the place of something without a name that are followed to the end on a given model at the noise floor.
+    settled: usize = 2, "", "judgement: for the time it takes";
     /// An effect must lower the held-out error of the best base without it by this fraction, unless it does as well with
     /// fewer parameters.
     worthwhile: f64 = 0.015, "share of the rms error", "nulls of six families: chance manages 0.01";

@@ -198,13 +198,7 @@ impl Session<'_> {
     fn compared(&self, with: &Hypothesis, root: &Hypothesis) -> Compared {
         let effects = with.terms.iter().filter_map(Term::effect);
         let names: Vec<&str> = effects.map(|spec| spec.name).collect();
-        let mut context = with.clone();
-        while let Some(index) = context.terms.iter().rposition(|t| t.effect().is_some()) {
-            match self.search.without(&context, index, root) {
-                Some(lesser) => context = lesser,
-                None => break,
-            }
-        }
+        let context = self.search.without_effects(with, root, |_| true);
         let seed = self.options.seed;
         let (others, chance) = rivals_and_chance(self.search, &context, &names, &with.judged, seed);
         Compared {

@@ -11,6 +11,7 @@ use crate::terms::{
     Found, HeldOut, Hypothesis, Judged, Noise, RULES as TERMS, Screen, Table, Term, p_value,
 };
 use model_core::effect::Spec;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 impl Session<'_> {
@@ -73,19 +74,29 @@ impl Session<'_> {
     fn imitated(&self, given: &Model, as_given: &HeldOut) -> bool {
         Term::UNNAMED.iter().any(|stand_in| {
             let without = stand_in.taken_from(given, given);
-            without != *given
-                && self
-                    .search
-                    .in_place_of(stand_in, &without, |term| term.effect().is_some())
-                    .iter()
-                    .any(|other| {
-                        let ratio = other.held_out.rmse() / as_given.rmse();
-                        let p = p_value(as_given, &other.held_out);
-                        let better = ratio < 1.0 - RULES.alike && p < RULES.level;
-                        let leaner =
-                            ratio < 1.0 + RULES.alike && other.term.cost() < stand_in.cost();
-                        better || leaner
-                    })
+            if without == *given {
+                return false;
+            }
+            let search = self.search;
+            let others = search.in_place_of(stand_in, &without, |term| term.effect().is_some());
+            let lags = Term::lags_of(&without);
+            // The lags were found beside what stands in: they move before anything is said.
+            let others: Vec<_> = others.into_iter().take(RULES.settled).collect();
+            others.into_par_iter().any(|other| {
+                let near = other.held_out.rmse() < TERMS.in_reach * as_given.rmse();
+                let terms = [lags.clone(), vec![other.term.clone()]].concat();
+                let count = terms.len();
+                let end = near
+                    .then(|| search.finish(terms, other.fit, count))
+                    .flatten();
+                end.is_some_and(|end| {
+                    let ratio = end.judged.rmse() / as_given.rmse();
+                    let p = p_value(as_given, &end.judged.held_out);
+                    let better = ratio < 1.0 - RULES.alike && p < RULES.level;
+                    let leaner = ratio < 1.0 + RULES.alike && other.term.cost() < stand_in.cost();
+                    better || leaner
+                })
+            })
         })
     }
 
@@ -216,10 +227,33 @@ impl Session<'_> {
                 best.judged.model().candidates().count() as f64 * p >= RULES.level
             })
         } else if found.best.terms.iter().filter_map(Term::effect).count() > 1 {
-            self.pared(found, |lesser, best| self.is_beside_the_point(lesser, best))
+            let pared = self.pared(found, |lesser, best| self.is_beside_the_point(lesser, best));
+            // Where a base fits, several effects that do nothing but together are a curve through its errors.
+            if self.fits(&found.bare.judged) && !self.one_leads(&pared, found) {
+                return found.bare.clone();
+            }
+            pared
         } else {
             found.best.clone()
         }
+    }
+
+    /// Whether one of the effects of `best` does better than the best without effects when it is alone.
+    fn one_leads(&self, best: &Hypothesis, found: &Found) -> bool {
+        let names: Vec<&str> = best
+            .terms
+            .iter()
+            .filter_map(Term::effect)
+            .map(|spec| spec.name)
+            .collect();
+        names.len() < 2
+            || names.iter().any(|name| {
+                let alone = self
+                    .search
+                    .without_effects(best, &found.root, |spec| spec.name != *name);
+                alone.judged.rmse() < (1.0 - RULES.worthwhile) * found.bare.judged.rmse()
+                    && self.more_than_chance(&alone, &found.bare).is_some()
+            })
     }
 
     /// Whether an effect beside others has not earned its name: where the model does without it,

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 pub(crate) struct InPlace {
     pub(crate) term: Term,
     pub(crate) held_out: HeldOut,
-    fit: Fit,
+    pub(crate) fit: Fit,
 }
 
 impl Search<'_> {

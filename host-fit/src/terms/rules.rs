@@ -25,7 +25,9 @@ rules! {
     /// Proposals with effects that are refitted per model …
     with_effects: usize = 5, "", "the truth was within the first three on 80 rigs of six families";
     /// … and proposals without.
-    without_effects: usize = 2, "", "the same rigs";
+    without_effects: usize = 4, "", "a rate that depends on y was the fourth beside lags of all kinds";
+    /// … of them of one kind.
+    of_one_kind: usize = 2, "", "judgement: lags are moved to where they belong";
     /// Of what was refitted for a few steps, how many are followed to the end.
     finished: usize = 4, "", "the same rigs";
     /// A given structure of more terms than this is no place to set out from.

@@ -332,21 +332,24 @@ impl Search<'_> {
         let table = Table::of(&screen, &self.known, effects);
         let (mut with, mut without) = (0, 0);
         let mut met = Vec::new();
-        let mut kept = Vec::new();
+        let mut kept: Vec<Proposal> = Vec::new();
         for proposal in screen.proposals(&table) {
             let added = count_effects(&proposal.terms);
-            let (count, most) = if added > 0 {
-                (&mut with, RULES.with_effects)
+            let again = |other: &&Proposal| Term::are_of_one_kind(&other.terms, &proposal.terms);
+            let enough = if added > 0 {
+                with >= RULES.with_effects
             } else {
-                (&mut without, RULES.without_effects)
+                // Lags move: neighbours are one proposal.
+                without >= RULES.without_effects
+                    || kept.iter().filter(again).count() >= RULES.of_one_kind
             };
             let key = signature(&hypothesis.terms, &proposal.terms);
             let too_many = present + added > self.most_effects;
-            if *count >= most || too_many || tried.contains(&key) || met.contains(&key) {
+            if enough || too_many || tried.contains(&key) || met.contains(&key) {
                 continue;
             }
             met.push(key);
-            *count += 1;
+            *(if added > 0 { &mut with } else { &mut without }) += 1;
             kept.push(proposal);
         }
         if effects && hypothesis.is_bare() {
@@ -635,6 +638,25 @@ impl Search<'_> {
         let term = &hypothesis.terms[index];
         let model = term.taken_from(hypothesis.judged.model(), root.judged.model());
         self.less(hypothesis, index, &model)
+    }
+
+    /// A hypothesis refitted without those of its effects that are `unwanted`, the last first.
+    #[must_use]
+    pub fn without_effects(
+        &self,
+        hypothesis: &Hypothesis,
+        root: &Hypothesis,
+        unwanted: impl Fn(&Spec) -> bool,
+    ) -> Hypothesis {
+        let mut rest = hypothesis.clone();
+        let is_unwanted = |term: &Term| term.effect().is_some_and(&unwanted);
+        while let Some(index) = rest.terms.iter().rposition(is_unwanted) {
+            match self.without(&rest, index, root) {
+                Some(lesser) => rest = lesser,
+                None => break,
+            }
+        }
+        rest
     }
 
     /// The same from `model`, which is without the term.

@@ -41,25 +41,31 @@ impl Term {
     /// effects; their values are the search's.
     pub(crate) const UNNAMED: [Self; 3] = [Self::LevelRate, Self::Wake(0.0), Self::Inertia(0.0)];
 
-    /// The terms that make `model` of the structure of `lean`; `None` where it is built
-    /// otherwise.
-    pub(super) fn all_of(model: &Model, lean: &Model) -> Option<Vec<Self>> {
-        let has = |lags: &[u16], lag: u16| lags.contains(&lag);
-        let mut terms = Vec::new();
-        if has(&model.state_lags, BEFORE) {
-            terms.push(Self::Inertia(0.0));
-        }
+    /// The lags of `model` that can move, as terms.
+    pub(crate) fn lags_of(model: &Model) -> Vec<Self> {
         let mut lags = [&model.state_lags[..], &model.product_lags].concat();
         lags.sort_unstable();
         lags.dedup();
         lags.retain(|lag| *lag != NEWEST && *lag != BEFORE);
-        terms.extend(lags.into_iter().map(|lag| {
-            match (has(&model.state_lags, lag), has(&model.product_lags, lag)) {
+        let term = |lag: u16| {
+            let (state, product) = (&model.state_lags, &model.product_lags);
+            match (state.contains(&lag), product.contains(&lag)) {
                 (true, true) => Self::Memory(lag),
                 (true, false) => Self::State(lag),
                 _ => Self::Product(lag),
             }
-        }));
+        };
+        lags.into_iter().map(term).collect()
+    }
+
+    /// The terms that make `model` of the structure of `lean`; `None` where it is built
+    /// otherwise.
+    pub(super) fn all_of(model: &Model, lean: &Model) -> Option<Vec<Self>> {
+        let mut terms = Vec::new();
+        if model.state_lags.contains(&BEFORE) {
+            terms.push(Self::Inertia(0.0));
+        }
+        terms.extend(Self::lags_of(model));
         for added in &model.effects {
             match added.name.as_str() {
                 name if name == LEVEL_RATE.name => terms.push(Self::LevelRate),
@@ -200,6 +206,17 @@ impl Term {
                 .iter()
                 .zip(&other)
                 .all(|(a, b)| a.0 == b.0 && usize::from(a.1.abs_diff(b.1)) <= RULES.lags_apart)
+    }
+
+    /// Whether two lists of terms differ in where they are only: in lags, times and starting values.
+    #[must_use]
+    pub(super) fn are_of_one_kind(one: &[Self], other: &[Self]) -> bool {
+        let sorted = |terms: &[Self]| {
+            let mut all: Vec<String> = terms.iter().map(Self::kind).collect();
+            all.sort();
+            all
+        };
+        sorted(one) == sorted(other)
     }
 
     fn reads_states(&self) -> bool {

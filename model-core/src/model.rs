@@ -304,7 +304,7 @@ where
     let mut strength = |l: usize| if l == 0 { first } else { arriving.jet(l).0 };
     let mut next = recursion.next_from(known, horizon, &state.outputs, &mut strength);
     if effects.drives() {
-        let relaxation = recursion.relaxation(&mut strength);
+        let relaxation = recursion.rate(first);
         let separated = recursion.separated(first, relaxation);
         let free = || recursion.next_from(known, horizon, &state.outputs, |_| T::ZERO) - flow;
         let flow = Flow {

@@ -44,6 +44,9 @@ pub enum Grading {
 /// around one half: steep, but not a jump, so that a fit has a derivative.
 const SWITCHING_SLOPE: f64 = 50.0;
 
+/// A lag below this, in samples, is of the order of the flow; from it on it is a memory.
+pub const SHORTEST_MEMORY: usize = 20;
+
 impl Grading {
     /// Every response.
     pub const ALL: [Self; 3] = [Self::Proportional, Self::Interpolated, Self::Switched];
@@ -67,10 +70,10 @@ impl Grading {
 /// y_{k+1} = d + Σ_i a_i y_{k−τ_i} + Σ_l ( b_l + Σ_j c_jl y_{k−τ̄_j} ) j_l
 ///
 /// with j_l the jet strength that arrives through input delay l (u_{k−h_l}
-/// where nothing shapes the command). With another [`Grading`] than
-/// proportional, j_l multiplies b_l·ρ/ρ_l and the products take its share,
-/// ρ being [`relaxation`](Self::relaxation) and ρ_l that of input l at full
-/// strength: the same for on/off jets.
+/// where nothing shapes the command). With another [`Grading`] than proportional, one
+/// input and jets of part strength, the flow goes at a rate between the separated flow's and the
+/// attached one's to a level in proportion between theirs; what terms of
+/// [`SHORTEST_MEMORY`] and more add is part of the level. For on/off jets it is the same.
 #[derive(Clone, Copy, Debug)]
 pub struct Bilinear<'a, T> {
     /// What the lags mean.
@@ -110,7 +113,8 @@ impl<T: Real> Known<T> {
 
 impl<T: Real> Bilinear<'_, T> {
     /// The terms with lags of `horizon` samples and more, `ahead` samples from
-    /// now (less than `horizon`): they read what has happened already.
+    /// now (less than `horizon`, which is no less than [`SHORTEST_MEMORY`]): they read
+    /// what has happened already.
     #[inline(always)]
     pub fn known(&self, y: &impl Past<T>, horizon: usize, ahead: usize) -> Known<T> {
         let mut known = Known::NOTHING;
@@ -147,15 +151,17 @@ impl<T: Real> Bilinear<'_, T> {
         y: &impl Past<T>,
         mut arriving: impl FnMut(usize) -> T,
     ) -> T {
+        if self.grading != Grading::Proportional
+            && let [drive] = self.b
+        {
+            return self.graded(*drive, known, horizon, y, arriving(0));
+        }
         let mut next = self.constant + known.free;
         for (a, lag) in self.a.iter().zip(self.state_lags) {
             let lag = self.convention.behind_newest(*lag);
             if lag < horizon {
                 next = next + *a * y.back(lag);
             }
-        }
-        if self.grading != Grading::Proportional {
-            return self.graded(next, known, horizon, y, arriving);
         }
         for l in 0..self.b.len() {
             let jet = arriving(l);
@@ -195,30 +201,83 @@ impl<T: Real> Bilinear<'_, T> {
         gain
     }
 
-    /// The inputs' part of [`next`](Self::next) where it is not proportional.
-    fn graded(
-        &self,
-        free: T,
-        known: &Known<T>,
-        horizon: usize,
-        y: &impl Past<T>,
-        mut arriving: impl FnMut(usize) -> T,
-    ) -> T {
-        let rate = self.relaxation(&mut arriving);
-        let mut next = free;
-        for (l, b) in self.b.iter().enumerate() {
-            let jet = arriving(l);
-            if jet == T::ZERO {
-                continue;
+    /// [`next`](Self::next) of a flow with one input and another grading than proportional.
+    fn graded(&self, drive: T, known: &Known<T>, horizon: usize, y: &impl Past<T>, jet: T) -> T {
+        let limit = self.order();
+        let share = self.grading.share(jet);
+        let [off, on] = self.rates(limit);
+        // What is known is of the past.
+        let (mut free, mut past) = (self.constant, known.free);
+        for (a, lag) in self.a.iter().zip(self.state_lags) {
+            let lag = self.convention.behind_newest(*lag);
+            let sum = if lag < limit { &mut free } else { &mut past };
+            if lag < horizon {
+                *sum = *sum + *a * y.back(lag);
             }
-            let gain = self.products(l, T::ZERO, known, horizon, y);
-            let full = self
-                .column(l)
-                .iter()
-                .fold(self.state_relaxation(), |full, c| full - *c);
-            next = next + gain * self.grading.share(jet) + *b * jet * rate / full;
         }
-        next
+        let (mut gain, mut past_gain) = (T::ZERO, known.gain);
+        for (c, lag) in self.column(0).iter().zip(self.product_lags) {
+            let lag = self.convention.behind_newest(*lag);
+            let sum = if lag < limit {
+                &mut gain
+            } else {
+                &mut past_gain
+            };
+            if lag < horizon {
+                *sum = *sum + *c * y.back(lag);
+            }
+        }
+        if jet == T::ZERO {
+            return free + past;
+        }
+        if limit == usize::MAX {
+            // All is of the flow's order, the past that is known too.
+            (free, gain) = (free + past, gain + past_gain);
+            (past, past_gain) = (T::ZERO, T::ZERO);
+        }
+        let rate = off + (on - off) * share;
+        let separated = if past == T::ZERO {
+            T::ZERO
+        } else {
+            (T::ONE - jet) * past / off
+        };
+        let attached = jet * (drive + past + past_gain) / on;
+        free + gain * share + rate * (separated + attached)
+    }
+
+    /// Lags below this are those of the flow's order: all of them where the short ones alone would not let the
+    /// flow go to any level.
+    #[inline(always)]
+    fn order(&self) -> usize {
+        let [off, on] = self.rates(SHORTEST_MEMORY);
+        if off > T::ZERO && on > T::ZERO {
+            SHORTEST_MEMORY
+        } else {
+            usize::MAX
+        }
+    }
+
+    /// The rates, per sample, at which the separated flow goes to its level and the attached one under the first
+    /// input: 1 − Σ a_i, and that − Σ c_j1, of lags below `limit`.
+    #[inline(always)]
+    fn rates(&self, limit: usize) -> [T; 2] {
+        let sum = |start: T, coefficients: &[T], lags: &[u16]| {
+            let mut all = coefficients.iter().zip(lags);
+            all.by_ref().fold(start, |rate, (x, lag)| {
+                let counts = self.convention.behind_newest(*lag) < limit;
+                if counts { rate - *x } else { rate }
+            })
+        };
+        let off = sum(T::ONE, self.a, self.state_lags);
+        [off, sum(off, self.column(0), self.product_lags)]
+    }
+
+    /// The rate, per sample, at which y goes to the level of the moment, which holds what the flow remembers, under
+    /// the first input's jet.
+    #[inline(always)]
+    pub(crate) fn rate(&self, jet: T) -> T {
+        let [off, on] = self.rates(self.order());
+        off + (on - off) * self.grading.share(jet)
     }
 
     /// The rate, per sample, at which y approaches its equilibrium under
@@ -235,7 +294,7 @@ impl<T: Real> Bilinear<'_, T> {
         rate
     }
 
-    /// The separated flow's share of [`relaxation`](Self::relaxation), `rate`, under the first input's jet.
+    /// The separated flow's share of [`rate`](Self::rate) under the first input's jet.
     #[inline(always)]
     pub(crate) fn separated(&self, jet: T, rate: T) -> T {
         let share = self.grading.share(jet);
@@ -243,7 +302,8 @@ impl<T: Real> Bilinear<'_, T> {
         if share == T::ZERO || share == T::ONE || rate == T::ZERO {
             return T::ONE - share;
         }
-        (T::ONE - share) * self.state_relaxation() / rate
+        let [off, _] = self.rates(self.order());
+        (T::ONE - share) * off / rate
     }
 
     /// Of a motion, s_{k+1} − s_k, what the separated flow makes, its share of the rate being `separated`:
@@ -291,7 +351,7 @@ mod tests {
         let mut y = DelayLine::<f64, 2>::new();
         y.push(0.3);
         let motion = flow.next(&y, |_| jet) - 0.3;
-        let separated = flow.separated(jet, flow.relaxation(|_| jet));
+        let separated = flow.separated(jet, flow.rate(jet));
         let free = || flow.next(&y, |_| 0.0) - 0.3;
         [motion, flow.released(motion, separated, jet, &free)]
     }
@@ -313,5 +373,38 @@ mod tests {
         // One flow or the other.
         let [motion, released] = self::motion(Grading::Switched, 0.4);
         assert!(motion > 0.0 && released == motion);
+    }
+
+    #[test]
+    fn under_part_of_a_jet_the_level_with_its_memory_is_in_proportion() {
+        let (now, past) = (0.3, 0.7);
+        for (grading, rate) in [(Grading::Switched, 0.02), (Grading::Interpolated, 0.032)] {
+            let flow = Bilinear {
+                convention: LagConvention::OneStep,
+                grading,
+                constant: 0.0,
+                state_lags: &[1, 30],
+                a: &[0.98, 0.004],
+                product_lags: &[30, 1],
+                b: &[0.04],
+                c: &[-0.01, -0.03],
+            };
+            let mut y = DelayLine::<f64, 40>::new();
+            y.push(past);
+            (0..29).for_each(|_| y.push(now));
+            let off = 0.004 * past / 0.02;
+            let on = (0.04 + (0.004 - 0.01) * past) / 0.05;
+            let level = |jet: f64| off + (on - off) * jet;
+            let next = |jet: f64| flow.next(&y, |_| jet);
+            assert!((flow.rate(0.4) - rate).abs() < 1e-12);
+            assert!((next(0.4) - now - rate * (level(0.4) - now)).abs() < 1e-12);
+            // On/off jets meet eq. (3).
+            assert!((next(0.0) - now - 0.02 * (level(0.0) - now)).abs() < 1e-12);
+            assert!((next(1.0) - now - 0.05 * (level(1.0) - now)).abs() < 1e-12);
+            // What is known before is added as if it were summed.
+            let known = flow.known(&y, SHORTEST_MEMORY, 0);
+            let again = flow.next_from(&known, SHORTEST_MEMORY, &y, |_| 0.4);
+            assert!((again - next(0.4)).abs() < 1e-12);
+        }
     }
 }

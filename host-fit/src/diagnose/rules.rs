@@ -1,6 +1,7 @@
 //! The rules of the verdict.
 
 use crate::rules;
+use model_core::recursion::SHORTEST_MEMORY;
 
 rules! {
     /// When a misfit counts, when an effect is named, and when it only stands in for something else.
@@ -43,7 +44,7 @@ rules! {
     /// Of so many `validate` records every third is kept back, and the last error is quoted there as well.
     enough_to_quote: usize = 4, "records", "judgement: fewer than three to choose by are too few";
     /// A lag below this is the order of the flow, not a memory.
-    shortest_memory: usize = 20, "samples", "judgement: as long as a fast flow takes";
+    shortest_memory: usize = SHORTEST_MEMORY, "samples", "judgement: as long as a fast flow takes; the model's own";
     /// A rate below this share of that of the way back is what lags leave that cancel: it is no rate.
     cancelled: f64 = 0.01, "share of the rate", "judgement";
 }

@@ -263,7 +263,8 @@ impl Session<'_> {
         let judge = self.judge();
         let excess = |hypothesis: &Hypothesis| judge.excess(&hypothesis.judged.held_out);
         let little = best.judged.rmse() > (1.0 - RULES.worthwhile) * lesser.judged.rmse()
-            || excess(best) > (1.0 - RULES.stands_in) * excess(lesser);
+            || excess(best) > (1.0 - RULES.stands_in) * excess(lesser)
+            || judge.over_noise(lesser.judged.rmse()) <= RULES.at_once;
         (little && self.fits(&lesser.judged)) || self.more_than_chance(best, lesser).is_none()
     }
 

@@ -54,7 +54,8 @@ pub struct Flow<T> {
     /// s_{k+1} as it would be with the flow effects that come before this one and no
     /// others: what changes the rate of a motion, or resists it, must know the motion.
     pub next: T,
-    /// 1 − Σa − Σc·j, per sample: turns an equilibrium level into a drive.
+    /// 1 − Σa − Σc·j of the lags below [`SHORTEST_MEMORY`](crate::recursion::SHORTEST_MEMORY), per sample: the rate
+    /// at which the flow goes to the level of the moment, which turns a level into a drive.
     pub relaxation: T,
     /// The separated flow's share of `relaxation`: 1 without jets, 0 under full ones.
     pub separated: T,

@@ -411,7 +411,7 @@ fn descend(
             ..Searched::of(index, coordinate)
         })
         .collect();
-    let problem = FreeRunProblem {
+    let mut problem = FreeRunProblem {
         model,
         signals: signals?,
         measured: records.iter().map(|record| record.y.as_slice()).collect(),
@@ -430,13 +430,30 @@ fn descend(
             model.free_run(record)?;
         }
     }
-    let end = minimise(
-        &problem,
-        values,
-        cost,
-        options.iterations,
-        options.tolerance,
-    );
+    let descent = |problem: &FreeRunProblem<'_>, values, cost| {
+        minimise(problem, values, cost, options.iterations, options.tolerance)
+    };
+    let mut end = descent(&problem, values, cost);
+    // A sensor that shows the jets jumps where an edge crosses a sample: the error has steps along the delays,
+    // and the others may have a way down still.
+    for _ in 0..RULES.held_delays {
+        if end.stop != FitStop::NoDescent {
+            break;
+        }
+        let is_delay = |axis: &Searched| matches!(coordinates[axis.index].kind, Kind::Delay(_));
+        let (delays, others) = problem.axes.into_iter().partition(is_delay);
+        problem.axes = others;
+        let without: Vec<Searched> = delays;
+        let held = descent(&problem, end.values.clone(), end.cost);
+        problem.axes.extend(without);
+        problem.axes.sort_by_key(|axis| axis.index);
+        if held.cost > (1.0 - options.tolerance) * end.cost {
+            break;
+        }
+        let made = end.iterations + held.iterations;
+        end = descent(&problem, held.values, held.cost);
+        end.iterations += made;
+    }
     let covariance = end
         .linearised
         .and_then(|(parts, information)| {

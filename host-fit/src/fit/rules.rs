@@ -13,6 +13,8 @@ rules! {
     iterations: usize = 30, "", "judgement";
     /// A fit ends when an iteration lowers the sum of squares by less than this.
     tolerance: f64 = 1e-5, "share of the sum of squares", "judgement: far below what a diagnosis can tell";
+    /// Times that a fit which finds no way down goes on with its delays held.
+    held_delays: usize = 3, "", "judgement: each has to lower the error";
     /// Iterations that every starting point is followed for before the best are chosen.
     brief: usize = 4, "", "campaign, seed 33000: after one iteration a hysteresis lost its thresholds, after four it is found";
     /// Iterations for a delay that is tried one step further.

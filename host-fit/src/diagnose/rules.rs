@@ -27,16 +27,14 @@ rules! {
     alike: f64 = 0.005, "share of the rms error", "judgement: a tenth of what two seeds of noise differ by";
     /// Effects that leave the model above the noise are named if they take at least this share of the excess …
     explained: f64 = 0.95, "share of the excess", "altered laws leave 1 to 4 % of an excess";
-    /// … and leave no more than this factor; otherwise they stand in for something else.
-    nearly: f64 = 1.25, "times the noise floor", "the same";
     /// Where the noise is not known, this share of the excess is enough to be named.
     explained_in_unknown_noise: f64 = 0.75, "share of the excess", "the public sets";
-    /// Effects that take less than this share of the excess are not named, nor do they stand in.
-    stands_in: f64 = 0.5, "share of the excess", "judgement: half";
-    /// Where slow noise is not known, a misfit counts if this share of it depends on something …
+    /// Effects that take less than this share of the excess are not named …
+    most: f64 = 0.5, "share of the excess", "judgement: half";
+    /// … and where they leave the model above the noise, they stand in for something else if they take this share.
+    stands_in: f64 = 0.25, "share of the excess", "judgement: nothing is claimed, and the model that is handed over errs less";
+    /// Where slow noise is not known, a misfit counts if this share of it depends on something.
     depends: f64 = 0.1, "share of the excess", "the public sets";
-    /// … or if it is more than noise can be in a recording worth fitting.
-    too_much: f64 = 0.06, "share of the variance of y", "the public sets";
     /// Where neither the noise is known nor anything shows that the base errs, an effect must lower the error by this.
     worthwhile_in_the_dark: f64 = 0.1, "share of the rms error", "the hair dryer and the gas furnace, where nothing is missing";
     /// Candidates that are refitted for the ranking beside the named ones.

@@ -111,7 +111,7 @@ impl Session<'_> {
                 judge.over_noise(judged.rmse()) <= RULES.floor_margin
             }
             NoiseSource::Scatter => {
-                judge.unexplained_share(&judged.held_out) <= RULES.too_much && !self.depends(judged)
+                judge.unexplained_share(&judged.held_out) <= TERMS.too_much && !self.depends(judged)
             }
         }
     }
@@ -219,7 +219,7 @@ impl Session<'_> {
     pub(super) fn named(&self, found: &Found) -> Hypothesis {
         let scatter = self.judge().noise_source == NoiseSource::Scatter;
         let dark = scatter
-            && self.judge().unexplained_share(&found.bare.judged.held_out) <= RULES.too_much;
+            && self.judge().unexplained_share(&found.bare.judged.held_out) <= TERMS.too_much;
         if dark {
             // One test for each effect: more cannot be asked in the dark.
             self.pared(found, |lesser, best| {
@@ -263,7 +263,7 @@ impl Session<'_> {
         let judge = self.judge();
         let excess = |hypothesis: &Hypothesis| judge.excess(&hypothesis.judged.held_out);
         let little = best.judged.rmse() > (1.0 - RULES.worthwhile) * lesser.judged.rmse()
-            || excess(best) > (1.0 - RULES.stands_in) * excess(lesser)
+            || excess(best) > (1.0 - RULES.most) * excess(lesser)
             || judge.over_noise(lesser.judged.rmse()) <= RULES.at_once;
         (little && self.fits(&lesser.judged)) || self.more_than_chance(best, lesser).is_none()
     }
@@ -302,13 +302,18 @@ impl Session<'_> {
         let explained = match judge.noise_source {
             NoiseSource::Scatter => taken >= RULES.explained_in_unknown_noise,
             NoiseSource::Measured | NoiseSource::Repeats => {
-                taken >= RULES.explained && judge.over_noise(best.judged.rmse()) <= RULES.nearly
+                taken >= RULES.explained && judge.over_noise(best.judged.rmse()) <= TERMS.much
             }
         };
         let leaner = is_leaner(best, bare);
         let known = judge.noise_source != NoiseSource::Scatter;
         // Near a known floor anything fits that takes a little.
-        if taken < RULES.stands_in && !(fits && (leaner || !known)) {
+        let least = if fits || explained {
+            RULES.most
+        } else {
+            RULES.stands_in
+        };
+        if taken < least && !(fits && (leaner || !known)) {
             return of_bare();
         }
         Conclusion {

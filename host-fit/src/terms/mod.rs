@@ -13,6 +13,7 @@ mod chance;
 mod evidence;
 mod exchange;
 mod folds;
+mod follow;
 mod grid;
 mod judge;
 mod proposal;

@@ -22,6 +22,12 @@ rules! {
     rounds: usize = 6, "", "two effects and two memories take three";
     /// Rounds without a gain that end the search.
     patience: usize = 2, "rounds", "judgement: for the time it takes";
+    /// Where this much or more is left when the search ends, it goes on once with what promised less …
+    much: f64 = 1.25, "times the noise floor", "what is named leaves less";
+    /// … or, where the noise is not known, so much of y …
+    too_much: f64 = 0.06, "share of the variance of y", "the public sets";
+    /// … and refits so many times as much in that round.
+    wider: usize = 4, "", "the flow over a ramp: separate delays of the edges promise little before there are vortices, and the other way round";
     /// Proposals with effects that are refitted per model …
     with_effects: usize = 5, "", "the truth was within the first three on 80 rigs of six families";
     /// … and proposals without.

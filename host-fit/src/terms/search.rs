@@ -1,16 +1,17 @@
 //! One search over lags, the sensor's zero and effects.
 
 use super::RULES;
-use super::grid::longest_lag;
+use super::follow::acts_in_steps;
 use super::judge::{Judge, Judged};
 use super::proposal::Proposal;
 use super::screen::Screen;
 use super::table::{Table, has_jet_effect};
 use super::term::Term;
-use crate::fit::{Fit, FitOptions, Known, fit, lean_base, settle_fixed_delay, starts};
+use crate::fit::{Fit, FitOptions, Known, fit, lean_base};
 use crate::model::{Model, Start};
+use crate::residual::NoiseSource;
 use crate::simulate::SimulateError;
-use model_core::effect::{Influence, Spec};
+use model_core::effect::Spec;
 use model_core::effects::NUISANCES;
 use model_core::recursion::Grading;
 use rayon::prelude::*;
@@ -140,6 +141,15 @@ impl Search<'_> {
         self.judge.over_noise(hypothesis.judged.rmse())
     }
 
+    /// Whether much is left that something could explain.
+    fn leaves_much(&self, hypothesis: &Hypothesis) -> bool {
+        let judged = &hypothesis.judged;
+        match self.judge.noise_source {
+            NoiseSource::Scatter => self.judge.unexplained_share(&judged.held_out) > RULES.too_much,
+            NoiseSource::Measured | NoiseSource::Repeats => self.over(hypothesis) > RULES.much,
+        }
+    }
+
     /// The leanest model with the kind of delay law and the effects that `given` has;
     /// in `mid_run`, its free runs begin from the measurement.
     ///
@@ -200,59 +210,42 @@ impl Search<'_> {
     }
 
     /// From `root`, and from the `second` one where the first step did not reach the
-    /// floor, round by round, until nothing that is left is worth its price.
+    /// floor, round by round, until nothing that is left is worth its price. Where much is left
+    /// then, what promised less is followed too, once: from the root and from the best.
     #[must_use]
     pub fn run(&self, root: Hypothesis, second: impl FnOnce() -> Option<Hypothesis>) -> Found {
         let mut all = vec![root];
         let mut second = Some(second);
         let mut tried = Vec::new();
-        let mut stalled = 0;
-        for round in 1..=RULES.rounds {
+        let (mut last, mut stalled, mut widened) = (RULES.rounds, 0, false);
+        for round in 1.. {
             if round > 1
                 && self.over(&all[best(&all, |_| true)]) > RULES.at_the_floor
                 && let Some(second) = second.take()
             {
                 all.extend(second());
             }
-            let chosen = self.chosen(&all);
+            let ended = round > last || stalled >= RULES.patience;
+            let mut chosen = if ended { Vec::new() } else { self.chosen(&all) };
+            let mut width = 1;
+            let end = best(&all, |_| true);
+            if chosen.is_empty() && !widened && self.effects && self.leaves_much(&all[end]) {
+                (last, stalled, widened) = (round + RULES.rounds, 0, true);
+                width = RULES.wider;
+                chosen = vec![(end, true)];
+                if end > 0 {
+                    chosen.push((0, true));
+                }
+            }
             if chosen.is_empty() || self.interrupted() {
                 break;
             }
-            let before = all[best(&all, |_| true)].score();
-            let mut pool: Vec<(usize, Proposal)> = Vec::new();
-            for (index, effects) in chosen {
-                all[index].expanded = true;
-                (self.progress)(&format!(
-                    "round {round}: screening [{}]",
-                    all[index].words()
-                ));
-                pool.extend(
-                    self.proposals(&all[index], effects, &tried)
-                        .into_iter()
-                        .map(|proposal| (index, proposal)),
-                );
-            }
-            if pool.is_empty() {
+            let before = all[end].score();
+            if !self.advance(round, &chosen, width, &mut all, &mut tried) {
                 break;
             }
-            (self.progress)(&format!("round {round}: refitting {} models", pool.len()));
-            for (index, proposal) in &pool {
-                tried.push(signature(&all[*index].terms, &proposal.terms));
-            }
-            let mut finished = self.refitted(&all, &pool);
-            finished.extend(self.regraded(&finished));
-            for hypothesis in finished {
-                keep(&mut all, hypothesis);
-            }
-            let after = all[best(&all, |_| true)].score();
-            if after > before - RULES.price {
-                stalled += 1;
-                if stalled >= RULES.patience {
-                    break;
-                }
-            } else {
-                stalled = 0;
-            }
+            let gained = all[best(&all, |_| true)].score() <= before - RULES.price;
+            stalled = if gained { 0 } else { stalled + 1 };
         }
         (self.progress)("leaving out what is not needed");
         let root = all[0].clone();
@@ -274,6 +267,39 @@ impl Search<'_> {
             tried: tried.len(),
             all,
         }
+    }
+
+    /// One round: screens for those that are `chosen`, refits `width` times what is refitted as a rule,
+    /// and keeps it in `all`. Whether there was anything to refit.
+    fn advance(
+        &self,
+        round: usize,
+        chosen: &[(usize, bool)],
+        width: usize,
+        all: &mut Vec<Hypothesis>,
+        tried: &mut Vec<Vec<TermKey>>,
+    ) -> bool {
+        let mut pool: Vec<(usize, Proposal)> = Vec::new();
+        for &(index, effects) in chosen {
+            all[index].expanded = true;
+            let words = all[index].words();
+            (self.progress)(&format!("round {round}: screening [{words}]"));
+            let proposals = self.proposals(&all[index], effects, width, tried);
+            pool.extend(proposals.into_iter().map(|proposal| (index, proposal)));
+        }
+        if pool.is_empty() {
+            return false;
+        }
+        (self.progress)(&format!("round {round}: refitting {} models", pool.len()));
+        for (index, proposal) in &pool {
+            tried.push(signature(&all[*index].terms, &proposal.terms));
+        }
+        let mut finished = self.refitted(all, &pool, width);
+        finished.extend(self.regraded(&finished));
+        for hypothesis in finished {
+            keep(all, hypothesis);
+        }
+        true
     }
 
     /// Whom to screen further terms for, and whether effects may be among them.
@@ -322,6 +348,7 @@ impl Search<'_> {
         &self,
         hypothesis: &Hypothesis,
         effects: bool,
+        width: usize,
         tried: &[Vec<TermKey>],
     ) -> Vec<Proposal> {
         let Some(screen) = Screen::new(self.judge, hypothesis.judged.model()) else {
@@ -337,10 +364,10 @@ impl Search<'_> {
             let added = count_effects(&proposal.terms);
             let again = |other: &&Proposal| Term::are_of_one_kind(&other.terms, &proposal.terms);
             let enough = if added > 0 {
-                with >= RULES.with_effects
+                with >= RULES.with_effects * width
             } else {
                 // Lags move: neighbours are one proposal.
-                without >= RULES.without_effects
+                without >= RULES.without_effects * width
                     || kept.iter().filter(again).count() >= RULES.of_one_kind
             };
             let key = signature(&hypothesis.terms, &proposal.terms);
@@ -386,8 +413,13 @@ impl Search<'_> {
         })
     }
 
-    /// Every proposal for a few steps, the best of them to the end.
-    fn refitted(&self, all: &[Hypothesis], pool: &[(usize, Proposal)]) -> Vec<Hypothesis> {
+    /// Every proposal for a few steps, the best of them, `width` times as many as a rule, to the end.
+    fn refitted(
+        &self,
+        all: &[Hypothesis],
+        pool: &[(usize, Proposal)],
+        width: usize,
+    ) -> Vec<Hypothesis> {
         let brief: Vec<Option<(f64, usize, Fit)>> = pool
             .par_iter()
             .enumerate()
@@ -412,7 +444,7 @@ impl Search<'_> {
             let bare = all[*index].is_bare() && count_effects(&proposal.terms) == 0;
             let terms = [all[*index].terms.clone(), proposal.terms.clone()].concat();
             let again = met.iter().any(|other| Term::are_alike(other, &terms));
-            if !again && (leading.len() < RULES.finished || (bare && !has_bare)) {
+            if !again && (leading.len() < RULES.finished * width || (bare && !has_bare)) {
                 has_bare |= bare;
                 met.push(terms);
                 leading.push((at, fit));
@@ -473,160 +505,6 @@ impl Search<'_> {
         })
     }
 
-    /// The fit of a proposal from where the screening puts it; from several points where the error
-    /// has more than one valley.
-    pub(crate) fn set_out(
-        &self,
-        model: &Model,
-        proposal: &Proposal,
-        iterations: usize,
-    ) -> Option<Fit> {
-        let others = self.valleys(model, &proposal.terms);
-        let all: Vec<&[Term]> = match &others[..] {
-            [] => vec![&proposal.terms],
-            others => others.iter().map(Vec::as_slice).collect(),
-        };
-        let fits = all
-            .into_par_iter()
-            .filter_map(|terms| self.set_out_from(model, proposal, terms, iterations));
-        let fits: Vec<Fit> = fits.collect();
-        fits.into_iter()
-            .min_by(|a, b| a.mean_square().total_cmp(&b.mean_square()))
-    }
-
-    /// The terms from other starting points, none where one does.
-    fn valleys(&self, model: &Model, terms: &[Term]) -> Vec<Vec<Term>> {
-        if terms.iter().any(|term| matches!(term, Term::Inertia(_))) {
-            let second = RULES.second_lags.into_iter().map(|samples| {
-                let other = |term: &Term| match term {
-                    Term::Inertia(_) => Term::Inertia(samples),
-                    term => term.clone(),
-                };
-                terms.iter().map(other).collect()
-            });
-            return second.collect();
-        }
-        match terms {
-            [term @ Term::Effect { spec, .. }] if acts_in_steps(spec) => {
-                let starts = starts(model, spec, &self.judge.learning(0)).into_iter();
-                let others = starts.map(|start| vec![term.with_parameters(start)]);
-                std::iter::once(terms.to_vec()).chain(others).collect()
-            }
-            _ => Vec::new(),
-        }
-    }
-
-    fn set_out_from(
-        &self,
-        model: &Model,
-        proposal: &Proposal,
-        terms: &[Term],
-        iterations: usize,
-    ) -> Option<Fit> {
-        let learning = self.judge.learning(0);
-        let with = |bold: bool| {
-            let pairs = terms.iter().zip(&proposal.coefficients);
-            let all = pairs.fold(model.clone(), |model, (term, coefficients)| {
-                term.added_to(&model, if bold { coefficients } else { &[] })
-            });
-            let options = FitOptions {
-                iterations,
-                ..self.judge.options_for(&all)
-            };
-            fit(&all, &learning, &options)
-        };
-        // First-order coefficients may be too bold for a free run: then from 0.
-        with(true).or_else(|_| with(false)).ok()
-    }
-
-    /// A fit followed to the end: lags and fixed delays where they leave least, all
-    /// folds fitted and judged. Effects that are bent as far as they can be are left out,
-    /// as what they were added with may be right all the same; `None` if fewer than
-    /// `least` terms stay.
-    pub(crate) fn finish(
-        &self,
-        mut terms: Vec<Term>,
-        brief: Fit,
-        least: usize,
-    ) -> Option<Hypothesis> {
-        let learning = self.judge.learning(0);
-        let options = self.judge.options_for(&brief.model);
-        let fitted = fit(&brief.model, &learning, &options).ok()?;
-        let fitted = self.settle_lags(fitted, &mut terms);
-        let fitted = settle_fixed_delay(fitted, &learning, &options).ok()?;
-        let end = &fitted.model;
-        let (bent, kept): (Vec<Term>, Vec<Term>) =
-            terms.into_iter().partition(|term| at_a_bound(end, term));
-        if kept.len() < least {
-            return None;
-        }
-        if !bent.is_empty() {
-            let rest = bent
-                .iter()
-                .fold(end.clone(), |m, term| term.taken_from(&m, end));
-            let options = self.judge.options_for(&rest);
-            return self.finish(kept, fit(&rest, &learning, &options).ok()?, least);
-        }
-        let judged = self.judge.judged_from(fitted).ok()?;
-        Some(Hypothesis {
-            terms: kept,
-            ..Hypothesis::new(judged)
-        })
-    }
-
-    /// Moves all lags to where they leave least, by steps of Gauss and Newton; a step
-    /// that does not lower the error is halved.
-    fn settle_lags(&self, mut current: Fit, terms: &mut [Term]) -> Fit {
-        let learning = self.judge.learning(0);
-        let shortest = learning.iter().map(|r| r.len()).min().unwrap_or(0);
-        let longest = longest_lag(current.model.sample_period_s, shortest);
-        for _ in 0..RULES.lag_rounds {
-            let Some(screen) = Screen::new(self.judge, &current.model) else {
-                return current;
-            };
-            let mut steps = screen.moves_of(terms);
-            drop(screen);
-            let mut better = None;
-            while better.is_none() && steps.iter().any(|step| *step != 0) && !self.interrupted() {
-                better = self.moved(&current, terms, &steps, longest);
-                steps.iter_mut().for_each(|step| *step /= 2);
-            }
-            let Some((fitted, moved)) = better else {
-                return current;
-            };
-            current = fitted;
-            terms.clone_from_slice(&moved);
-        }
-        current
-    }
-
-    /// A fit with its lags moved, if that lowers the error.
-    fn moved(
-        &self,
-        current: &Fit,
-        terms: &[Term],
-        steps: &[i32],
-        longest: u16,
-    ) -> Option<(Fit, Vec<Term>)> {
-        let mut model = current.model.clone();
-        let mut moved = terms.to_vec();
-        for (term, step) in moved.iter_mut().zip(steps) {
-            let Some(old) = term.lag() else { continue };
-            let lag = (i32::from(old) + step).clamp(3, longest.into()) as u16;
-            if let Some(other) = term.moved_in(&model, lag) {
-                model = other;
-                *term = term.with_lag(lag);
-            }
-        }
-        let options = FitOptions {
-            iterations: RULES.lag_iterations,
-            ..self.judge.options_for(&model)
-        };
-        let fitted = fit(&model, &self.judge.learning(0), &options).ok()?;
-        let least = current.mean_square() * (1.0 - RULES.lag_gain);
-        (fitted.mean_square() < least).then_some((fitted, moved))
-    }
-
     /// A hypothesis refitted without one of its terms.
     #[must_use]
     pub fn without(
@@ -675,31 +553,6 @@ impl Search<'_> {
             from_given: hypothesis.from_given,
         })
     }
-}
-
-/// Whether a card has a parameter that acts in steps.
-fn acts_in_steps(spec: &Spec) -> bool {
-    let mut parameters = spec.parameters.iter();
-    parameters.any(|parameter| parameter.influence == Influence::Stepwise)
-}
-
-/// Whether an effect was bent as far as its card lets it: it stands in for something
-/// else then. Delay laws are exempt: levels that y hardly visits leave them open.
-fn at_a_bound(model: &Model, term: &Term) -> bool {
-    let Some(spec) = term.effect() else {
-        return false;
-    };
-    let added = model.effects.iter().find(|added| added.name == spec.name);
-    let values = added.map_or(&[][..], |added| &added.parameters);
-    values.iter().zip(spec.parameters).any(|(value, card)| {
-        let place = |x: f64| if card.is_logarithmic() { x.ln() } else { x };
-        let (low, high) = (place(card.low), place(card.high));
-        let near = RULES.bound * (high - low);
-        // An amplitude may be small.
-        let low_end = card.is_logarithmic() || card.low != 0.0;
-        let at_low = low_end && place(*value) < low + near;
-        card.low < card.high && (place(*value) > high - near || at_low)
-    })
 }
 
 /// Adds a hypothesis, or puts it in the place of one that it is alike but for its error.

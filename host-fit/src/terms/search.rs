@@ -226,11 +226,19 @@ impl Search<'_> {
                 all.extend(second());
             }
             let ended = round > last || stalled >= RULES.patience;
-            let mut chosen = if ended { Vec::new() } else { self.chosen(&all) };
+            let mut chosen = if ended {
+                Vec::new()
+            } else {
+                self.chosen(&all, since)
+            };
             let mut width = 1;
             let end = best(&all, |_| true);
-            if chosen.is_empty() && !widened && self.effects && self.leaves_much(&all[end]) {
-                (last, stalled, widened) = (round + RULES.rounds, 0, true);
+            if chosen.is_empty()
+                && since == usize::MAX
+                && self.effects
+                && self.leaves_much(&all[end])
+            {
+                (last, stalled, since) = (round + RULES.rounds, 0, all.len());
                 width = RULES.wider;
                 chosen = vec![(end, true)];
                 if end > 0 {
@@ -241,11 +249,13 @@ impl Search<'_> {
                 break;
             }
             let before = all[end].score();
-            if !self.advance(round, &chosen, width, &mut all, &mut tried) {
-                break;
-            }
+            let refitted = self.advance(round, &chosen, width, &mut all, &mut tried);
             let gained = all[best(&all, |_| true)].score() <= before - RULES.price;
-            stalled = if gained { 0 } else { stalled + 1 };
+            stalled = match (refitted, gained) {
+                (false, _) => RULES.patience,
+                (true, true) => 0,
+                (true, false) => stalled + 1,
+            };
         }
         (self.progress)("leaving out what is not needed");
         let root = all[0].clone();
@@ -302,8 +312,9 @@ impl Search<'_> {
         true
     }
 
-    /// Whom to screen further terms for, and whether effects may be among them.
-    fn chosen(&self, all: &[Hypothesis]) -> Vec<(usize, bool)> {
+    /// Whom to screen further terms for, and whether effects may be among them; those from `since` on came
+    /// of a wider round.
+    fn chosen(&self, all: &[Hypothesis], since: usize) -> Vec<(usize, bool)> {
         let (end, bare) = (best(all, |_| true), best(all, Hypothesis::is_bare));
         let settled = all[end].expanded;
         let open = |i: &usize| !all[*i].expanded;
@@ -318,20 +329,26 @@ impl Search<'_> {
         let mut chosen = Vec::new();
         if !settled {
             chosen.push((end, self.effects));
-            let rival = leading(all, |i| open(i) && *i != end);
-            if let Some(rival) = rival
-                && self.over(&all[end]) > RULES.near_the_floor
-                && all[rival].score() < all[end].score() + RULES.rival.ln()
-            {
-                chosen.push((rival, self.effects));
-            }
+        }
+        let near = |i: usize| all[i].score() < all[end].score() + RULES.rival.ln();
+        let rival = leading(all, |i| open(i) && *i != end);
+        if let Some(rival) = rival.filter(|rival| near(*rival))
+            && !settled
+            && self.over(&all[end]) > RULES.near_the_floor
+        {
+            chosen.push((rival, self.effects));
+        }
+        // What a wider round brought is followed whether or not it leads.
+        let new = leading(all, |i| *i >= since && !chosen.iter().any(|(c, _)| c == i));
+        if let Some(new) = new.filter(|i| open(i) && near(*i)) {
+            chosen.push((new, self.effects));
         }
         // Two lines of descent, until the one that is behind has become the dearer.
         let line = all[end].from_given;
         let other = leading(all, |i| all[*i].from_given != line);
         if let Some(other) = other.filter(open)
             && self.over(&all[end]) > RULES.at_the_floor
-            && all[other].score() < all[end].score() + RULES.rival.ln()
+            && near(other)
             && all[other].cost() < all[end].cost() + RULES.head_start
             && !chosen.iter().any(|(index, _)| *index == other)
         {

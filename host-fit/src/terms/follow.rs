@@ -1,0 +1,194 @@
+//! How a proposal is followed to its end: fitted from where the screening puts it, its lags moved to where
+//! they leave least, what is bent as far as it can be left out.
+
+use super::RULES;
+use super::grid::longest_lag;
+use super::proposal::Proposal;
+use super::screen::Screen;
+use super::search::{Hypothesis, Search};
+use super::term::Term;
+use crate::fit::{Fit, FitOptions, fit, settle_fixed_delay, starts};
+use crate::model::Model;
+use model_core::effect::{Influence, Spec};
+use rayon::prelude::*;
+
+impl Search<'_> {
+    /// The fit of a proposal from where the screening puts it; from several points where the error
+    /// has more than one valley.
+    pub(crate) fn set_out(
+        &self,
+        model: &Model,
+        proposal: &Proposal,
+        iterations: usize,
+    ) -> Option<Fit> {
+        let others = self.valleys(model, &proposal.terms);
+        let all: Vec<&[Term]> = match &others[..] {
+            [] => vec![&proposal.terms],
+            others => others.iter().map(Vec::as_slice).collect(),
+        };
+        let fits = all
+            .into_par_iter()
+            .filter_map(|terms| self.set_out_from(model, proposal, terms, iterations));
+        let fits: Vec<Fit> = fits.collect();
+        fits.into_iter()
+            .min_by(|a, b| a.mean_square().total_cmp(&b.mean_square()))
+    }
+
+    /// The terms from other starting points, none where one does.
+    fn valleys(&self, model: &Model, terms: &[Term]) -> Vec<Vec<Term>> {
+        if terms.iter().any(|term| matches!(term, Term::Inertia(_))) {
+            let second = RULES.second_lags.into_iter().map(|samples| {
+                let other = |term: &Term| match term {
+                    Term::Inertia(_) => Term::Inertia(samples),
+                    term => term.clone(),
+                };
+                terms.iter().map(other).collect()
+            });
+            return second.collect();
+        }
+        match terms {
+            [term @ Term::Effect { spec, .. }] if acts_in_steps(spec) => {
+                let starts = starts(model, spec, &self.judge.learning(0)).into_iter();
+                let others = starts.map(|start| vec![term.with_parameters(start)]);
+                std::iter::once(terms.to_vec()).chain(others).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    fn set_out_from(
+        &self,
+        model: &Model,
+        proposal: &Proposal,
+        terms: &[Term],
+        iterations: usize,
+    ) -> Option<Fit> {
+        let learning = self.judge.learning(0);
+        let with = |bold: bool| {
+            let pairs = terms.iter().zip(&proposal.coefficients);
+            let all = pairs.fold(model.clone(), |model, (term, coefficients)| {
+                term.added_to(&model, if bold { coefficients } else { &[] })
+            });
+            let options = FitOptions {
+                iterations,
+                ..self.judge.options_for(&all)
+            };
+            fit(&all, &learning, &options)
+        };
+        // First-order coefficients may be too bold for a free run: then from 0.
+        with(true).or_else(|_| with(false)).ok()
+    }
+
+    /// A fit followed to the end: lags and fixed delays where they leave least, all
+    /// folds fitted and judged. Effects that are bent as far as they can be are left out,
+    /// as what they were added with may be right all the same; `None` if fewer than
+    /// `least` terms stay.
+    pub(crate) fn finish(
+        &self,
+        mut terms: Vec<Term>,
+        brief: Fit,
+        least: usize,
+    ) -> Option<Hypothesis> {
+        let learning = self.judge.learning(0);
+        let options = self.judge.options_for(&brief.model);
+        let fitted = fit(&brief.model, &learning, &options).ok()?;
+        let fitted = self.settle_lags(fitted, &mut terms);
+        let fitted = settle_fixed_delay(fitted, &learning, &options).ok()?;
+        let end = &fitted.model;
+        let (bent, kept): (Vec<Term>, Vec<Term>) =
+            terms.into_iter().partition(|term| at_a_bound(end, term));
+        if kept.len() < least {
+            return None;
+        }
+        if !bent.is_empty() {
+            let rest = bent
+                .iter()
+                .fold(end.clone(), |m, term| term.taken_from(&m, end));
+            let options = self.judge.options_for(&rest);
+            return self.finish(kept, fit(&rest, &learning, &options).ok()?, least);
+        }
+        let judged = self.judge.judged_from(fitted).ok()?;
+        Some(Hypothesis {
+            terms: kept,
+            ..Hypothesis::new(judged)
+        })
+    }
+
+    /// Moves all lags to where they leave least, by steps of Gauss and Newton; a step
+    /// that does not lower the error is halved.
+    fn settle_lags(&self, mut current: Fit, terms: &mut [Term]) -> Fit {
+        let learning = self.judge.learning(0);
+        let shortest = learning.iter().map(|r| r.len()).min().unwrap_or(0);
+        let longest = longest_lag(current.model.sample_period_s, shortest);
+        for _ in 0..RULES.lag_rounds {
+            let Some(screen) = Screen::new(self.judge, &current.model) else {
+                return current;
+            };
+            let mut steps = screen.moves_of(terms);
+            drop(screen);
+            let mut better = None;
+            while better.is_none() && steps.iter().any(|step| *step != 0) && !self.interrupted() {
+                better = self.moved(&current, terms, &steps, longest);
+                steps.iter_mut().for_each(|step| *step /= 2);
+            }
+            let Some((fitted, moved)) = better else {
+                return current;
+            };
+            current = fitted;
+            terms.clone_from_slice(&moved);
+        }
+        current
+    }
+
+    /// A fit with its lags moved, if that lowers the error.
+    fn moved(
+        &self,
+        current: &Fit,
+        terms: &[Term],
+        steps: &[i32],
+        longest: u16,
+    ) -> Option<(Fit, Vec<Term>)> {
+        let mut model = current.model.clone();
+        let mut moved = terms.to_vec();
+        for (term, step) in moved.iter_mut().zip(steps) {
+            let Some(old) = term.lag() else { continue };
+            let lag = (i32::from(old) + step).clamp(3, longest.into()) as u16;
+            if let Some(other) = term.moved_in(&model, lag) {
+                model = other;
+                *term = term.with_lag(lag);
+            }
+        }
+        let options = FitOptions {
+            iterations: RULES.lag_iterations,
+            ..self.judge.options_for(&model)
+        };
+        let fitted = fit(&model, &self.judge.learning(0), &options).ok()?;
+        let least = current.mean_square() * (1.0 - RULES.lag_gain);
+        (fitted.mean_square() < least).then_some((fitted, moved))
+    }
+}
+
+/// Whether a card has a parameter that acts in steps.
+pub(super) fn acts_in_steps(spec: &Spec) -> bool {
+    let mut parameters = spec.parameters.iter();
+    parameters.any(|parameter| parameter.influence == Influence::Stepwise)
+}
+
+/// Whether an effect was bent as far as its card lets it: it stands in for something
+/// else then. Delay laws are exempt: levels that y hardly visits leave them open.
+fn at_a_bound(model: &Model, term: &Term) -> bool {
+    let Some(spec) = term.effect() else {
+        return false;
+    };
+    let added = model.effects.iter().find(|added| added.name == spec.name);
+    let values = added.map_or(&[][..], |added| &added.parameters);
+    values.iter().zip(spec.parameters).any(|(value, card)| {
+        let place = |x: f64| if card.is_logarithmic() { x.ln() } else { x };
+        let (low, high) = (place(card.low), place(card.high));
+        let near = RULES.bound * (high - low);
+        // An amplitude may be small.
+        let low_end = card.is_logarithmic() || card.low != 0.0;
+        let at_low = low_end && place(*value) < low + near;
+        card.low < card.high && (place(*value) > high - near || at_low)
+    })
+}

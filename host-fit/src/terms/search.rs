@@ -217,7 +217,7 @@ impl Search<'_> {
         let mut all = vec![root];
         let mut second = Some(second);
         let mut tried = Vec::new();
-        let (mut last, mut stalled, mut widened) = (RULES.rounds, 0, false);
+        let (mut last, mut stalled, mut since) = (RULES.rounds, 0, usize::MAX);
         for round in 1.. {
             if round > 1
                 && self.over(&all[best(&all, |_| true)]) > RULES.at_the_floor

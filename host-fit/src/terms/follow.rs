@@ -9,7 +9,7 @@ use super::search::{Hypothesis, Search};
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit, settle_fixed_delay, starts};
 use crate::model::Model;
-use model_core::effect::{Influence, Spec};
+use model_core::effect::{Influence, Place, Spec, Starts};
 use rayon::prelude::*;
 
 impl Search<'_> {
@@ -47,7 +47,7 @@ impl Search<'_> {
             return second.collect();
         }
         match terms {
-            [term @ Term::Effect { spec, .. }] if acts_in_steps(spec) => {
+            [term @ Term::Effect { spec, .. }] if hides(spec) => {
                 let starts = starts(model, spec, &self.judge.learning(0)).into_iter();
                 let others = starts.map(|start| vec![term.with_parameters(start)]);
                 std::iter::once(terms.to_vec()).chain(others).collect()
@@ -168,10 +168,12 @@ impl Search<'_> {
     }
 }
 
-/// Whether a card has a parameter that acts in steps.
-pub(super) fn acts_in_steps(spec: &Spec) -> bool {
+/// Whether an effect promises nothing to first order where it is put in the wrong place: a threshold that is
+/// never crossed, limits beyond all that the bent base reaches. Its card writes the places out, or they are steps.
+pub(super) fn hides(spec: &Spec) -> bool {
     let mut parameters = spec.parameters.iter();
-    parameters.any(|parameter| parameter.influence == Influence::Stepwise)
+    let acts_in_steps = parameters.any(|p| p.influence == Influence::Stepwise);
+    acts_in_steps || (spec.place != Place::Delay && matches!(spec.starts, Starts::Rows(_)))
 }
 
 /// Whether an effect was bent as far as its card lets it: it stands in for something

@@ -1,7 +1,7 @@
 //! One search over lags, the sensor's zero and effects.
 
 use super::RULES;
-use super::follow::acts_in_steps;
+use super::follow::hides;
 use super::judge::{Judge, Judged};
 use super::proposal::Proposal;
 use super::screen::Screen;
@@ -397,7 +397,7 @@ impl Search<'_> {
             kept.push(proposal);
         }
         if effects && hypothesis.is_bare() {
-            let unseen = self.stepwise(&screen);
+            let unseen = self.unseen(&screen);
             kept.extend(unseen.filter(|proposal| {
                 let key = signature(&hypothesis.terms, &proposal.terms);
                 !tried.contains(&key) && !met.contains(&key)
@@ -406,13 +406,12 @@ impl Search<'_> {
         kept
     }
 
-    /// Effects that act in steps, whatever the screening says of them: where a threshold is never crossed,
-    /// or always at the wrong time, it promises nothing.
-    fn stepwise(&self, screen: &Screen<'_>) -> impl Iterator<Item = Proposal> {
+    /// Effects that hide, whatever the screening says of them.
+    fn unseen(&self, screen: &Screen<'_>) -> impl Iterator<Item = Proposal> {
         let model = screen.model();
         let specs = model
             .candidates()
-            .filter(|spec| acts_in_steps(spec) && spec.channel.is_none());
+            .filter(|spec| hides(spec) && spec.channel.is_none());
         let possible = specs.filter(|spec| screen.pointless(spec).is_none());
         possible.map(|spec| {
             let term = Term::Effect {

@@ -134,8 +134,9 @@ fn chosen(
         return Ok(diagnosis);
     }
     progress("the leanest model");
-    let (root, step) = if mid_run && given.start == Start::Measured && !judge.on_off {
-        // Rigs that are no blown ramp: their dynamics is the user's choice of lags.
+    // Rigs that are no blown ramp: their dynamics is the user's choice of lags.
+    let own_dynamics = mid_run && given.start == Start::Measured && !judge.on_off;
+    let (root, step) = if own_dynamics {
         session.root_of_given(&given_inside, &as_given)?
     } else {
         let root = search.root(&given_inside, mid_run)?;
@@ -153,6 +154,7 @@ fn chosen(
     if (judge.over_noise(reached) > RULES.floor_margin
         || reached > (1.0 - RULES.worthwhile) * as_given.rmse())
         && !found.set_out_twice()
+        && (own_dynamics || !Search::is_as_lean(&given_inside, &origin))
         && let Ok(judged) = judge.refitted(&given_inside)
         && judged.rmse() < origin.judged.rmse()
     {

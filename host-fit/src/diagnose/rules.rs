@@ -33,8 +33,10 @@ rules! {
     most: f64 = 0.5, "share of the excess", "judgement: half";
     /// … and where they leave the model above the noise, they stand in for something else if they take this share.
     stands_in: f64 = 0.25, "share of the excess", "judgement: nothing is claimed, and the model that is handed over errs less";
-    /// Where slow noise is not known, a misfit counts if this share of it depends on something.
+    /// Where slow noise is not known, a misfit counts if this share of it depends on something …
     depends: f64 = 0.1, "share of the excess", "the public sets";
+    /// … or if it is more than noise can be in a recording worth fitting.
+    too_much: f64 = 0.06, "share of the variance of y", "the public sets";
     /// Where neither the noise is known nor anything shows that the base errs, an effect must lower the error by this.
     worthwhile_in_the_dark: f64 = 0.1, "share of the rms error", "the hair dryer and the gas furnace, where nothing is missing";
     /// Candidates that are refitted for the ranking beside the named ones.

@@ -111,7 +111,7 @@ impl Session<'_> {
                 judge.over_noise(judged.rmse()) <= RULES.floor_margin
             }
             NoiseSource::Scatter => {
-                judge.unexplained_share(&judged.held_out) <= TERMS.too_much && !self.depends(judged)
+                judge.unexplained_share(&judged.held_out) <= RULES.too_much && !self.depends(judged)
             }
         }
     }
@@ -219,7 +219,7 @@ impl Session<'_> {
     pub(super) fn named(&self, found: &Found) -> Hypothesis {
         let scatter = self.judge().noise_source == NoiseSource::Scatter;
         let dark = scatter
-            && self.judge().unexplained_share(&found.bare.judged.held_out) <= TERMS.too_much;
+            && self.judge().unexplained_share(&found.bare.judged.held_out) <= RULES.too_much;
         if dark {
             // One test for each effect: more cannot be asked in the dark.
             self.pared(found, |lesser, best| {

@@ -141,13 +141,9 @@ impl Search<'_> {
         self.judge.over_noise(hypothesis.judged.rmse())
     }
 
-    /// Whether much is left that something could explain.
+    /// Whether much is left that something could explain, where that is known.
     fn leaves_much(&self, hypothesis: &Hypothesis) -> bool {
-        let judged = &hypothesis.judged;
-        match self.judge.noise_source {
-            NoiseSource::Scatter => self.judge.unexplained_share(&judged.held_out) > RULES.too_much,
-            NoiseSource::Measured | NoiseSource::Repeats => self.over(hypothesis) > RULES.much,
-        }
+        self.judge.noise_source != NoiseSource::Scatter && self.over(hypothesis) > RULES.much
     }
 
     /// The leanest model with the kind of delay law and the effects that `given` has;
@@ -190,6 +186,11 @@ impl Search<'_> {
             }
         }
         Ok(Hypothesis::new(judged))
+    }
+
+    /// Whether `given` has the structure of `root`: fitted anew it is no other place to set out from.
+    pub(crate) fn is_as_lean(given: &Model, root: &Hypothesis) -> bool {
+        Term::all_of(given, root.judged.model()).is_some_and(|terms| terms.is_empty())
     }
 
     /// The structure of `given`, refitted, as terms on top of `root`: a second place to
@@ -238,7 +239,7 @@ impl Search<'_> {
                 && self.effects
                 && self.leaves_much(&all[end])
             {
-                (last, stalled, since) = (round + RULES.rounds, 0, all.len());
+                (last, stalled, since) = (round + RULES.rounds_after, 0, all.len());
                 width = RULES.wider;
                 chosen = vec![(end, true)];
                 if end > 0 {

@@ -244,19 +244,22 @@ fn the_flow_over_a_ramp_is_described_by_stand_ins() {
             _ => Use::Identify,
         };
     }
+    // What `identify` makes of the three.
     let given = Model {
         sample_period_s: records[0].sample_period_s,
-        delay: Delay::Fixed { delays: vec![19] },
+        state_lags: vec![1, 40],
+        a: vec![0.923, -0.037],
+        product_lags: vec![1, 40],
+        b: vec![0.0157],
+        c: vec![0.0733, 0.0247],
+        delay: Delay::Fixed { delays: vec![14] },
         ..Model::default()
     };
     let found = diagnosed(&given, &records, 3);
-    assert_eq!(
-        found.verdict,
-        Verdict::PartlyExplained,
-        "{:?}",
-        found.ladder
-    );
+    let ladder = &found.ladder;
+    assert_eq!(found.verdict, Verdict::PartlyExplained, "{ladder:?}");
     assert!(found.missing.is_empty());
-    let last = found.ladder.last().expect("a rung");
-    assert!(last.validate_fit_percent > 60.0, "{:?}", found.ladder);
+    // The lags alone reach 47 %; so did the search before what promised less was followed.
+    let last = ladder.last().expect("a rung");
+    assert!(last.validate_fit_percent > 65.0, "{ladder:?}");
 }

@@ -154,7 +154,7 @@ fn chosen(
     if (judge.over_noise(reached) > RULES.floor_margin
         || reached > (1.0 - RULES.worthwhile) * as_given.rmse())
         && !found.set_out_twice()
-        && (own_dynamics || !Search::is_as_lean(&given_inside, &origin))
+        && (own_dynamics || !origin.is_built_as(&given_inside))
         && let Ok(judged) = judge.refitted(&given_inside)
         && judged.rmse() < origin.judged.rmse()
     {

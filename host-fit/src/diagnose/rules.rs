@@ -25,7 +25,8 @@ rules! {
     worthwhile: f64 = 0.015, "share of the rms error", "nulls of six families: chance manages 0.01";
     /// Held-out errors that differ by less than this are the same for any purpose.
     alike: f64 = 0.005, "share of the rms error", "judgement: a tenth of what two seeds of noise differ by";
-    /// Effects that leave the model above the noise are named if they take at least this share of the excess …
+    /// Effects that leave the model above the noise are named if they take at least this share of the excess and leave less than `much` of the
+    /// search; otherwise they stand in for something else.
     explained: f64 = 0.95, "share of the excess", "altered laws leave 1 to 4 % of an excess";
     /// Where the noise is not known, this share of the excess is enough to be named.
     explained_in_unknown_noise: f64 = 0.75, "share of the excess", "the public sets";

@@ -441,11 +441,10 @@ fn descend(
             break;
         }
         let is_delay = |axis: &Searched| matches!(coordinates[axis.index].kind, Kind::Delay(_));
-        let (delays, others) = problem.axes.into_iter().partition(is_delay);
-        problem.axes = others;
-        let without: Vec<Searched> = delays;
+        let delays: Vec<Searched>;
+        (delays, problem.axes) = problem.axes.into_iter().partition(is_delay);
         let held = descent(&problem, end.values.clone(), end.cost);
-        problem.axes.extend(without);
+        problem.axes.extend(delays);
         problem.axes.sort_by_key(|axis| axis.index);
         if held.cost > (1.0 - options.tolerance) * end.cost {
             break;

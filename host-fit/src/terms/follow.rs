@@ -2,14 +2,13 @@
 //! they leave least, what is bent as far as it can be left out.
 
 use super::RULES;
-use super::grid::longest_lag;
+use super::grid::{hides, longest_lag};
 use super::proposal::Proposal;
 use super::screen::Screen;
 use super::search::{Hypothesis, Search};
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit, settle_fixed_delay, starts};
 use crate::model::Model;
-use model_core::effect::{Influence, Place, Spec, Starts};
 use rayon::prelude::*;
 
 impl Search<'_> {
@@ -166,14 +165,6 @@ impl Search<'_> {
         let least = current.mean_square() * (1.0 - RULES.lag_gain);
         (fitted.mean_square() < least).then_some((fitted, moved))
     }
-}
-
-/// Whether an effect promises nothing to first order where it is put in the wrong place: a threshold that is
-/// never crossed, limits beyond all that the bent base reaches. Its card writes the places out, or they are steps.
-pub(super) fn hides(spec: &Spec) -> bool {
-    let mut parameters = spec.parameters.iter();
-    let acts_in_steps = parameters.any(|p| p.influence == Influence::Stepwise);
-    acts_in_steps || (spec.place != Place::Delay && matches!(spec.starts, Starts::Rows(_)))
 }
 
 /// Whether an effect was bent as far as its card lets it: it stands in for something

@@ -3,13 +3,21 @@
 use super::RULES;
 use crate::fit::{Known, combinations, rows};
 use crate::model::Model;
-use model_core::effect::{Parameter, Spec, StartValue, Unit};
+use model_core::effect::{Influence, Parameter, Place, Spec, StartValue, Starts, Unit};
 
 /// The longest lag that is tried in records of at least `shortest` samples.
 pub(super) fn longest_lag(period_s: f64, shortest: usize) -> u16 {
     let longest = (RULES.longest_lag_s / period_s).round();
     let share = RULES.longest_lag_share * shortest as f64;
     longest.min(share).clamp(2.0, 4096.0) as u16
+}
+
+/// Whether an effect promises nothing to first order where it is put in the wrong place: a threshold that is
+/// never crossed, limits beyond all that the bent base reaches. Its card writes the places out, or they are steps.
+pub(super) fn hides(spec: &Spec) -> bool {
+    let mut parameters = spec.parameters.iter();
+    let acts_in_steps = parameters.any(|p| p.influence == Influence::Stepwise);
+    acts_in_steps || (spec.place != Place::Delay && matches!(spec.starts, Starts::Rows(_)))
 }
 
 /// Parameter vectors from which `spec` is screened, for `model`.

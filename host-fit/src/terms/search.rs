@@ -1,7 +1,7 @@
 //! One search over lags, the sensor's zero and effects.
 
 use super::RULES;
-use super::follow::hides;
+use super::grid::hides;
 use super::judge::{Judge, Judged};
 use super::proposal::Proposal;
 use super::screen::Screen;
@@ -59,6 +59,11 @@ impl Hypothesis {
     #[must_use]
     pub fn score(&self) -> f64 {
         score(self.judged.rmse(), self.cost())
+    }
+
+    /// Whether `other` is built as it is: fitted anew that is no other place to set out from.
+    pub(crate) fn is_built_as(&self, other: &Model) -> bool {
+        Term::all_of(other, self.judged.model()).is_some_and(|terms| terms.is_empty())
     }
 
     /// Its terms in words.
@@ -188,11 +193,6 @@ impl Search<'_> {
         Ok(Hypothesis::new(judged))
     }
 
-    /// Whether `given` has the structure of `root`: fitted anew it is no other place to set out from.
-    pub(crate) fn is_as_lean(given: &Model, root: &Hypothesis) -> bool {
-        Term::all_of(given, root.judged.model()).is_some_and(|terms| terms.is_empty())
-    }
-
     /// The structure of `given`, refitted, as terms on top of `root`: a second place to
     /// set out from. `None` where it is not made of such terms, or of too many.
     #[must_use]
@@ -218,7 +218,7 @@ impl Search<'_> {
         let mut all = vec![root];
         let mut second = Some(second);
         let mut tried = Vec::new();
-        let (mut last, mut stalled, mut since) = (RULES.rounds, 0, usize::MAX);
+        let (mut last, mut stalled, mut since) = (RULES.rounds, 0, None);
         for round in 1.. {
             if round > 1
                 && self.over(&all[best(&all, |_| true)]) > RULES.at_the_floor
@@ -234,12 +234,8 @@ impl Search<'_> {
             };
             let mut width = 1;
             let end = best(&all, |_| true);
-            if chosen.is_empty()
-                && since == usize::MAX
-                && self.effects
-                && self.leaves_much(&all[end])
-            {
-                (last, stalled, since) = (round + RULES.rounds_after, 0, all.len());
+            if chosen.is_empty() && since.is_none() && self.effects && self.leaves_much(&all[end]) {
+                (last, stalled, since) = (round + RULES.rounds_after, 0, Some(all.len()));
                 width = RULES.wider;
                 chosen = vec![(end, true)];
                 if end > 0 {
@@ -315,7 +311,7 @@ impl Search<'_> {
 
     /// Whom to screen further terms for, and whether effects may be among them; those from `since` on came
     /// of a wider round.
-    fn chosen(&self, all: &[Hypothesis], since: usize) -> Vec<(usize, bool)> {
+    fn chosen(&self, all: &[Hypothesis], since: Option<usize>) -> Vec<(usize, bool)> {
         let (end, bare) = (best(all, |_| true), best(all, Hypothesis::is_bare));
         let settled = all[end].expanded;
         let open = |i: &usize| !all[*i].expanded;
@@ -340,7 +336,9 @@ impl Search<'_> {
             chosen.push((rival, self.effects));
         }
         // What a wider round brought is followed whether or not it leads.
-        let new = leading(all, |i| *i >= since && !chosen.iter().any(|(c, _)| c == i));
+        let new = leading(all, |i| {
+            since.is_some_and(|since| *i >= since) && !chosen.iter().any(|(c, _)| c == i)
+        });
         if let Some(new) = new.filter(|i| open(i) && near(*i)) {
             chosen.push((new, self.effects));
         }

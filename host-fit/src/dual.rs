@@ -40,7 +40,7 @@ impl<const P: usize> Dual<P> {
     }
 
     /// f(self), given f and f′ at the value.
-    #[inline]
+    #[inline(always)]
     fn chain(self, value: f64, slope: f64) -> Self {
         let mut partials = self.partials;
         for partial in &mut partials {
@@ -51,7 +51,7 @@ impl<const P: usize> Dual<P> {
 }
 
 impl<const P: usize> PartialOrd for Dual<P> {
-    #[inline]
+    #[inline(always)]
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         self.value.partial_cmp(&other.value)
     }
@@ -59,7 +59,7 @@ impl<const P: usize> PartialOrd for Dual<P> {
 
 impl<const P: usize> Add for Dual<P> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn add(mut self, other: Self) -> Self {
         self.value += other.value;
         for (partial, theirs) in self.partials.iter_mut().zip(other.partials) {
@@ -71,7 +71,7 @@ impl<const P: usize> Add for Dual<P> {
 
 impl<const P: usize> Sub for Dual<P> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn sub(mut self, other: Self) -> Self {
         self.value -= other.value;
         for (partial, theirs) in self.partials.iter_mut().zip(other.partials) {
@@ -83,7 +83,7 @@ impl<const P: usize> Sub for Dual<P> {
 
 impl<const P: usize> Mul for Dual<P> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn mul(self, other: Self) -> Self {
         let mut partials = [0.0; P];
         for ((partial, mine), theirs) in partials.iter_mut().zip(self.partials).zip(other.partials)
@@ -99,7 +99,7 @@ impl<const P: usize> Mul for Dual<P> {
 
 impl<const P: usize> Div for Dual<P> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn div(self, other: Self) -> Self {
         let value = self.value / other.value;
         let mut partials = [0.0; P];
@@ -113,7 +113,7 @@ impl<const P: usize> Div for Dual<P> {
 
 impl<const P: usize> Neg for Dual<P> {
     type Output = Self;
-    #[inline]
+    #[inline(always)]
     fn neg(self) -> Self {
         self.chain(-self.value, -1.0)
     }

@@ -48,8 +48,8 @@ impl<T: Real> Memory<T> for Ring<T> {
     fn push(&mut self, value: T) {
         self.count += 1;
         if value != self.samples[self.newest] {
-            self.changes.rotate_right(1);
-            self.changes[0] = self.count;
+            let [first, second, third, _] = self.changes;
+            self.changes = [self.count, first, second, third];
         }
         self.newest = (self.newest + 1) & (self.samples.len() - 1);
         self.samples[self.newest] = value;

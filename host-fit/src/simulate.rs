@@ -135,6 +135,19 @@ impl<T: Real> Simulator<T> {
     pub fn run(
         &self,
         signals: &Signals<'_>,
+        sink: impl FnMut(usize, &Output<T>) -> ControlFlow<()>,
+    ) -> Option<usize> {
+        // The partials of a number go through the machine's vector unit side by side; the result is the same.
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || self.run_inlined(signals, sink),
+        )
+    }
+
+    #[inline(always)]
+    fn run_inlined(
+        &self,
+        signals: &Signals<'_>,
         mut sink: impl FnMut(usize, &Output<T>) -> ControlFlow<()>,
     ) -> Option<usize> {
         let mut state = self.state();
@@ -189,7 +202,7 @@ impl<T: Real> Simulator<T> {
         self.memory.at_rest(&self.prepared)
     }
 
-    #[inline]
+    #[inline(always)]
     fn observe(
         &self,
         signals: &Signals<'_>,

@@ -34,7 +34,7 @@ impl<T: Real> TwoWords<T> {
     };
 
     /// Knuth's two-sum: `high + term` and its rounding error are both exact.
-    #[inline]
+    #[inline(always)]
     fn add(&mut self, term: T) {
         let sum = self.high + term;
         let part = sum - self.high;
@@ -55,7 +55,7 @@ impl<T: Real> WindowSum<T> {
     }
 
     /// Moves a window of `terms` samples on by one sample.
-    #[inline]
+    #[inline(always)]
     pub fn slide(&mut self, entering: T, leaving: T, terms: u32) {
         self.fresh.add(entering);
         self.in_block += 1;

@@ -113,6 +113,7 @@ where
             product_lags: &self.product_lags,
             b: self.b.as_slice(),
             c: self.c.as_slice(),
+            pace: None,
         }
     }
     #[inline]
@@ -195,7 +196,7 @@ where
 
     /// Makes `flow` the newest output s_{k+1}: what [`step`] does with its own
     /// prediction, or a measurement takes the place of.
-    #[inline]
+    #[inline(always)]
     pub fn advance(&mut self, flow: T, window: u32) {
         let terms = window.saturating_sub(1).max(1);
         let entering = self.outputs.back(0);

@@ -92,6 +92,27 @@ pub struct Bilinear<'a, T> {
     pub b: &'a [T],
     /// c_jl, N2 × N3, column-major: the N2 coefficients of input 1 first.
     pub c: &'a [T],
+    /// What [`pace`](Self::pace) makes of the rest, where that was asked before; `None` is right, and slower.
+    pub pace: Option<&'a Pace<T>>,
+}
+
+/// How fast a flow goes to the level of the moment, which holds what the flow remembers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace<T> {
+    /// Lags below this, in samples, are those of the flow's order.
+    order: usize,
+    /// The separated flow's rate, per sample: 1 − Σ a_i of those lags.
+    off: T,
+    /// The attached flow's under the first input's jet: that − Σ c_j1 of those lags.
+    on: T,
+}
+
+impl<T: Real> Pace<T> {
+    /// The rate, per sample, under a jet that has this `share` of the attached flow's.
+    #[inline(always)]
+    fn at(&self, share: T) -> T {
+        self.off + (self.on - self.off) * share
+    }
 }
 
 /// Sums over terms of [`Bilinear::next`] that are known before the others.
@@ -203,9 +224,9 @@ impl<T: Real> Bilinear<'_, T> {
 
     /// [`next`](Self::next) of a flow with one input and another grading than proportional.
     fn graded(&self, drive: T, known: &Known<T>, horizon: usize, y: &impl Past<T>, jet: T) -> T {
-        let limit = self.order();
+        let pace = self.pace();
+        let limit = pace.order;
         let share = self.grading.share(jet);
-        let [off, on] = self.rates(limit);
         // What is known is of the past.
         let (mut free, mut past) = (self.constant, known.free);
         for (a, lag) in self.a.iter().zip(self.state_lags) {
@@ -235,49 +256,51 @@ impl<T: Real> Bilinear<'_, T> {
             (free, gain) = (free + past, gain + past_gain);
             (past, past_gain) = (T::ZERO, T::ZERO);
         }
-        let rate = off + (on - off) * share;
         let separated = if past == T::ZERO {
             T::ZERO
         } else {
-            (T::ONE - jet) * past / off
+            (T::ONE - jet) * past / pace.off
         };
-        let attached = jet * (drive + past + past_gain) / on;
-        free + gain * share + rate * (separated + attached)
+        let attached = jet * (drive + past + past_gain) / pace.on;
+        free + gain * share + pace.at(share) * (separated + attached)
     }
 
-    /// Lags below this are those of the flow's order: all of them where the short ones alone would not let the
-    /// flow go to any level.
+    /// How fast the flow goes to its level: with the lags below [`SHORTEST_MEMORY`], or with all of them where the
+    /// short ones alone would not let it go to any.
     #[inline(always)]
-    fn order(&self) -> usize {
-        let [off, on] = self.rates(SHORTEST_MEMORY);
-        if off > T::ZERO && on > T::ZERO {
-            SHORTEST_MEMORY
+    #[must_use]
+    pub fn pace(&self) -> Pace<T> {
+        if let Some(pace) = self.pace {
+            return *pace;
+        }
+        let short = self.rates(SHORTEST_MEMORY);
+        if short.off > T::ZERO && short.on > T::ZERO {
+            short
         } else {
-            usize::MAX
+            self.rates(usize::MAX)
         }
     }
 
-    /// The rates, per sample, at which the separated flow goes to its level and the attached one under the first
-    /// input: 1 − Σ a_i, and that − Σ c_j1, of lags below `limit`.
+    /// The pace with the lags below `order`.
     #[inline(always)]
-    fn rates(&self, limit: usize) -> [T; 2] {
+    fn rates(&self, order: usize) -> Pace<T> {
         let sum = |start: T, coefficients: &[T], lags: &[u16]| {
             let mut all = coefficients.iter().zip(lags);
             all.by_ref().fold(start, |rate, (x, lag)| {
-                let counts = self.convention.behind_newest(*lag) < limit;
+                let counts = self.convention.behind_newest(*lag) < order;
                 if counts { rate - *x } else { rate }
             })
         };
         let off = sum(T::ONE, self.a, self.state_lags);
-        [off, sum(off, self.column(0), self.product_lags)]
+        let on = sum(off, self.column(0), self.product_lags);
+        Pace { order, off, on }
     }
 
     /// The rate, per sample, at which y goes to the level of the moment, which holds what the flow remembers, under
     /// the first input's jet.
     #[inline(always)]
     pub(crate) fn rate(&self, jet: T) -> T {
-        let [off, on] = self.rates(self.order());
-        off + (on - off) * self.grading.share(jet)
+        self.pace().at(self.grading.share(jet))
     }
 
     /// The rate, per sample, at which y approaches its equilibrium under
@@ -302,8 +325,7 @@ impl<T: Real> Bilinear<'_, T> {
         if share == T::ZERO || share == T::ONE || rate == T::ZERO {
             return T::ONE - share;
         }
-        let [off, _] = self.rates(self.order());
-        (T::ONE - share) * off / rate
+        (T::ONE - share) * self.pace().off / rate
     }
 
     /// Of a motion, s_{k+1} − s_k, what the separated flow makes, its share of the rate being `separated`:
@@ -347,6 +369,7 @@ mod tests {
             product_lags: &[1],
             b: &[0.04],
             c: &[-0.03],
+            pace: None,
         };
         let mut y = DelayLine::<f64, 2>::new();
         y.push(0.3);
@@ -388,6 +411,7 @@ mod tests {
                 product_lags: &[30, 1],
                 b: &[0.04],
                 c: &[-0.01, -0.03],
+                pace: None,
             };
             let mut y = DelayLine::<f64, 40>::new();
             y.push(past);

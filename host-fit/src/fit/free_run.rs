@@ -255,13 +255,17 @@ impl FreeRunProblem<'_> {
         let mut y = Vec::with_capacity(signals.u.len());
         let mut columns = vec![Vec::with_capacity(signals.u.len()); axes.len()];
         let simulator = Simulator::with_values(self.model, &duals, self.rounding);
-        let left = simulator.run(signals, |k, output: &Output<Dual<P>>| {
-            y.push(output.measured.value);
-            for (column, slope) in columns.iter_mut().zip(output.measured.partials) {
-                column.push(if k < self.warm_up { 0.0 } else { slope });
-            }
-            ControlFlow::Continue(())
-        });
+        let left = simulator.run(
+            signals,
+            #[inline(always)]
+            |k, output: &Output<Dual<P>>| {
+                y.push(output.measured.value);
+                for (column, slope) in columns.iter_mut().zip(output.measured.partials) {
+                    column.push(if k < self.warm_up { 0.0 } else { slope });
+                }
+                ControlFlow::Continue(())
+            },
+        );
         left.is_none().then_some((y, columns))
     }
 }

@@ -61,20 +61,18 @@ pub(crate) fn least_squares(columns: &[Vec<f64>], rhs: &[f64]) -> Result<Vec<f64
 /// Σ a_i·b_i in four partial sums, so that the processor can work on them side by
 /// side; the order is fixed and the result repeatable.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4
-        .remainder()
-        .iter()
-        .zip(b4.remainder())
-        .map(|(a, b)| a * b)
-        .sum();
-    for (a, b) in a4.zip(b4) {
-        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
-            *sum += a * b;
-        }
-    }
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+    pulp::Arch::new().dispatch(
+        #[inline(always)]
+        || {
+            let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+            let mut sums = [0.0; 4];
+            for (a, b) in a.iter().zip(b) {
+                sums = std::array::from_fn(|lane| sums[lane] + a[lane] * b[lane]);
+            }
+            let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+            (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+        },
+    )
 }
 
 /// The inverse of an information matrix (symmetric, row-major, `n` × `n`) in the

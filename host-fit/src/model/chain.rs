@@ -52,7 +52,7 @@ impl<T: Real> Effect<T> for HostEffect<T> {
             Self::User(effect) => HostState::User(effect.start()),
         }
     }
-    #[inline]
+    #[inline(always)]
     fn jet(&self, state: &mut HostState<T>, jet: T, at: &Instant<'_, T>) -> T {
         match (self, state) {
             (Self::Catalogue(effect), HostState::Catalogue(state)) => effect.jet(state, jet, at),
@@ -60,14 +60,14 @@ impl<T: Real> Effect<T> for HostEffect<T> {
             _ => jet,
         }
     }
-    #[inline]
+    #[inline(always)]
     fn drives(&self) -> bool {
         match self {
             Self::Catalogue(effect) => effect.drives(),
             Self::User(effect) => effect.drives(),
         }
     }
-    #[inline]
+    #[inline(always)]
     fn drive(&self, state: &mut HostState<T>, flow: &Flow<T>, at: &Instant<'_, T>) -> T {
         match (self, state) {
             (Self::Catalogue(effect), HostState::Catalogue(state)) => effect.drive(state, flow, at),
@@ -75,7 +75,7 @@ impl<T: Real> Effect<T> for HostEffect<T> {
             _ => T::ZERO,
         }
     }
-    #[inline]
+    #[inline(always)]
     fn sense(&self, state: &mut HostState<T>, signal: T, at: &Instant<'_, T>) -> T {
         match (self, state) {
             (Self::Catalogue(effect), HostState::Catalogue(state)) => {
@@ -108,27 +108,32 @@ impl<T: Real> Effect<T> for Chain<T> {
     fn start(&self) -> Self::State {
         self.effects.iter().map(Effect::start).collect()
     }
-    #[inline]
-    fn jet(&self, states: &mut Self::State, jet: T, at: &Instant<'_, T>) -> T {
-        let each = self.effects.iter().zip(states);
-        each.fold(jet, |jet, (effect, state)| effect.jet(state, jet, at))
+    #[inline(always)]
+    fn jet(&self, states: &mut Self::State, mut jet: T, at: &Instant<'_, T>) -> T {
+        for (effect, state) in self.effects.iter().zip(states) {
+            jet = effect.jet(state, jet, at);
+        }
+        jet
     }
-    #[inline]
+    #[inline(always)]
     fn drives(&self) -> bool {
         self.drives
     }
-    #[inline]
+    #[inline(always)]
     fn drive(&self, states: &mut Self::State, flow: &Flow<T>, at: &Instant<'_, T>) -> T {
-        let each = self.effects.iter().zip(states);
-        each.fold(T::ZERO, |sum, (effect, state)| {
-            sum + effect.drive(state, &flow.driven_by(sum), at)
-        })
+        let mut sum = T::ZERO;
+        for (effect, state) in self.effects.iter().zip(states) {
+            if effect.drives() {
+                sum = sum + effect.drive(state, &flow.driven_by(sum), at);
+            }
+        }
+        sum
     }
-    #[inline]
-    fn sense(&self, states: &mut Self::State, signal: T, at: &Instant<'_, T>) -> T {
-        let each = self.effects.iter().zip(states);
-        each.fold(signal, |signal, (effect, state)| {
-            effect.sense(state, signal, at)
-        })
+    #[inline(always)]
+    fn sense(&self, states: &mut Self::State, mut signal: T, at: &Instant<'_, T>) -> T {
+        for (effect, state) in self.effects.iter().zip(states) {
+            signal = effect.sense(state, signal, at);
+        }
+        signal
     }
 }

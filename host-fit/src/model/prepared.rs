@@ -7,7 +7,7 @@ use model_core::delay::{DelayLaw, FixedDelay, Tap, Transport};
 use model_core::effect::Setting;
 use model_core::effects::{AnyTransport, AnyTransportState};
 use model_core::model::{Averaging, Parts};
-use model_core::recursion::{Bilinear, Grading, LagConvention};
+use model_core::recursion::{Bilinear, Grading, LagConvention, Pace};
 
 /// A model prepared to run in numbers of type `T`.
 #[derive(Clone, Debug)]
@@ -21,6 +21,8 @@ pub struct Prepared<T: Real> {
     a: Vec<T>,
     b: Vec<T>,
     c: Vec<T>,
+    /// `None` only while it is made.
+    pace: Option<Pace<T>>,
     delay: AnyDelay<T>,
     effects: Chain<T>,
 }
@@ -39,6 +41,7 @@ impl<T: Real> Parts<T> for Prepared<T> {
             product_lags: &self.product_lags,
             b: &self.b,
             c: &self.c,
+            pace: self.pace.as_ref(),
         }
     }
     #[inline]
@@ -193,7 +196,7 @@ impl Model {
                 HostEffect::new(self, added, &parameters, &setting)
             })
             .collect();
-        Prepared {
+        let mut prepared = Prepared {
             convention: self.convention,
             averaging: self.averaging,
             state_lags: self.state_lags.clone(),
@@ -203,8 +206,11 @@ impl Model {
             a,
             b,
             c,
+            pace: None,
             delay,
             effects: Chain::new(effects),
-        }
+        };
+        prepared.pace = Some(prepared.recursion().pace());
+        prepared
     }
 }

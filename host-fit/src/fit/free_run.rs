@@ -165,7 +165,30 @@ struct FreeRunProblem<'a> {
     rounding: Rounding,
 }
 
-impl FreeRunProblem<'_> {
+impl<'a> FreeRunProblem<'a> {
+    fn new(
+        model: &'a Model,
+        records: &[&'a Record],
+        axes: Vec<Searched>,
+        rounding: Rounding,
+    ) -> Result<Self, SimulateError> {
+        let signals: Result<Vec<_>, _> = records.iter().map(|r| Signals::of(model, r)).collect();
+        Ok(Self {
+            model,
+            signals: signals?,
+            measured: records.iter().map(|record| record.y.as_slice()).collect(),
+            axes,
+            warm_up: model.warm_up(),
+            rounding,
+        })
+    }
+
+    /// Samples that are judged.
+    fn samples(&self) -> usize {
+        let each = self.measured.iter();
+        each.map(|y| y.len().saturating_sub(self.warm_up)).sum()
+    }
+
     /// y_sim of a record; `None` if it diverges.
     fn run(&self, values: &[f64], record: usize) -> Option<Vec<f64>> {
         let signals = &self.signals[record];
@@ -393,13 +416,21 @@ pub fn sensitivities(
     Some((run, columns))
 }
 
+/// The mean square error of `model` as it is, over the judged samples; infinite if a free run diverges.
+///
+/// # Errors
+/// A missing channel.
+pub(crate) fn mean_square(model: &Model, records: &[&Record]) -> Result<f64, SimulateError> {
+    let problem = FreeRunProblem::new(model, records, Vec::new(), Rounding::Samples)?;
+    Ok(problem.cost(&model.values(), f64::INFINITY) / problem.samples() as f64)
+}
+
 fn descend(
     model: &Model,
     records: &[&Record],
     options: &FitOptions,
     rounding: Rounding,
 ) -> Result<Fit, SimulateError> {
-    let signals: Result<Vec<_>, _> = records.iter().map(|r| Signals::of(model, r)).collect();
     let coordinates = model.coordinates();
     let moves = |index: usize, coordinate: &Coordinate| match coordinate.parameter() {
         None => options.linear && (index > 0 || options.constant),
@@ -415,18 +446,8 @@ fn descend(
             ..Searched::of(index, coordinate)
         })
         .collect();
-    let mut problem = FreeRunProblem {
-        model,
-        signals: signals?,
-        measured: records.iter().map(|record| record.y.as_slice()).collect(),
-        axes,
-        warm_up: model.warm_up(),
-        rounding,
-    };
-    let samples: usize = records
-        .iter()
-        .map(|r| r.y.len().saturating_sub(problem.warm_up))
-        .sum();
+    let mut problem = FreeRunProblem::new(model, records, axes, rounding)?;
+    let samples = problem.samples();
     let values = model.values();
     let cost = problem.cost(&values, f64::INFINITY);
     if !cost.is_finite() {

@@ -7,7 +7,7 @@ use super::proposal::Proposal;
 use super::screen::Screen;
 use super::search::{Hypothesis, Search};
 use super::term::Term;
-use crate::fit::{Fit, FitOptions, fit, settle_fixed_delay, starts};
+use crate::fit::{Fit, FitOptions, fit, mean_square, settle_fixed_delay, starts};
 use crate::model::Model;
 use rayon::prelude::*;
 
@@ -113,58 +113,58 @@ impl Search<'_> {
         })
     }
 
-    /// Moves all lags to where they leave least, by steps of Gauss and Newton; a step
-    /// that does not lower the error is halved.
-    fn settle_lags(&self, mut current: Fit, terms: &mut [Term]) -> Fit {
+    /// Moves all lags to where they leave least, by steps of Gauss and Newton in lags and parameters together; a
+    /// step that does not lower the error is halved.
+    fn settle_lags(&self, fitted: Fit, terms: &mut [Term]) -> Fit {
         let learning = self.judge.learning(0);
         let shortest = learning.iter().map(|r| r.len()).min().unwrap_or(0);
-        let longest = longest_lag(current.model.sample_period_s, shortest);
+        let longest = longest_lag(fitted.model.sample_period_s, shortest);
+        let (mut model, mut least) = (fitted.model.clone(), fitted.mean_square());
+        let mut settled = terms.to_vec();
         for _ in 0..RULES.lag_rounds {
-            let Some(screen) = Screen::new(self.judge, &current.model) else {
-                return current;
+            let Some(screen) = Screen::new(self.judge, &model) else {
+                break;
             };
-            let mut steps = screen.moves_of(terms);
-            drop(screen);
+            let moves = screen.moves_of(&settled);
+            let mut steps = moves.steps.clone();
             let mut better = None;
             while better.is_none() && steps.iter().any(|step| *step != 0) && !self.interrupted() {
-                better = self.moved(&current, terms, &steps, longest);
+                let (moved, lags) = moved(&model, &settled, &steps, longest);
+                let moved = moved.with_values(&screen.values_with(&moves, &steps));
+                let square = mean_square(&moved, &learning).unwrap_or(f64::INFINITY);
+                better = (square < least * (1.0 - RULES.lag_gain)).then_some((moved, lags, square));
                 steps.iter_mut().for_each(|step| *step /= 2);
             }
-            let Some((fitted, moved)) = better else {
-                return current;
+            let Some((moved, lags, square)) = better else {
+                break;
             };
-            current = fitted;
-            terms.clone_from_slice(&moved);
+            (model, settled, least) = (moved, lags, square);
         }
-        current
-    }
-
-    /// A fit with its lags moved, if that lowers the error.
-    fn moved(
-        &self,
-        current: &Fit,
-        terms: &[Term],
-        steps: &[i32],
-        longest: u16,
-    ) -> Option<(Fit, Vec<Term>)> {
-        let mut model = current.model.clone();
-        let mut moved = terms.to_vec();
-        for (term, step) in moved.iter_mut().zip(steps) {
-            let Some(old) = term.lag() else { continue };
-            let lag = (i32::from(old) + step).clamp(3, longest.into()) as u16;
-            if let Some(other) = term.moved_in(&model, lag) {
-                model = other;
-                *term = term.with_lag(lag);
+        if least >= fitted.mean_square() {
+            return fitted;
+        }
+        match fit(&model, &learning, &self.judge.options_for(&model)) {
+            Ok(end) if end.mean_square() < fitted.mean_square() => {
+                terms.clone_from_slice(&settled);
+                end
             }
+            _ => fitted,
         }
-        let options = FitOptions {
-            iterations: RULES.lag_iterations,
-            ..self.judge.options_for(&model)
-        };
-        let fitted = fit(&model, &self.judge.learning(0), &options).ok()?;
-        let least = current.mean_square() * (1.0 - RULES.lag_gain);
-        (fitted.mean_square() < least).then_some((fitted, moved))
     }
+}
+
+/// A model with the lags of its terms moved, and the terms.
+fn moved(model: &Model, terms: &[Term], steps: &[i32], longest: u16) -> (Model, Vec<Term>) {
+    let (mut model, mut moved) = (model.clone(), terms.to_vec());
+    for (term, step) in moved.iter_mut().zip(steps) {
+        let Some(old) = term.lag() else { continue };
+        let lag = (i32::from(old) + step).clamp(3, longest.into()) as u16;
+        if let Some(other) = term.moved_in(&model, lag) {
+            model = other;
+            *term = term.with_lag(lag);
+        }
+    }
+    (model, moved)
 }
 
 /// Whether an effect was bent as far as its card lets it: it stands in for something

@@ -116,9 +116,7 @@ rules! {
     /// … and what a move must promise.
     worth_moving: f64 = 2e-4, "share of the error energy", "judgement: a twentieth of the price of a parameter";
     /// Rounds of moving all lags of a model …
-    lag_rounds: usize = 4, "", "judgement";
-    /// … the steps of a fit after each move …
-    lag_iterations: usize = 5, "iterations", "judgement";
+    lag_rounds: usize = 6, "", "judgement";
     /// … and what a move must gain.
     lag_gain: f64 = 1e-4, "share of the mean square error", "judgement";
     /// Delay laws are compared at this level, where nothing better is known.

@@ -51,6 +51,19 @@ pub struct Screen<'a> {
     /// Directions that the model's own parameters can follow, orthonormal on what is
     /// learned from.
     pub(super) basis: Vec<Vec<f64>>,
+    /// Of the first of these directions: the coordinate that gave it, and how much of each direction a unit of
+    /// that coordinate makes. The others are fixed delays.
+    made_by: Vec<(usize, Vec<f64>)>,
+    /// How much of each direction the error held.
+    own: Vec<f64>,
+}
+
+/// Where lags should move, and what the model's parameters would do of that.
+pub(super) struct Moves {
+    /// For each term by how many samples, 0 where it is right or the term has no lag.
+    pub(super) steps: Vec<i32>,
+    /// For each term how much of each direction of the basis a sample makes.
+    along: Vec<Vec<f64>>,
 }
 
 impl<'a> Screen<'a> {
@@ -86,16 +99,20 @@ impl<'a> Screen<'a> {
             runs,
             error: Vec::new(),
             basis: Vec::new(),
+            made_by: Vec::new(),
+            own: Vec::new(),
         };
-        let mut jacobian: Vec<Vec<f64>> = (0..indices.len())
-            .map(|i| screen.joined(slopes.iter().map(|record| record[i].as_slice())))
-            .collect();
-        jacobian.extend(screen.fixed_delays());
-        for column in jacobian {
+        for (i, index) in indices.into_iter().enumerate() {
+            let column = screen.joined(slopes.iter().map(|record| record[i].as_slice()));
+            if let Some(made) = screen.follow(column) {
+                screen.made_by.push((index, made));
+            }
+        }
+        for column in screen.fixed_delays() {
             screen.follow(column);
         }
         let mut error = screen.error_with(&screen.runs);
-        screen.residualise(&mut error);
+        screen.own = screen.residualise(&mut error);
         screen.error = error;
         Some(screen)
     }
@@ -181,17 +198,22 @@ impl<'a> Screen<'a> {
         (0..delays.len()).filter_map(later).collect()
     }
 
-    /// Adds a direction to those that the model can follow.
-    fn follow(&mut self, mut column: Vec<f64>) {
+    /// Adds a direction to those that the model can follow, and says how much of each the column was; `None` if
+    /// it follows that one already.
+    fn follow(&mut self, mut column: Vec<f64>) -> Option<Vec<f64>> {
         let size = self.learned_square(&column).sqrt();
         // Twice is enough (Kahan, in Parlett 1980).
-        self.residualise(&mut column);
-        self.residualise(&mut column);
+        let mut made = self.residualise(&mut column);
+        let again = self.residualise(&mut column);
+        made.iter_mut().zip(again).for_each(|(sum, x)| *sum += x);
         let left = self.learned_square(&column).sqrt();
         if left > 1e-8 * size && left.is_finite() {
             column.iter_mut().for_each(|x| *x /= left);
             self.basis.push(column);
+            made.push(left);
+            return Some(made);
         }
+        None
     }
 
     pub(super) fn learned_square(&self, column: &[f64]) -> f64 {
@@ -271,29 +293,56 @@ impl<'a> Screen<'a> {
         Some(less(series, columns, &scale))
     }
 
-    /// By how many samples the lag of each term should move, to first order; 0 where
-    /// it is right, or the term has none.
+    /// Where the lags of the terms should move, to first order.
     #[must_use]
-    pub fn moves_of(&self, terms: &[Term]) -> Vec<i32> {
+    pub(super) fn moves_of(&self, terms: &[Term]) -> Moves {
         let probed = terms.par_iter().enumerate().filter_map(|(index, term)| {
             let mut column =
                 self.change(&term.moved_in(self.model, term.lag()? + RULES.lag_probe)?)?;
-            self.residualise(&mut column);
-            Some((index, column))
+            let along = self.residualise(&mut column);
+            Some((index, column, along))
         });
-        let (indices, columns): (Vec<usize>, Vec<Vec<f64>>) = probed.collect();
-        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-        let mut moves = vec![0; terms.len()];
+        let probed: Vec<(usize, Vec<f64>, Vec<f64>)> = probed.collect();
+        let columns: Vec<&[f64]> = probed.iter().map(|(_, column, _)| &column[..]).collect();
+        let mut moves = Moves {
+            steps: vec![0; terms.len()],
+            along: vec![Vec::new(); terms.len()],
+        };
+        let probe = f64::from(RULES.lag_probe);
         if let Some((scales, left, _)) = self.regress(&columns)
             && 1.0 - left > RULES.worth_moving
         {
-            for (index, scale) in indices.into_iter().zip(scales) {
-                let step = (scale * f64::from(RULES.lag_probe))
-                    .clamp(-RULES.longest_move, RULES.longest_move);
-                moves[index] = step.round() as i32;
+            for ((index, _, along), scale) in probed.iter().zip(scales) {
+                let step = (scale * probe).clamp(-RULES.longest_move, RULES.longest_move);
+                moves.steps[*index] = step.round() as i32;
+                moves.along[*index] = along.iter().map(|x| x / probe).collect();
             }
         }
         moves
+    }
+
+    /// The parameters that go with lags moved by so many samples, to first order.
+    pub(super) fn values_with(&self, moves: &Moves, steps: &[i32]) -> Vec<f64> {
+        let wanted = |direction: usize| {
+            let of_term = |(along, step): (&Vec<f64>, &i32)| {
+                f64::from(*step) * along.get(direction).copied().unwrap_or(0.0)
+            };
+            self.own[direction] - moves.along.iter().zip(steps).map(of_term).sum::<f64>()
+        };
+        let mut rest: Vec<f64> = (0..self.made_by.len()).map(wanted).collect();
+        let mut values = self.model.values();
+        let coordinates = self.model.coordinates();
+        for (direction, (index, made)) in self.made_by.iter().enumerate().rev() {
+            let step = rest[direction] / made[direction];
+            rest.iter_mut()
+                .zip(made)
+                .for_each(|(rest, made)| *rest -= step * made);
+            let moved = values[*index] + step;
+            values[*index] = coordinates[*index]
+                .parameter()
+                .map_or(moved, |card| moved.clamp(card.low, card.high));
+        }
+        values
     }
 
     /// What the parameters of an effect do together, from where `other` has them: the

@@ -451,16 +451,20 @@ impl Search<'_> {
             .collect();
         let mut brief: Vec<(f64, usize, Fit)> = brief.into_iter().flatten().collect();
         brief.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // One without effects is among those that are followed to the end; what ends as another does is not.
+        // One without effects is among those that are followed to the end, and one of each model that was screened:
+        // a few steps say less where it is further to go. What ends as another does is not.
         let mut leading: Vec<(usize, Fit)> = Vec::new();
         let (mut has_bare, mut met): (bool, Vec<Vec<Term>>) = (false, Vec::new());
+        let mut heirless: Vec<usize> = pool.iter().map(|(index, _)| *index).collect();
         for (_, at, fit) in brief {
             let (index, proposal) = &pool[at];
             let bare = all[*index].is_bare() && count_effects(&proposal.terms) == 0;
             let terms = [all[*index].terms.clone(), proposal.terms.clone()].concat();
             let again = met.iter().any(|other| Term::are_alike(other, &terms));
-            if !again && (leading.len() < RULES.finished * width || (bare && !has_bare)) {
+            let first = heirless.contains(index) || (bare && !has_bare);
+            if !again && (leading.len() < RULES.finished * width || first) {
                 has_bare |= bare;
+                heirless.retain(|other| other != index);
                 met.push(terms);
                 leading.push((at, fit));
             }

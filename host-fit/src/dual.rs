@@ -155,6 +155,12 @@ impl<const P: usize> Real for Dual<P> {
         };
         self.chain(value, slope)
     }
+    #[inline(always)]
+    fn two_sum(self, term: Self) -> (Self, Self) {
+        // Derivatives are not summed for ever: their rounding is left as it is.
+        let (_, error) = self.value.two_sum(term.value);
+        (self + term, Self::constant(error))
+    }
     fn round(self) -> i32 {
         Real::round(self.value)
     }

@@ -33,12 +33,10 @@ impl<T: Real> TwoWords<T> {
         low: T::ZERO,
     };
 
-    /// Knuth's two-sum: `high + term` and its rounding error are both exact.
     #[inline(always)]
     fn add(&mut self, term: T) {
-        let sum = self.high + term;
-        let part = sum - self.high;
-        self.low = self.low + ((self.high - (sum - part)) + (term - part));
+        let (sum, error) = self.high.two_sum(term);
+        self.low = self.low + error;
         self.high = sum;
     }
 }

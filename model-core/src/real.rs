@@ -44,6 +44,13 @@ pub trait Real:
     /// The largest integer not above this number, saturating; NaN gives 0.
     fn floor(self) -> i32;
 
+    /// Knuth's two-sum: the sum and its rounding error, both exact.
+    #[inline(always)]
+    fn two_sum(self, term: Self) -> (Self, Self) {
+        let sum = self + term;
+        let part = sum - self;
+        (sum, (self - (sum - part)) + (term - part))
+    }
     /// The magnitude.
     fn abs(self) -> Self {
         if self < Self::ZERO { -self } else { self }

@@ -78,19 +78,18 @@ impl Session<'_> {
                 return false;
             }
             let search = self.search;
-            let others = search.in_place_of(stand_in, &without, |term| term.effect().is_some());
+            let own = as_given.rmse();
+            let others =
+                search.in_place_of(stand_in, &without, own, |term| term.effect().is_some());
             let lags = Term::lags_of(&without);
             // The lags were found beside what stands in: they move before anything is said.
             let others: Vec<_> = others.into_iter().take(RULES.settled).collect();
             others.into_par_iter().any(|other| {
-                let near = other.held_out.rmse() < TERMS.in_reach * as_given.rmse();
                 let terms = [lags.clone(), vec![other.term.clone()]].concat();
                 let count = terms.len();
-                let end = near
-                    .then(|| search.finish(terms, other.fit, count))
-                    .flatten();
+                let end = search.finish(terms, other.fit, count);
                 end.is_some_and(|end| {
-                    let ratio = end.judged.rmse() / as_given.rmse();
+                    let ratio = end.judged.rmse() / own;
                     let p = p_value(as_given, &end.judged.held_out);
                     let better = ratio < 1.0 - RULES.alike && p < RULES.level;
                     let leaner = ratio < 1.0 + RULES.alike && other.term.cost() < stand_in.cost();

@@ -19,11 +19,13 @@ pub(crate) struct InPlace {
 
 impl Search<'_> {
     /// Single terms in the place of one that was taken out, on the model without it, the
-    /// best first: of those `wanted` one of each kind, and of effects the leading ones.
+    /// best first: of those `wanted` one of each kind, and of effects the leading ones. Only
+    /// those within reach of `own`, the held-out error with the term.
     pub(crate) fn in_place_of(
         &self,
         taken: &Term,
         without: &Model,
+        own: f64,
         wanted: impl Fn(&Term) -> bool,
     ) -> Vec<InPlace> {
         let Ok(judged) = self.judge.refitted(without) else {
@@ -46,7 +48,8 @@ impl Search<'_> {
                 met.push(kind);
                 let is_effect = candidate.term.effect().is_some();
                 effects += usize::from(is_effect);
-                !is_effect || effects <= RULES.in_its_place
+                let left = (1.0 - candidate.held_out).max(0.0).sqrt() * judged.rmse();
+                left <= RULES.promising * own && (!is_effect || effects <= RULES.in_its_place)
             })
             .collect();
         let tried = leading.into_par_iter().filter_map(|candidate| {
@@ -54,7 +57,7 @@ impl Search<'_> {
             let fit = self.set_out(model, &proposal, RULES.brief)?;
             let held_out = self.judge.held_out(|_| &fit.model).ok()?;
             let term = proposal.terms.into_iter().next()?;
-            Some(InPlace {
+            (held_out.rmse() < RULES.in_reach * own).then_some(InPlace {
                 term,
                 held_out,
                 fit,
@@ -83,18 +86,26 @@ impl Search<'_> {
             && !self.interrupted()
         {
             let term = &hypothesis.terms[index];
+            let effects = count_effects(&hypothesis.terms);
+            let near = match term.effect() {
+                // Nothing in its place would do better, and no name would be saved.
+                Some(_) if effects == 1 => RULES.at_the_floor,
+                Some(_) => 0.0,
+                None => RULES.near_the_floor,
+            };
+            if self.over(&hypothesis) <= near {
+                done.push(term.name());
+                continue;
+            }
             (self.progress)(&format!("what could stand in the place of {}", term.name()));
             done.push(term.name());
-            let effects = count_effects(&hypothesis.terms);
             let others = effects - count_effects(std::slice::from_ref(term));
             let room = others < self.most_effects;
             let wanted = |other: &Term| room || other.effect().is_none();
             let without = term.taken_from(hypothesis.judged.model(), root.judged.model());
-            let best = self.in_place_of(term, &without, wanted).into_iter().next();
-            let near =
-                |other: &InPlace| other.held_out.rmse() < RULES.in_reach * hypothesis.judged.rmse();
-            let best = best.filter(near);
-            let other = best.and_then(|other| {
+            let own = hypothesis.judged.rmse();
+            let near = self.in_place_of(term, &without, own, wanted);
+            let other = near.into_iter().next().and_then(|other| {
                 done.push(other.term.name());
                 let mut terms = hypothesis.terms.clone();
                 terms[index] = other.term;

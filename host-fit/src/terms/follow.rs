@@ -25,12 +25,28 @@ impl Search<'_> {
             [] => vec![&proposal.terms],
             others => others.iter().map(Vec::as_slice).collect(),
         };
+        // Of many starts the best are followed further.
+        let many = all.len() > RULES.followed;
+        let first = if many { iterations / 2 } else { iterations };
         let fits = all
             .into_par_iter()
-            .filter_map(|terms| self.set_out_from(model, proposal, terms, iterations));
-        let fits: Vec<Fit> = fits.collect();
-        fits.into_iter()
-            .min_by(|a, b| a.mean_square().total_cmp(&b.mean_square()))
+            .filter_map(|terms| self.set_out_from(model, proposal, terms, first));
+        let mut fits: Vec<Fit> = fits.collect();
+        let better = |a: &Fit, b: &Fit| a.mean_square().total_cmp(&b.mean_square());
+        fits.sort_by(better);
+        if many {
+            fits.truncate(RULES.followed);
+            let learning = self.judge.learning(0);
+            let further = fits.into_par_iter().map(|begun| {
+                let options = FitOptions {
+                    iterations: iterations - first,
+                    ..self.judge.options_for(&begun.model)
+                };
+                fit(&begun.model, &learning, &options).unwrap_or(begun)
+            });
+            fits = further.collect();
+        }
+        fits.into_iter().min_by(better)
     }
 
     /// The terms from other starting points, none where one does.

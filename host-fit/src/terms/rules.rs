@@ -40,12 +40,16 @@ rules! {
     most_given: usize = 6, "terms", "judgement: each has to be tried without at the end";
     /// Effects that are tried in the place of another term.
     in_its_place: usize = 3, "", "judgement: the truth leads the screening or is next to the leader";
+    /// … if the screening promises no more than this …
+    promising: f64 = 2.0, "times the error", "eight rigs: after a few steps no less than 0.7 of what the screening promised was left";
     /// … and those that are followed to the end: what is further behind after a few steps does not catch up.
     in_reach: f64 = 1.2, "times the error", "judgement: the lag of a valve in the place of a film's is 1.15 after the first steps";
     /// A base that is worse by no more than this, its parameters paid for, takes the place of a second name.
     as_well: f64 = 0.01, "share of the rms error", "a lag of the film and a second lag of the flow are one model where the delay is fixed, and the second costs a parameter more";
     /// Steps that every proposal is followed for.
     brief: usize = 6, "iterations", "fewer leave thresholds where they were";
+    /// Of more starts than this, the best so many are followed for the second half of them.
+    followed: usize = 3, "starts", "judgement: for the time it takes";
     /// What costs this many times its price after those steps without it is needed.
     far_from_needless: f64 = 5.0, "times the price", "judgement: the steps that follow take half of the loss at most";
     /// Level of the tests.

@@ -142,7 +142,7 @@ impl Search<'_> {
         self.interrupt.load(Memory::Relaxed)
     }
 
-    fn over(&self, hypothesis: &Hypothesis) -> f64 {
+    pub(super) fn over(&self, hypothesis: &Hypothesis) -> f64 {
         self.judge.over_noise(hypothesis.judged.rmse())
     }
 

@@ -201,3 +201,81 @@ fn at_a_bound(model: &Model, term: &Term) -> bool {
         card.low < card.high && (place(*value) > high - near || at_low)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::{Record, Use};
+    use crate::fit::Known;
+    use crate::model::Delay;
+    use crate::terms::judge::Judge;
+    use std::sync::atomic::AtomicBool;
+
+    /// A flow that remembers what it was 120 samples ago, on its own and under the jet what it was 61 samples ago.
+    fn remembering(records: u32) -> Vec<Record> {
+        let mut random = 7_u32;
+        let mut next = move || {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            random >> 16
+        };
+        let mut one = |index| {
+            let mut u: Vec<f64> = Vec::new();
+            while u.len() < 4000 {
+                let (rest, blow) = (40 + next() % 300, 40 + next() % 300);
+                u.extend((0..rest).map(|_| 0.0));
+                u.extend((0..blow).map(|_| 1.0));
+            }
+            u.truncate(4000);
+            let mut y: Vec<f64> = vec![0.0];
+            for k in 0..u.len() - 1 {
+                let jet = if k >= 20 { u[k - 20] } else { 0.0 };
+                let past = |lag: usize| if k >= lag { y[k - lag] } else { 0.0 };
+                let drive = 0.03 - 0.02 * y[k] + 0.005 * past(60);
+                let noise = f64::from(next() % 1000) / 1e6;
+                y.push(0.98 * y[k] - 0.006 * past(119) + jet * drive + 1e-3 * noise);
+            }
+            let role = if index % 2 == 0 {
+                Use::Identify
+            } else {
+                Use::Validate
+            };
+            Record::new(&format!("r{index}"), role, 0.001, u, y)
+        };
+        (0..records).map(&mut one).collect()
+    }
+
+    #[test]
+    fn lags_that_are_off_by_a_dozen_samples_are_moved_to_where_they_belong() {
+        let records = remembering(4);
+        let judge = Judge::new(&records, None, FitOptions::default()).expect("records");
+        let search = Search {
+            judge: &judge,
+            known: Known::of(&judge.learning(0)),
+            effects: false,
+            most_effects: 0,
+            interrupt: &AtomicBool::new(false),
+            progress: &|_| {},
+        };
+        let mut terms = vec![Term::State(131), Term::Product(52)];
+        let lean = Model {
+            a: vec![0.98],
+            b: vec![0.03],
+            c: vec![-0.02],
+            delay: Delay::Fixed { delays: vec![20] },
+            ..Model::default()
+        };
+        let off = terms
+            .iter()
+            .fold(lean, |model, term| term.added_to(&model, &[]));
+        let options = judge.options_for(&off);
+        let begun = fit(&off, &judge.learning(0), &options).expect("a fit");
+        let settled = search.settle_lags(begun.clone(), &mut terms);
+        assert!(settled.mean_square() < 1e-3 * begun.mean_square());
+        assert_eq!([terms[0].lag(), terms[1].lag()], [Some(120), Some(61)]);
+        assert!(
+            (settled.model.a[1] + 0.006).abs() < 1e-4,
+            "{:?}",
+            settled.model
+        );
+    }
+}

@@ -103,4 +103,24 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn what_acts_at_thresholds_or_limits_hides_and_what_bends_the_flow_does_not() {
+        let hiding = SPECS
+            .iter()
+            .filter(|spec| hides(spec))
+            .map(|spec| spec.name);
+        let hiding: Vec<&str> = hiding.collect();
+        for name in ["attachment-hysteresis", "sensor-saturation"] {
+            assert!(hiding.contains(&name), "{hiding:?}");
+        }
+        for name in [
+            "echo-path",
+            "hot-film-lag",
+            "state-dependent-delay",
+            "quadratic-drag",
+        ] {
+            assert!(!hiding.contains(&name), "{hiding:?}");
+        }
+    }
 }

@@ -5,6 +5,7 @@ use crate::model::{Delay, Footprint, Model, Prepared, Rounding, Start};
 use crate::ring::Ring;
 use crate::rules;
 use model_core::effects::SLOW_WAKE;
+use model_core::history::Memory as _;
 use model_core::model::{StateOf, observe};
 use model_core::{Input, Output, Parts, Real, State};
 use std::ops::ControlFlow;
@@ -169,7 +170,7 @@ impl<T: Real> Simulator<T> {
             if size > bound || size.is_nan() {
                 return Some(k + 1);
             }
-            state.advance(next, window);
+            self.advance(&mut state, next, window);
         }
         None
     }
@@ -185,7 +186,7 @@ impl<T: Real> Simulator<T> {
             if self.start == Start::Measured {
                 self.hold_first(signals, &mut state, &mut channels);
             } else {
-                state.advance(T::from_f64(*first), window);
+                self.advance(&mut state, T::from_f64(*first), window);
             }
         }
         for (k, u) in signals.u.iter().enumerate() {
@@ -194,12 +195,22 @@ impl<T: Real> Simulator<T> {
             };
             let output = self.observe(signals, &mut state, &mut channels, k, *u);
             sink(k + 1, output.next);
-            state.advance(T::from_f64(*measured), window);
+            self.advance(&mut state, T::from_f64(*measured), window);
         }
     }
 
     fn state(&self) -> HostState<T> {
         self.memory.at_rest(&self.prepared)
+    }
+
+    /// Makes `flow` the newest output; the average is kept where something reads it.
+    #[inline(always)]
+    fn advance(&self, state: &mut HostState<T>, flow: T, window: u32) {
+        if self.prepared.follows_average() {
+            state.advance(flow, window);
+        } else {
+            state.outputs.push(flow);
+        }
     }
 
     #[inline(always)]
@@ -229,7 +240,7 @@ impl<T: Real> Simulator<T> {
         let window = self.prepared.averaging().window;
         let full = self.memory.outputs.max(self.memory.jets);
         for _ in 0..full.max(self.followed) {
-            state.advance(T::from_f64(*y), window);
+            self.advance(state, T::from_f64(*y), window);
             self.observe(signals, state, channels, 0, *u);
         }
     }

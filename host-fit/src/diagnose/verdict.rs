@@ -227,8 +227,10 @@ impl Session<'_> {
             })
         } else if found.best.terms.iter().filter_map(Term::effect).count() > 1 {
             let pared = self.pared(found, |lesser, best| self.is_beside_the_point(lesser, best));
-            // Where a base fits, several effects that do nothing but together are a curve through its errors.
-            if self.fits(&found.bare.judged) && !self.one_leads(&pared, found) {
+            // Where a base fits, several effects that do nothing but together are a curve through its errors, unless
+            // they make do with less than that base.
+            let leaner = pared.cost() <= found.bare.cost();
+            if self.fits(&found.bare.judged) && !leaner && !self.one_leads(&pared, found) {
                 return found.bare.clone();
             }
             pared

@@ -14,9 +14,9 @@ use model_core::effect::Sign;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
-/// Derivatives carried by one run: up to eight …
+/// Derivatives carried by one run: eight …
 const FEW: usize = 8;
-/// … or, where more are wanted, up to twelve.
+/// … or all that are left, if that is no more than twelve.
 const MANY: usize = 12;
 
 /// How to fit.
@@ -208,8 +208,11 @@ impl<'a> FreeRunProblem<'a> {
             .collect();
         let mut jacobian: Vec<Vec<f64>> = vec![Vec::new(); self.axes.len()];
         let mut simulated = None;
-        let chunks = smooth.chunks(if smooth.len() <= FEW { FEW } else { MANY });
-        for chunk in chunks {
+        let mut rest = &smooth[..];
+        while !rest.is_empty() {
+            let at_once = if rest.len() <= MANY { rest.len() } else { FEW };
+            let chunk;
+            (chunk, rest) = rest.split_at(at_once);
             let (run, columns) = if chunk.len() <= FEW {
                 self.sensitivities::<FEW>(values, record, chunk)?
             } else {

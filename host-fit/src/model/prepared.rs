@@ -24,7 +24,17 @@ pub struct Prepared<T: Real> {
     /// `None` only while it is made.
     pace: Option<Pace<T>>,
     delay: AnyDelay<T>,
+    /// Whether the delay follows ỹ.
+    follows: bool,
     effects: Chain<T>,
+}
+
+impl<T: Real> Prepared<T> {
+    /// Whether the delay follows the averaged output ỹ of eq. (1): of other models it need not be kept.
+    #[inline]
+    pub(crate) fn follows_average(&self) -> bool {
+        self.follows
+    }
 }
 
 impl<T: Real> Parts<T> for Prepared<T> {
@@ -181,6 +191,10 @@ impl Model {
                 }
             }
         };
+        let follows = match &delay {
+            AnyDelay::Fixed(_) => false,
+            AnyDelay::Law { law, .. } => law.bounds().is_none_or(|[least, most]| least != most),
+        };
         let channels = self.channels();
         let effects: Vec<HostEffect<T>> = self
             .effects
@@ -207,6 +221,7 @@ impl Model {
             b,
             c,
             pace: None,
+            follows: follows && !self.averaging.averaged_model,
             delay,
             effects: Chain::new(effects),
         };

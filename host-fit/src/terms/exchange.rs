@@ -87,21 +87,23 @@ impl Search<'_> {
         {
             let term = &hypothesis.terms[index];
             let effects = count_effects(&hypothesis.terms);
-            let near = match term.effect() {
+            if effects == 1
+                && term.effect().is_some()
+                && self.over(&hypothesis) <= RULES.at_the_floor
+            {
                 // Nothing in its place would do better, and no name would be saved.
-                Some(_) if effects == 1 => RULES.at_the_floor,
-                Some(_) => 0.0,
-                None => RULES.near_the_floor,
-            };
-            if self.over(&hypothesis) <= near {
                 done.push(term.name());
                 continue;
             }
+            // What is nearly at the floor can only be had for less.
+            let less_only =
+                term.effect().is_none() && self.over(&hypothesis) <= RULES.near_the_floor;
             (self.progress)(&format!("what could stand in the place of {}", term.name()));
             done.push(term.name());
             let others = effects - count_effects(std::slice::from_ref(term));
             let room = others < self.most_effects;
-            let wanted = |other: &Term| room || other.effect().is_none();
+            let affordable = |other: &Term| !less_only || other.cost() < term.cost();
+            let wanted = |other: &Term| (room || other.effect().is_none()) && affordable(other);
             let without = term.taken_from(hypothesis.judged.model(), root.judged.model());
             let own = hypothesis.judged.rmse();
             let near = self.in_place_of(term, &without, own, wanted);

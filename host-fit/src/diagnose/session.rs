@@ -87,7 +87,7 @@ impl Session<'_> {
         let (search, judge, units) = (self.search, self.judge(), &self.units);
         let named = self.named(&found);
         (search.progress)("what else it could be");
-        let mut compared = self.compared(&named, &found.root);
+        let mut compared = self.compared(&named, &found);
         // One effect may do better than all that were found together.
         let alone = compared.best_alone();
         let alone = alone.filter(|alone| alone.score() < named.score());
@@ -102,7 +102,7 @@ impl Session<'_> {
             .filter(|conclusion| !conclusion.effects.is_empty())
             .unwrap_or_else(|| concluded(&named));
         if effects.is_empty() && !named.is_bare() {
-            compared = self.compared(&last, &found.root);
+            compared = self.compared(&last, &found);
         }
         let Compared {
             context,
@@ -195,10 +195,16 @@ impl Session<'_> {
     }
 
     /// A hypothesis without its effects, and all candidates there.
-    fn compared(&self, with: &Hypothesis, root: &Hypothesis) -> Compared {
+    fn compared(&self, with: &Hypothesis, found: &Found) -> Compared {
         let effects = with.terms.iter().filter_map(Term::effect);
         let names: Vec<&str> = effects.map(|spec| spec.name).collect();
-        let context = self.search.without_effects(with, root, |_| true);
+        let without = self.search.without_effects(with, &found.root, |_| true);
+        // Without them its lags may not run freely.
+        let context = if without.is_bare() {
+            without
+        } else {
+            found.bare.clone()
+        };
         let seed = self.options.seed;
         let (others, chance) = rivals_and_chance(self.search, &context, &names, &with.judged, seed);
         Compared {

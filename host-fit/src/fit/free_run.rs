@@ -419,15 +419,6 @@ pub fn sensitivities(
     Some((run, columns))
 }
 
-/// The mean square error of `model` as it is, over the judged samples; infinite if a free run diverges.
-///
-/// # Errors
-/// A missing channel.
-pub(crate) fn mean_square(model: &Model, records: &[&Record]) -> Result<f64, SimulateError> {
-    let problem = FreeRunProblem::new(model, records, Vec::new(), Rounding::Samples)?;
-    Ok(problem.cost(&model.values(), f64::INFINITY) / problem.samples() as f64)
-}
-
 fn descend(
     model: &Model,
     records: &[&Record],

@@ -7,7 +7,7 @@ use super::proposal::Proposal;
 use super::screen::Screen;
 use super::search::{Hypothesis, Search};
 use super::term::Term;
-use crate::fit::{Fit, FitOptions, fit, mean_square, settle_fixed_delay, starts};
+use crate::fit::{Fit, FitOptions, fit, settle_fixed_delay, starts};
 use crate::model::Model;
 use rayon::prelude::*;
 
@@ -129,8 +129,8 @@ impl Search<'_> {
         })
     }
 
-    /// Moves all lags to where they leave least, by steps of Gauss and Newton in lags and parameters together; a
-    /// step that does not lower the error is halved.
+    /// Moves all lags to where they leave least, by steps of Gauss and Newton in lags and parameters together, the
+    /// parameters fitted briefly after each; a step that does not lower the error is halved.
     fn settle_lags(&self, fitted: Fit, terms: &mut [Term]) -> Fit {
         let learning = self.judge.learning(0);
         let shortest = learning.iter().map(|r| r.len()).min().unwrap_or(0);
@@ -147,14 +147,20 @@ impl Search<'_> {
             while better.is_none() && steps.iter().any(|step| *step != 0) && !self.interrupted() {
                 let (moved, lags) = moved(&model, &settled, &steps, longest);
                 let moved = moved.with_values(&screen.values_with(&moves, &steps));
-                let square = mean_square(&moved, &learning).unwrap_or(f64::INFINITY);
-                better = (square < least * (1.0 - RULES.lag_gain)).then_some((moved, lags, square));
+                let options = FitOptions {
+                    iterations: RULES.lag_iterations,
+                    ..self.judge.options_for(&moved)
+                };
+                let end = fit(&moved, &learning, &options).ok();
+                better = end
+                    .filter(|end| end.mean_square() < least * (1.0 - RULES.lag_gain))
+                    .map(|end| (end, lags));
                 steps.iter_mut().for_each(|step| *step /= 2);
             }
-            let Some((moved, lags, square)) = better else {
+            let Some((end, lags)) = better else {
                 break;
             };
-            (model, settled, least) = (moved, lags, square);
+            (least, model, settled) = (end.mean_square(), end.model, lags);
         }
         if least >= fitted.mean_square() {
             return fitted;

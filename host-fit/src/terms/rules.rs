@@ -121,6 +121,8 @@ rules! {
     worth_moving: f64 = 2e-4, "share of the error energy", "judgement: a twentieth of the price of a parameter";
     /// Rounds of moving all lags of a model …
     lag_rounds: usize = 6, "", "judgement";
+    /// … the steps of a fit after each move …
+    lag_iterations: usize = 1, "iterations", "without one, far from the floor, lags stay where they are: a converter, a ball screw and the flow over a ramp";
     /// … and what a move must gain.
     lag_gain: f64 = 1e-4, "share of the mean square error", "judgement";
     /// Delay laws are compared at this level, where nothing better is known.

@@ -37,6 +37,29 @@ struct Tried {
     memory: Vec<crate::terms::Term>,
 }
 
+/// Who is followed further, of many that come the best first: so many, and the best beside each base, known by
+/// its number of terms. Beside a lean base a few steps say less, as it is further to go.
+struct Heirs {
+    free: usize,
+    bases: Vec<usize>,
+}
+
+impl Heirs {
+    fn of(free: usize) -> Self {
+        Self {
+            free,
+            bases: Vec::new(),
+        }
+    }
+
+    fn takes(&mut self, base: usize) -> bool {
+        let taken = self.free > 0 || !self.bases.contains(&base);
+        self.free = self.free.saturating_sub(1);
+        self.bases.push(base);
+        taken
+    }
+}
+
 /// The search for terms and what it works on.
 pub(super) struct Finder<'a> {
     pub(super) search: &'a Search<'a>,
@@ -83,23 +106,11 @@ impl Finder<'_> {
             |a: &(Term, Hypothesis), b: &(Term, Hypothesis)| size(&a.1).total_cmp(&size(&b.1));
         finished.sort_by(by_size);
         progress(&format!("term {number}: the flow's lags beside it"));
-        let mut leading: Vec<(Term, Hypothesis)> = Vec::new();
-        for one in &finished {
-            // While it blows, the length of this pulse is the time since its edge.
-            let twin = |other: &(Term, Hypothesis)| {
-                let ratio = one.1.judged.rmse() / other.1.judged.rmse();
-                other.0.entry == one.0.entry && ratio - 1.0 < RULES.twins
-            };
-            if leading.len() < RULES.settled && !leading.iter().any(twin) {
-                leading.push(one.clone());
-            }
-        }
-        for (term, hypothesis) in leading {
+        for (term, hypothesis) in self.leading(&finished) {
             let found = self.search.run(hypothesis, || None);
-            let over = self.search.judge.over_noise(found.best.judged.rmse());
             finished.push((term, found.best));
             // At the floor there is nothing to gain from others; what is as good is asked below.
-            if over < crate::diagnose::RULES.floor_margin {
+            if self.at_floor(&finished[finished.len() - 1].1) {
                 break;
             }
         }
@@ -110,6 +121,31 @@ impl Finder<'_> {
             looked_at,
             smallest,
         }
+    }
+
+    /// Whether nothing is left that another term could explain.
+    fn at_floor(&self, hypothesis: &Hypothesis) -> bool {
+        let judge = self.search.judge;
+        judge.over_noise(hypothesis.judged.rmse()) < crate::diagnose::RULES.floor_margin
+    }
+
+    /// Of `finished`, the best first, those beside which the flow's lags are searched again: the best, and the best
+    /// beside each base, the leanest first: a rich base leaves less with any term, and its lags stand in for the right one.
+    fn leading(&self, finished: &[(Term, Hypothesis)]) -> Vec<(Term, Hypothesis)> {
+        let mut leading: Vec<(Term, Hypothesis)> = Vec::new();
+        let mut heirs = Heirs::of(RULES.settled);
+        for one in finished {
+            // While it blows, the length of this pulse is the time since its edge.
+            let twin = |other: &(Term, Hypothesis)| {
+                let ratio = one.1.judged.rmse() / other.1.judged.rmse();
+                other.0.entry == one.0.entry && ratio - 1.0 < RULES.twins
+            };
+            if !leading.iter().any(twin) && heirs.takes(one.1.terms.len()) {
+                leading.push(one.clone());
+            }
+        }
+        leading.sort_by_key(|(_, hypothesis)| (!self.at_floor(hypothesis), hypothesis.terms.len()));
+        leading
     }
 
     /// How large a term would have to be at each place, in the user's units.
@@ -180,7 +216,8 @@ impl Finder<'_> {
         });
         let mut rated: Vec<(f64, Tried)> = rated.collect();
         rated.sort_by(|a, b| a.0.total_cmp(&b.0));
-        rated.truncate(RULES.finished);
+        let mut heirs = Heirs::of(RULES.finished);
+        rated.retain(|(_, tried)| heirs.takes(tried.memory.len()));
         let finished = rated.into_par_iter().filter_map(|(_, tried)| {
             let least = tried.memory.len();
             let finished = self.search.finish(tried.memory, tried.brief, least)?;
@@ -399,4 +436,16 @@ fn errors(term: &Term, fitted: &Fit) -> Vec<f64> {
         known.unwrap_or(f64::INFINITY)
     };
     (0..g.len()).map(error).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_best_are_followed_and_the_best_beside_each_base() {
+        let mut heirs = Heirs::of(2);
+        let taken = [6, 6, 6, 0, 0, 3].map(|base| heirs.takes(base));
+        assert_eq!(taken, [true, true, false, true, false, true]);
+    }
 }

@@ -22,9 +22,9 @@ rules! {
     tried_leaner: usize = 4, "", "judgement";
     /// … no more of them of one place and one kind of coordinate than this …
     of_a_kind: usize = 2, "", "judgement: memories of neighbouring lengths promise alike";
-    /// … and how many of them are followed to the end.
+    /// … and how many of them are followed to the end, beside the best one of each base.
     finished: usize = 4, "", "judgement";
-    /// Of those, for how many the flow's own lags are searched again.
+    /// Of those, for how many the flow's own lags are searched again, beside the best one of each base.
     settled: usize = 2, "", "judgement: each takes as long as `identify`";
     /// Curves at one place whose errors differ by less than this are the same curve.
     twins: f64 = 0.001, "share of the rms error", "two names of one signal differ by rounding";

@@ -81,7 +81,7 @@ impl Session<'_> {
             return None;
         }
         let models: Vec<Model> = std::iter::once(model.clone()).chain(alternatives).collect();
-        let noise = (self.judge().noise_rmse() * self.units.y).max(f64::MIN_POSITIVE);
+        let noise = (self.judge().measured_noise_rmse() * self.units.y).max(f64::MIN_POSITIVE);
         let experiment = separating(&models, noise, &Limits::default(), self.options.seed).ok()?;
         Some(Separation {
             effects,

@@ -84,9 +84,9 @@ impl Rung {
         let measured = judge.noise_source == NoiseSource::Measured;
         Self {
             effects: effects.to_vec(),
-            validate_rmse: held_out.rmse() * units.y,
+            validate_rmse: held_out.measured_rmse() * units.y,
             validate_fit_percent: 100.0 * (1.0 - judge.unexplained_share(held_out).sqrt()),
-            noise_rmse: measured.then(|| judge.noise_rmse() * units.y),
+            noise_rmse: measured.then(|| judge.measured_noise_rmse() * units.y),
             step: step.to_owned(),
             model,
         }
@@ -156,6 +156,9 @@ pub struct Diagnosis {
     pub noise_source: NoiseSource,
     /// The noise floor on what was judged, y rms: measured or estimated.
     pub noise_estimate: f64,
+    /// By how much of itself the level of a record scatters between repeats, where `y_sd` says so: what that explains of an
+    /// error is not held against a model.
+    pub level_scatter: Option<f64>,
     /// The last error on records that nothing was chosen by; none where there are too few to keep
     /// some back.
     pub quoted: Option<Quoted>,

@@ -36,6 +36,12 @@ impl Rival {
         self.judged().map_or(self.promised, Judged::rmse)
     }
 
+    /// As it is measured, scatter of the level and all.
+    fn measured_rmse(&self) -> f64 {
+        let measured = |judged: &Judged| judged.held_out.measured_rmse();
+        self.judged().map_or(self.promised, measured)
+    }
+
     /// Its fits, if it was refitted.
     pub(super) fn judged(&self) -> Option<&Judged> {
         Some(&self.refitted.as_ref()?.judged)
@@ -177,7 +183,7 @@ pub(super) fn ranked(units: &Units, before: f64, rivals: &[Rival], chance: &Chan
             });
             Ranked {
                 effect: rival.name.clone(),
-                validate_rmse: after * units.y,
+                validate_rmse: rival.measured_rmse() * units.y,
                 error_reduction_percent: 100.0 * gain,
                 p_value: p,
                 by_chance_percent: 100.0 * by_chance,

@@ -43,8 +43,10 @@ impl Session<'_> {
     /// The step of the ladder on which `judged` stands.
     pub(super) fn rung(&self, judged: &Judged, effects: &[String], step: &str) -> Rung {
         let (judge, units) = (self.judge(), &self.units);
-        let model = units.model_out(&judge.final_fit(judged).model);
-        Rung::of(judge, units, &judged.held_out, effects, step, Some(model))
+        let end = judge.final_fit(judged);
+        let held_out = judge.handed_over(judged, &end.model);
+        let model = units.model_out(&end.model);
+        Rung::of(judge, units, &held_out, effects, step, Some(model))
     }
 
     /// The given model's own structure, for rigs whose dynamics is the user's choice of
@@ -182,7 +184,8 @@ impl Session<'_> {
             quoted: None,
             restarted_s,
             noise_source: judge.noise_source,
-            noise_estimate: judge.noise_rmse() * units.y,
+            noise_estimate: judge.measured_noise_rmse() * units.y,
+            level_scatter: judge.level_scatter(),
             ladder,
             ranking,
             parameters,

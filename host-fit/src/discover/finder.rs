@@ -37,11 +37,18 @@ struct Tried {
     memory: Vec<crate::terms::Term>,
 }
 
-/// Who is followed further, of many that come the best first: so many, and the best beside each base, known by
-/// its number of terms. Beside a lean base a few steps say less, as it is further to go.
+/// What a base is known by: its number of terms, and its delay law where that is one of the catalogue.
+type Base = (usize, Option<&'static str>);
+
+fn base_of(terms: &[crate::terms::Term], model: &Model) -> Base {
+    (terms.len(), model.delay.effect_name())
+}
+
+/// Who is followed further, of many that come the best first: so many, and the best beside each base.
+/// Beside a lean base a few steps say less, as it is further to go.
 struct Heirs {
     free: usize,
-    bases: Vec<usize>,
+    bases: Vec<Base>,
 }
 
 impl Heirs {
@@ -52,7 +59,7 @@ impl Heirs {
         }
     }
 
-    fn takes(&mut self, base: usize) -> bool {
+    fn takes(&mut self, base: Base) -> bool {
         let taken = self.free > 0 || !self.bases.contains(&base);
         self.free = self.free.saturating_sub(1);
         self.bases.push(base);
@@ -140,7 +147,8 @@ impl Finder<'_> {
                 let ratio = one.1.judged.rmse() / other.1.judged.rmse();
                 other.0.entry == one.0.entry && ratio - 1.0 < RULES.twins
             };
-            if !leading.iter().any(twin) && heirs.takes(one.1.terms.len()) {
+            if !leading.iter().any(twin) && heirs.takes(base_of(&one.1.terms, one.1.judged.model()))
+            {
                 leading.push(one.clone());
             }
         }
@@ -217,7 +225,7 @@ impl Finder<'_> {
         let mut rated: Vec<(f64, Tried)> = rated.collect();
         rated.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut heirs = Heirs::of(RULES.finished);
-        rated.retain(|(_, tried)| heirs.takes(tried.memory.len()));
+        rated.retain(|(_, tried)| heirs.takes(base_of(&tried.memory, &tried.brief.model)));
         let finished = rated.into_par_iter().filter_map(|(_, tried)| {
             let least = tried.memory.len();
             let finished = self.search.finish(tried.memory, tried.brief, least)?;
@@ -445,7 +453,8 @@ mod tests {
     #[test]
     fn the_best_are_followed_and_the_best_beside_each_base() {
         let mut heirs = Heirs::of(2);
-        let taken = [6, 6, 6, 0, 0, 3].map(|base| heirs.takes(base));
+        let taken = [6, 6, 6, 0, 0, 3].map(|terms| heirs.takes((terms, None)));
         assert_eq!(taken, [true, true, false, true, false, true]);
+        assert!(heirs.takes((0, Some("edge-dependent-delay"))));
     }
 }

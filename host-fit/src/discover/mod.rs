@@ -132,20 +132,25 @@ pub fn discover(
     if interrupt.load(Ordering::Relaxed) {
         return Err(DiagnoseError::Interrupted);
     }
-    let mut bases = vec![root.clone()];
     let given = search.second_root(&bench.given, &root);
     let refitted = || Some(Hypothesis::new(judge.refitted(&bench.given).ok()?));
-    bases.extend(given.or_else(refitted));
-    let found = search.run(root, || None);
+    let given = given.or_else(refitted);
+    // The catalogue's delay laws are no news: a base that lacks its own bends in its place.
+    let after_another_law = |base: &Hypothesis| search.after_another_law(base, &options.without);
+    let leanest: Vec<Hypothesis> = [after_another_law(&root), Some(root.clone())]
+        .into_iter()
+        .flatten()
+        .collect();
+    let found = search.run(leanest[0].clone(), || None);
     let half = halfway(&found);
-    bases.push(found.best);
-    let leanest = bases[0].clone();
+    let last = after_another_law(&found.best);
+    let bases = leanest.iter().cloned().chain(given).chain([found.best]);
     let by_size = |a: &Hypothesis, b: &Hypothesis| size(a).total_cmp(&size(b));
-    let base = bases.into_iter().min_by(by_size).unwrap_or(leanest.clone());
+    let base = bases.chain(last).min_by(by_size).unwrap_or(root);
     ladder.push(rung(&base, &[], "the best base without a new term"));
     let mut current = base.clone();
     let mut contexts = vec![current.clone()];
-    let leaner = half.into_iter().chain([leanest]);
+    let leaner = half.into_iter().chain(leanest);
     let missing = |rmse: f64| judge.over_noise(rmse) > crate::terms::RULES.at_the_floor;
     if missing(base.judged.rmse()) {
         contexts.extend(leaner.filter(|leaner| size(leaner) > size(&base)));
@@ -205,7 +210,7 @@ pub fn discover(
         smallest_seen: smallest.unwrap_or_default(),
         held_out_by: judge.held_out_by,
         noise_source: judge.noise_source,
-        noise_estimate: judge.noise_rmse() * units.y,
+        noise_estimate: judge.measured_noise_rmse() * units.y,
         looked_at,
         trace,
         model,

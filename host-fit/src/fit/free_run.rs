@@ -2,6 +2,7 @@
 //! by dual numbers, secants for what acts in steps, and standard errors that allow for
 //! correlated residuals.
 
+use super::level_scatter::LevelScatter;
 use super::levenberg::{FitStop, LeastSquares, Part, minimise};
 use super::rules::RULES;
 use crate::data::Record;
@@ -32,6 +33,8 @@ pub struct FitOptions {
     pub linear: bool,
     /// Whether the delay law moves.
     pub delay: bool,
+    /// How the level of a record scatters, where that is known: errors along y count for less then.
+    pub level_scatter: Option<LevelScatter>,
 }
 
 impl Default for FitOptions {
@@ -42,6 +45,7 @@ impl Default for FitOptions {
             constant: false,
             linear: true,
             delay: true,
+            level_scatter: None,
         }
     }
 }
@@ -51,7 +55,7 @@ impl Default for FitOptions {
 pub struct Fit {
     /// The model with its fitted parameters.
     pub model: Model,
-    /// Σ (y − y_sim)² over the records.
+    /// Σ (y − y_sim)² over the records, errors along y weighed by how the level scatters.
     pub sum_of_squares: f64,
     /// Samples that were judged.
     pub samples: usize,
@@ -163,6 +167,7 @@ struct FreeRunProblem<'a> {
     axes: Vec<Searched>,
     warm_up: usize,
     rounding: Rounding,
+    level_scatter: Option<LevelScatter>,
 }
 
 impl<'a> FreeRunProblem<'a> {
@@ -171,6 +176,7 @@ impl<'a> FreeRunProblem<'a> {
         records: &[&'a Record],
         axes: Vec<Searched>,
         rounding: Rounding,
+        level_scatter: Option<LevelScatter>,
     ) -> Result<Self, SimulateError> {
         let signals: Result<Vec<_>, _> = records.iter().map(|r| Signals::of(model, r)).collect();
         Ok(Self {
@@ -180,6 +186,7 @@ impl<'a> FreeRunProblem<'a> {
             axes,
             warm_up: model.warm_up(),
             rounding,
+            level_scatter,
         })
     }
 
@@ -235,7 +242,7 @@ impl<'a> FreeRunProblem<'a> {
                 measured[k] - sim
             }
         };
-        let residual: Vec<f64> = simulated.iter().enumerate().map(residual).collect();
+        let mut residual: Vec<f64> = simulated.iter().enumerate().map(residual).collect();
         for (axis, column) in self.axes.iter().zip(&mut jacobian) {
             let Some(half) = axis.secant else { continue };
             let at = |shift: f64| {
@@ -257,6 +264,13 @@ impl<'a> FreeRunProblem<'a> {
                     }
                 })
                 .collect();
+        }
+        if let Some(scatter) = &self.level_scatter {
+            let y = measured.get(self.warm_up..).unwrap_or(&[]);
+            for series in jacobian.iter_mut().chain([&mut residual]) {
+                let judged = series.get_mut(self.warm_up..).unwrap_or(&mut []);
+                scatter.shrink(judged, y, 1);
+            }
         }
         Some(Part { residual, jacobian })
     }
@@ -305,11 +319,20 @@ impl LeastSquares for FreeRunProblem<'_> {
         let simulator = Simulator::with_values(self.model, values, self.rounding);
         let each = |record: usize| {
             let measured = self.measured[record];
-            let mut sum = 0.0;
+            let (mut sum, mut product, mut square) = (0.0, 0.0, 0.0);
+            // What lies along y is known at the end only.
+            let enough = match self.level_scatter {
+                Some(_) => f64::MAX,
+                None => enough,
+            };
             let left = simulator.run(&self.signals[record], |k, output: &Output<f64>| {
                 if k >= self.warm_up {
                     let error = measured[k] - output.measured;
                     sum += error * error;
+                    if self.level_scatter.is_some() {
+                        product += error * measured[k];
+                        square += measured[k] * measured[k];
+                    }
                 }
                 // NaN breaks off too.
                 if sum <= enough {
@@ -318,10 +341,10 @@ impl LeastSquares for FreeRunProblem<'_> {
                     ControlFlow::Break(())
                 }
             });
-            if left.is_some() || sum.is_nan() {
-                f64::INFINITY
-            } else {
-                sum
+            match &self.level_scatter {
+                _ if left.is_some() || sum.is_nan() => f64::INFINITY,
+                Some(scatter) => scatter.sum_of_squares(sum, product, square),
+                None => sum,
             }
         };
         let sums: Vec<f64> = (0..self.signals.len()).into_par_iter().map(each).collect();
@@ -440,7 +463,7 @@ fn descend(
             ..Searched::of(index, coordinate)
         })
         .collect();
-    let mut problem = FreeRunProblem::new(model, records, axes, rounding)?;
+    let mut problem = FreeRunProblem::new(model, records, axes, rounding, options.level_scatter)?;
     let samples = problem.samples();
     let values = model.values();
     let cost = problem.cost(&values, f64::INFINITY);

@@ -51,6 +51,17 @@ rules! {
     /// The percentile of y/u under a strong input that is taken for that level.
     settled_percentile: usize = 95, "%", "judgement: what is above is noise";
 
+    /// Scatter of the level between repeats is looked for in so many records …
+    records_of_scatter: usize = 3, "records", "judgement: from fewer nobody can say whether it differs between them";
+    /// … it counts where it is this share of the noise …
+    share_of_scatter: f64 = 0.05, "share of the variance", "judgement: below it, it matters nowhere";
+    /// … and differs so much from record to record: noise that is louder at a high level does not.
+    scatter_differs: f64 = 0.12, "share of its mean", "20 repeats: 0.3; 10 000 samples of noise with 40 ms: 0.03";
+    /// Noise beside it is at least this share of the variance.
+    noise_beside_scatter: f64 = 0.1, "share of the variance", "judgement: a standard error of 20 repeats is off by a sixth";
+    /// That noise is correlated over so many samples.
+    correlated: f64 = 40.0, "samples", "a hot film's at 1 kHz; four times as many double what is left along y";
+
     /// A lean model with effects is kept when its error is within this factor of the given structure's.
     as_good: f64 = 1.02, "times the rms error", "judgement";
 

@@ -26,6 +26,13 @@ pub(super) fn words(diagnosis: &Diagnosis) -> (String, String) {
             significant(seconds, 3)
         ));
     }
+    if let Some(scatter) = diagnosis.level_scatter {
+        meaning.push_str(&format!(
+            " The level scatters between repeats (`y_sd` grows with y), by {} % from record to record: as much of an error along y is not held \
+             against a model.",
+            significant(100.0 * scatter, 2)
+        ));
+    }
     meaning.push_str(bench_check(&diagnosis.sets));
     let told = diagnosis.sets.iter().flatten().any(|name| name == FLOW_LAG);
     if let Some(second) = second_lag_s(&diagnosis.model).filter(|_| !told) {

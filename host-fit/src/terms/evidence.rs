@@ -15,6 +15,8 @@ pub(crate) struct HeldOut {
     /// Σ e² and the number of samples.
     pub(crate) sum_of_squares: f64,
     pub(crate) samples: usize,
+    /// Σ e² before anything was taken for scatter of the level.
+    pub(crate) measured: f64,
     /// Samples of a block that counts as independent of the next.
     block: usize,
 }
@@ -28,7 +30,18 @@ impl HeldOut {
             errors,
             sum_of_squares,
             samples,
+            measured: sum_of_squares,
         }
+    }
+
+    /// The same with what was taken from the errors for scatter of the level: `measured` is Σ e² before that.
+    pub(crate) fn beside_scatter(self, measured: f64) -> Self {
+        Self { measured, ..self }
+    }
+
+    /// Root mean square of y − y_sim as it is measured, scatter of the level and all.
+    pub(crate) fn measured_rmse(&self) -> f64 {
+        (self.measured / self.samples.max(1) as f64).sqrt()
     }
 
     /// Samples that say as much as one would.

@@ -21,6 +21,14 @@ pub(crate) struct Judging {
     pub(crate) from: usize,
 }
 
+impl Judging {
+    /// y of the last so many samples: those that an error is left on.
+    pub(crate) fn last(&self, samples: usize) -> &[f64] {
+        let y = &self.record.y;
+        &y[y.len().saturating_sub(samples)..]
+    }
+}
+
 impl Fold {
     /// The same split with free runs that start anew every `samples`.
     pub(crate) fn restarted(&self, samples: usize) -> Self {

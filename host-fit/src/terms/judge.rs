@@ -5,7 +5,8 @@ use super::RULES;
 use super::evidence::{HeldOut, p_above_noise};
 use super::folds::{Fold, HeldOutBy, Judging, folds};
 use crate::data::{Record, Use};
-use crate::fit::{Fit, FitOptions, fit, pieces};
+use crate::fit::{Fit, FitOptions, LevelScatter, fit, pieces};
+use crate::linalg::dot;
 use crate::model::Model;
 use crate::residual::{NoiseSource, noise_floor};
 use crate::simulate::SimulateError;
@@ -48,12 +49,20 @@ pub struct Judge {
     identify: Vec<Record>,
     /// Whether the command is on/off.
     pub on_off: bool,
-    /// σ² of the noise per judged sample.
+    /// σ² of the noise per judged sample, what the level scatters by not counted …
     floor: Vec<Vec<f64>>,
+    /// … and the root mean square of all of it, y.
+    measured_noise: f64,
     /// Where the noise floor comes from.
     pub noise_source: NoiseSource,
     /// How models are fitted.
     pub options: FitOptions,
+}
+
+fn root_mean(variances: &[Vec<f64>]) -> f64 {
+    let all = variances.iter().flatten();
+    let (sum, count) = all.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+    f64::sqrt(sum / f64::max(count, 1.0))
 }
 
 impl Judge {
@@ -86,7 +95,19 @@ impl Judge {
         for (variance, judging) in floor.iter_mut().zip(judging()) {
             variance.drain(..judging.from.min(variance.len()));
         }
+        let measured_noise = root_mean(&floor);
+        let level_scatter = match restarted {
+            None => LevelScatter::of(records),
+            Some(_) => None,
+        };
+        if let Some(scatter) = &level_scatter {
+            for (variance, judging) in floor.iter_mut().zip(judging()) {
+                let y = judging.last(variance.len());
+                scatter.take_from(variance, y);
+            }
+        }
         Some(Self {
+            measured_noise,
             identify,
             on_off: records.iter().all(Record::is_on_off),
             folds,
@@ -94,16 +115,29 @@ impl Judge {
             held_out_by,
             floor,
             noise_source,
-            options,
+            options: FitOptions {
+                level_scatter,
+                ..options
+            },
         })
     }
 
-    /// Root mean square of the noise on what is judged, y: measured or estimated.
+    /// Root mean square of the noise on what is judged, y: measured or estimated, without what the level scatters by.
     #[must_use]
     pub fn noise_rmse(&self) -> f64 {
-        let all = self.floor.iter().flatten();
-        let (sum, count) = all.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
-        f64::sqrt(sum / f64::max(count, 1.0))
+        root_mean(&self.floor)
+    }
+
+    /// The same with it: what stands beside an error as it is measured.
+    #[must_use]
+    pub fn measured_noise_rmse(&self) -> f64 {
+        self.measured_noise
+    }
+
+    /// By how much of itself the level of a record scatters between repeats; none where nothing says so.
+    #[must_use]
+    pub fn level_scatter(&self) -> Option<f64> {
+        Some(self.options.level_scatter?.deviation)
     }
 
     /// The error over the noise floor; 1 is all that can be reached. Where slow noise
@@ -171,10 +205,11 @@ impl Judge {
         &self,
         models: impl Fn(usize) -> &'m Model + Sync,
     ) -> Result<HeldOut, SimulateError> {
-        Self::held_out_of(&self.folds, models)
+        self.held_out_of(&self.folds, models)
     }
 
     fn held_out_of<'m>(
+        &self,
         folds: &[Fold],
         models: impl Fn(usize) -> &'m Model + Sync,
     ) -> Result<HeldOut, SimulateError> {
@@ -187,7 +222,16 @@ impl Judge {
             .par_iter()
             .map(|(fold, judging)| Self::error(models(*fold), &judging.record, judging.from));
         let errors: Vec<Result<Vec<f64>, SimulateError>> = each.collect();
-        Ok(HeldOut::new(errors.into_iter().collect::<Result<_, _>>()?))
+        let mut errors: Vec<Vec<f64>> = errors.into_iter().collect::<Result<_, _>>()?;
+        let Some(scatter) = &self.options.level_scatter else {
+            return Ok(HeldOut::new(errors));
+        };
+        let measured = errors.iter().map(|e| dot(e, e)).sum();
+        for (error, (_, judging)) in errors.iter_mut().zip(&judged) {
+            let y = judging.last(error.len());
+            scatter.shrink(error, y, 1);
+        }
+        Ok(HeldOut::new(errors).beside_scatter(measured))
     }
 
     /// The first fold's fit judged, with the other folds' from there.
@@ -206,7 +250,7 @@ impl Judge {
         }
         let held_out = self.held_out(|fold| &fits[fold].model)?;
         let drifted = match &self.whole {
-            Some(whole) => Self::held_out_of(whole, |fold| &fits[fold].model)?.rmse(),
+            Some(whole) => self.held_out_of(whole, |fold| &fits[fold].model)?.rmse(),
             None => held_out.rmse(),
         };
         Ok(Judged {
@@ -229,11 +273,24 @@ impl Judge {
     #[must_use]
     pub fn final_fit(&self, judged: &Judged) -> Fit {
         let own = judged.fits[0].clone();
-        if self.held_out_by == HeldOutBy::Records {
+        if self.held_out_by == HeldOutBy::Records && self.options.level_scatter.is_none() {
             return own;
         }
         let all: Vec<&Record> = self.identify.iter().collect();
-        fit(&own.model, &all, &self.options_for(&own.model)).unwrap_or(own)
+        // What is handed over is off by as little as can be, wherever that comes from.
+        let options = FitOptions {
+            level_scatter: None,
+            ..self.options_for(&own.model)
+        };
+        fit(&own.model, &all, &options).unwrap_or(own)
+    }
+
+    /// The held-out error of the model that is handed over for `judged`, where that can be told.
+    pub(crate) fn handed_over(&self, judged: &Judged, end: &Model) -> HeldOut {
+        let fitted_anew =
+            self.held_out_by == HeldOutBy::Records && self.options.level_scatter.is_some();
+        let anew = fitted_anew.then(|| self.held_out(|_| end).ok()).flatten();
+        anew.unwrap_or_else(|| judged.held_out.clone())
     }
 
     /// Σ e² over Σ (y − ȳ)² on what is judged.
@@ -250,7 +307,7 @@ impl Judge {
         }
         let spread = squares - sum * sum / f64::max(n, 1.0);
         if spread > 0.0 {
-            held_out.sum_of_squares / spread
+            held_out.measured / spread
         } else {
             1.0
         }

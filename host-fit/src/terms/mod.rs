@@ -16,6 +16,7 @@ mod folds;
 mod follow;
 mod grid;
 mod judge;
+mod laws;
 mod proposal;
 mod rest;
 mod rules;

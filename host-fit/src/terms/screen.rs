@@ -175,11 +175,23 @@ impl<'a> Screen<'a> {
     /// The same of the records from one on.
     fn joined_from<'s>(&self, first: usize, series: impl Iterator<Item = &'s [f64]>) -> Vec<f64> {
         let mut all = Vec::new();
-        for (series, from) in series.zip(&self.from[first..]) {
-            let judged = series.get(*from..).unwrap_or(&[]).chunks_exact(self.stride);
-            all.extend(judged.map(|chunk| chunk.iter().sum::<f64>() / self.stride as f64));
+        for (index, series) in (first..).zip(series) {
+            let begin = all.len();
+            self.join(index, series, &mut all);
+            if let Some(scatter) = &self.judge.options.level_scatter {
+                let mut y = Vec::new();
+                self.join(index, &self.records[index].y, &mut y);
+                scatter.shrink(&mut all[begin..], &y, self.stride);
+            }
         }
         all
+    }
+
+    /// Joins judged samples of one record, averaged over neighbours.
+    fn join(&self, record: usize, series: &[f64], all: &mut Vec<f64>) {
+        let judged = series.get(self.from[record]..).unwrap_or(&[]);
+        let means = judged.chunks_exact(self.stride);
+        all.extend(means.map(|chunk| chunk.iter().sum::<f64>() / self.stride as f64));
     }
 
     /// What moving each fixed delay by a sample does: they have no derivative.

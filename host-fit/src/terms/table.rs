@@ -228,8 +228,8 @@ impl Screen<'_> {
         }
         let has_zero = self.model.has_effect(ZERO_OFFSET.name);
         if !has_zero && !self.judge.options.constant {
-            let mut column = self.joined(self.runs.iter().map(Vec::as_slice));
-            column.iter_mut().for_each(|x| *x = 1.0);
+            let ones: Vec<Vec<f64>> = self.runs.iter().map(|run| vec![1.0; run.len()]).collect();
+            let mut column = self.joined(ones.iter().map(Vec::as_slice));
             self.residualise(&mut column);
             all.push((Term::Offset, vec![columns.len()]));
             columns.push(column);

@@ -35,6 +35,9 @@ struct Arguments {
     /// Rigs for each effect of the size at which the diagnosis says that it would be seen.
     #[arg(long, default_value_t = 0)]
     power: u64,
+    /// Puts in so many times the size at which the diagnosis says that it would be seen.
+    #[arg(long, default_value_t = 1.0)]
+    power_times: f64,
     /// Prints what the rows say of error rates, coverage and power in place of the tables of what was found.
     #[arg(long)]
     calibration: bool,
@@ -77,6 +80,7 @@ fn campaign(arguments: &Arguments) -> anyhow::Result<()> {
         outside: arguments.outside,
         units: arguments.units,
         power: arguments.power,
+        power_times: arguments.power_times,
     };
     let wanted: Vec<Case> = cases(&sizes, arguments.given, arguments.ledger.seed)
         .into_iter()

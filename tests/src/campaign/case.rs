@@ -113,6 +113,8 @@ pub struct Case {
     pub noise: NoiseKind,
     /// What is no effect.
     pub nuisances: Vec<Nuisance>,
+    /// So many times what is said to be seen is put in, where that is asked.
+    pub times: f64,
     /// In which units the rig is written down.
     pub units: Units,
     /// The model that is handed in.
@@ -131,6 +133,7 @@ impl Case {
             hidden: hidden.iter().map(|name| (*name).to_owned()).collect(),
             noise: NoiseKind::Coloured,
             nuisances: Vec::new(),
+            times: 1.0,
             units: Units::OWN,
             given: Given::Default,
             seed,
@@ -179,6 +182,9 @@ impl fmt::Display for Case {
         if !nuisances.is_empty() {
             write!(f, "{}/", nuisances.join("+"))?;
         }
+        if self.times != 1.0 {
+            write!(f, "x{}/", self.times)?;
+        }
         if self.units != Units::OWN {
             write!(f, "t*{},y*{}/", self.units.time, self.units.y)?;
         }
@@ -201,8 +207,10 @@ pub struct Sizes {
     pub outside: u64,
     /// Rigs that are written down in five units each.
     pub units: u64,
-    /// Rigs for each effect of the size at which it is said to be seen; the families take turns.
+    /// Rigs for each effect of the size at which it is said to be seen; the families take turns …
     pub power: u64,
+    /// … or of so many times that size.
+    pub power_times: f64,
 }
 
 /// The units of twins: seconds and y times these.
@@ -320,6 +328,7 @@ pub fn cases(sizes: &Sizes, given: Given, seed: u64) -> Vec<Case> {
             let seed = next(Group::Power);
             all.push(Case {
                 given,
+                times: sizes.power_times,
                 ..Case::new(Group::Power, turn(round, index), &[name], seed)
             });
         }
@@ -386,6 +395,7 @@ mod tests {
             outside: 1,
             units: 3,
             power: 0,
+            power_times: 1.0,
         };
         let all = cases(&sizes, Given::Default, 5000);
         assert_eq!(all.len(), 21 + 5 * 19 + 12 + 60 + 6 + 3 + 15);

@@ -167,7 +167,7 @@ fn just_seen(
     let said = document["detectable"].as_array().into_iter().flatten();
     let own = said.clone().find(|entry| entry["effect"] == name.as_str());
     let own = own.ok_or("nothing is said of how much of it would be seen")?;
-    let amplitude = own["amplitude"].as_f64();
+    let amplitude = own["amplitude"].as_f64().map(|said| case.times * said);
     let put_in = PutIn {
         effect: name.clone(),
         amplitude,
@@ -178,8 +178,13 @@ fn just_seen(
     let mut rng = ChaCha8Rng::seed_from_u64(case.seed);
     let mut effect = Effect::draw(name, &plan.plant.base, &mut rng).map_err(|e| e.to_string())?;
     let values = own["parameters"].as_array().into_iter().flatten();
+    let card = model_core::effects::spec(name).and_then(|spec| spec.amplitude);
+    let card = card.ok_or("the effect has no amplitude")?;
     for (parameter, value) in effect.parameters().iter().zip(values) {
-        let value = value.as_f64().ok_or("a parameter is no number")?;
+        let mut value = value.as_f64().ok_or("a parameter is no number")?;
+        if card.together || parameter.name == card.parameter {
+            value *= case.times;
+        }
         effect = effect
             .with(parameter.name, value)
             .map_err(|e| e.to_string())?;

@@ -1,0 +1,43 @@
+//! Delay laws of the catalogue, where they belong to the base.
+
+use super::RULES;
+use super::search::{Hypothesis, Search};
+use crate::fit::rows;
+use crate::model::Model;
+use model_core::effect::Place;
+use rayon::prelude::*;
+
+impl Search<'_> {
+    /// The same structure after the delay law of the catalogue that does best with it, one of `forgotten` not among
+    /// them; `None` where the law that it has does as well.
+    #[must_use]
+    pub fn after_another_law(
+        &self,
+        hypothesis: &Hypothesis,
+        forgotten: &[String],
+    ) -> Option<Hypothesis> {
+        let model = hypothesis.judged.model();
+        let facts = self.known.facts(model, 1.0, 1.0);
+        let mut starts = Vec::new();
+        for spec in model.candidates().filter(|spec| spec.place == Place::Delay) {
+            if !forgotten.iter().any(|name| name == spec.name) {
+                let rows = rows(spec, &facts).unwrap_or_default();
+                starts.extend(rows.into_iter().map(|row| (spec, row)));
+            }
+        }
+        let tried = starts.into_par_iter().filter_map(|(spec, parameters)| {
+            let mut with = model.clone();
+            with.add(spec, &parameters, None);
+            self.judge.refitted(&with).ok()
+        });
+        let tried: Vec<_> = tried.collect();
+        let best = (tried.into_iter()).min_by(|a, b| a.rmse().total_cmp(&b.rmse()))?;
+        let parameters = |model: &Model| model.coordinates().len() as f64;
+        let price = RULES.price * (parameters(best.model()) - parameters(model));
+        let pays = best.rmse().ln() + price < hypothesis.judged.rmse().ln();
+        pays.then(|| Hypothesis {
+            terms: hypothesis.terms.clone(),
+            ..Hypothesis::new(best)
+        })
+    }
+}

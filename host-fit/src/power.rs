@@ -32,6 +32,8 @@ rules! {
     terms: usize = 6, "", "what `identify` takes of a flow with two memories";
     /// … each for the price of so many parameters.
     term_cost: f64 = 2.0, "parameters", "a lag and its weight";
+    /// What passes to first order has to be so many times as large: a search that lets all lags move imitates more.
+    margin: f64 = 2.0, "times the amplitude", "`cargo xtask calibrate`: named were 13 of 37 without it, and with it 14 of 19";
     /// An effect that is not linear in its amplitude is probed this often, ever nearer to the amplitude that comes out.
     probes: usize = 4, "", "judgement";
 }
@@ -210,7 +212,7 @@ impl Detector<'_> {
         let shown = self
             .screen
             .shown(&self.unnamed, &model, self.block, RULES.terms)?;
-        let x = size * self.asked.multiple(&shown);
+        let x = RULES.margin * size * self.asked.multiple(&shown);
         x.is_finite().then_some(x)
     }
 }
@@ -264,11 +266,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_to_be_seen_is_named_and_a_third_of_it_is_not() {
+    fn what_is_said_to_be_seen_is_named_and_a_sixth_of_it_is_not() {
         let records = records(&[], &[], 2);
         let model = base(&records);
         let effect = "hot-film-lag";
-        assert_eq!(named(&model, &records, effect, 1.5), [effect]);
-        assert!(named(&model, &records, effect, 0.33).is_empty());
+        assert_eq!(named(&model, &records, effect, 0.75), [effect]);
+        assert!(named(&model, &records, effect, 0.16).is_empty());
     }
 }

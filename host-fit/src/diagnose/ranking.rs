@@ -93,15 +93,22 @@ fn refitted(
     screen: &Screen<'_>,
     table: &Table,
 ) -> Vec<Rival> {
+    let of = |name: &str| {
+        let is = |candidate: &&Candidate| candidate.term.effect().is_some_and(|s| s.name == name);
+        table.candidates.iter().find(is)
+    };
+    let found: Vec<&Candidate> = named.iter().filter_map(|name| of(name)).collect();
     rated(
         screen,
         table,
         context.judged.rmse(),
         |place, name, candidate| {
-            // What the flow may be without a name promises little to first order, and often does as well.
+            // What the flow may be without a name promises little to first order, and often does as well; and so does
+            // what acts like a named effect at another place of its grid.
             let wanted = place < RULES.ranked_in_full
                 || [FLOW_MEMORY, FLOW_LAG].contains(&name)
-                || named.contains(&name);
+                || named.contains(&name)
+                || (found.iter()).any(|own| table.are_alike(screen, own, candidate));
             if !wanted || named.is_empty() {
                 return None;
             }

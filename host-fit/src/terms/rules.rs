@@ -103,6 +103,8 @@ rules! {
     some: f64 = 0.1, "times its size in the grid", "judgement";
     /// Points of a curve that are hardly ever met stay where they are: the ridge that holds them there.
     ridge: f64 = 1e-4, "share of the mean square of the points", "judgement";
+    /// Candidates whose changes of the free run correlate so well may do for each other.
+    alike: f64 = 0.85, "", "theory 4.3: above it no fit of the paper's structure tells effects apart";
     /// Grid points of an effect that are kept for sets …
     kept_points: usize = 2, "", "judgement: for the time it takes";
     /// … of a kind of lag …

@@ -83,6 +83,13 @@ impl Table {
         }
     }
 
+    /// Whether two candidates change the free run so alike that refits may not tell them apart.
+    pub(crate) fn are_alike(&self, screen: &Screen, one: &Candidate, other: &Candidate) -> bool {
+        let directions = one.columns.iter().map(|i| &self.columns[*i]);
+        let likeness = directions.map(|direction| self.likeness(screen, other, direction));
+        likeness.fold(0.0, f64::max) > RULES.alike
+    }
+
     /// Correlation of what a candidate changes with a direction, where it is learned.
     pub(crate) fn likeness(
         &self,

@@ -246,6 +246,9 @@ impl<T: Real> Simulator<T> {
     }
 }
 
+/// After so many time constants a wake that nobody saw begin is forgotten: a twentieth of what was not known is left.
+const WAKE_FADES: f64 = 3.0;
+
 impl Model {
     /// How many samples at a record's start follow the measurement and are not
     /// judged: none unless the model starts from measurements.
@@ -257,7 +260,7 @@ impl Model {
                 // Nobody knows the wake of a flow that was blown before: it has to fade.
                 let wake = self.effects.iter().find(|e| e.name == SLOW_WAKE.name);
                 let fades_s = wake.and_then(|e| e.parameters.first()).unwrap_or(&0.0);
-                let fades = (fades_s / self.sample_period_s).ceil() as usize;
+                let fades = (WAKE_FADES * fades_s / self.sample_period_s).ceil() as usize;
                 self.longest_lag().max(self.longest_delay()).max(fades) + 1
             }
         }

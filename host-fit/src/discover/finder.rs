@@ -9,6 +9,7 @@ use super::{Options, RULES};
 use crate::fit::{Fit, FitOptions, fit};
 use crate::model::Model;
 use crate::terms::{HeldOut, Hypothesis, Judged, Screen, Search, Table, Units, p_value};
+use model_core::recursion::Grading;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
@@ -200,8 +201,21 @@ impl Finder<'_> {
     /// A curve beside a model, followed for a few steps.
     fn brief_of(&self, beside: &Hypothesis, curve: Screened) -> Option<Tried> {
         let model = beside.judged.model();
+        // On/off commands do not show how the flow takes jets of part strength, which a term at the jet makes of them.
+        let unknown = curve.term.entry == Entry::Jet && self.search.judge.on_off;
+        let responses = Grading::ALL
+            .into_par_iter()
+            .filter(|grading| unknown || *grading == model.grading);
+        let fits = responses.filter_map(|grading| {
+            let model = Model {
+                grading,
+                ..model.clone()
+            };
+            self.fitted(&model, &curve.term, crate::terms::RULES.brief)
+        });
+        let by_error = |a: &Fit, b: &Fit| a.mean_square().total_cmp(&b.mean_square());
         Some(Tried {
-            brief: self.fitted(model, &curve.term, crate::terms::RULES.brief)?,
+            brief: fits.min_by(by_error)?,
             term: curve.term,
             memory: beside.terms.clone(),
         })

@@ -74,9 +74,15 @@ pub fn calibration(seed: u64, rows: &[Row]) -> String {
         share(&seen, Row::is_found),
         "70–90 %",
     );
+    // Delays of the edges, or a drift, are there to be found; a delay that depends on the state is in the base.
+    let in_the_base = |row: &&&Row| {
+        let mut others = row.also_right.iter();
+        others.all(|name| name == "state-dependent-delay")
+    };
+    let bare: Vec<&Row> = nothing.iter().filter(in_the_base).copied().collect();
     line(
         "p ≤ 0.05 of the whole search where nothing is missing",
-        share(&nothing, |row| row.p_value.is_some_and(|p| p <= 0.05)),
+        share(&bare, |row| row.p_value.is_some_and(|p| p <= 0.05)),
         "3–7 %",
     );
     let mut kinds: BTreeMap<&str, Vec<&Found>> = BTreeMap::new();

@@ -23,7 +23,8 @@ pub(super) fn bounded(hits: usize, all: usize) -> String {
     let share = k / n;
     let middle = (k + Z * Z / 2.0) / (n + Z * Z);
     let half = Z * n.sqrt() / (n + Z * Z) * (share * (1.0 - share) + Z * Z / (4.0 * n)).sqrt();
-    let [share, low, high] = [share, middle - half, middle + half].map(|x| 100.0 * x);
+    let low = (middle - half).max(0.0);
+    let [share, low, high] = [share, low, middle + half].map(|x| 100.0 * x);
     format!("{hits} of {all} ({share:.1} %, {low:.1}–{high:.1} %)")
 }
 
@@ -36,5 +37,6 @@ mod tests {
     fn shares_have_wilsons_bounds() {
         assert_eq!(bounded(95, 100), "95 of 100 (95.0 %, 88.8–97.8 %)");
         assert_eq!(bounded(0, 100), "0 of 100 (0.0 %, 0.0–3.7 %)");
+        assert_eq!(bounded(0, 71), "0 of 71 (0.0 %, 0.0–5.1 %)");
     }
 }

@@ -298,6 +298,9 @@ impl Finder<'_> {
             })
             .collect();
         alike.dedup();
+        // One coordinate may enter a place in two ways: for who reads it, that is the same finding.
+        let words = coordinate_words(term.entry, &term);
+        alike.retain(|other| other.place != term.entry.place() || other.coordinate != words);
         let term = term.in_model(with.judged.model());
         let errors = errors(&term, &with.judged.fits[0]);
         let direction = context.direction(&term);

@@ -8,7 +8,7 @@ use super::term::{Shape, Term};
 use super::{Options, RULES};
 use crate::fit::{Fit, FitOptions, fit};
 use crate::model::Model;
-use crate::terms::{HeldOut, Hypothesis, Judged, Screen, Search, Table, Units, p_value};
+use crate::terms::{self, HeldOut, Hypothesis, Judged, Screen, Search, Table, Units, p_value};
 use model_core::recursion::Grading;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -23,11 +23,7 @@ pub(super) struct Round {
 
 /// ln of the held-out error, and the price of the model's parameters.
 pub(super) fn size(hypothesis: &Hypothesis) -> f64 {
-    sized(hypothesis.judged.rmse(), hypothesis.judged.model())
-}
-
-fn sized(rmse: f64, model: &Model) -> f64 {
-    rmse.ln() + crate::terms::RULES.price * model.coordinates().len() as f64
+    hypothesis.judged.size()
 }
 
 /// A term beside a base, followed for a few steps.
@@ -234,7 +230,7 @@ impl Finder<'_> {
         let judge = self.search.judge;
         let rated = tried.into_par_iter().filter_map(|tried| {
             let rmse = judge.held_out(|_| &tried.brief.model).ok()?.rmse();
-            Some((sized(rmse, &tried.brief.model), tried))
+            Some((terms::size(rmse, &tried.brief.model), tried))
         });
         let mut rated: Vec<(f64, Tried)> = rated.collect();
         rated.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -404,7 +400,7 @@ impl Finder<'_> {
                 .coordinate
                 .fading()
                 .and_then(|t| refitted(formula(Some(t))));
-            let least = |judged: &Judged| sized(judged.rmse(), judged.model());
+            let least = |judged: &Judged| terms::size(judged.rmse(), judged.model());
             match (plain, faded) {
                 (Some(a), Some(b)) if least(&b.1) < least(&a.1) => Some(b),
                 (Some(a), _) => Some(a),
@@ -418,7 +414,7 @@ impl Finder<'_> {
                 || p_value(&judged.held_out, &with_curve.held_out) >= RULES.level
         });
         fits.into_iter().min_by(|a, b| {
-            sized(a.1.rmse(), a.1.model()).total_cmp(&sized(b.1.rmse(), b.1.model()))
+            terms::size(a.1.rmse(), a.1.model()).total_cmp(&terms::size(b.1.rmse(), b.1.model()))
         })
     }
 }

@@ -75,7 +75,7 @@ pub fn base_model(
             Err(error) => refused = Some(error),
         }
     }
-    let by_score = |a: &&Hypothesis, b: &&Hypothesis| score(&a.judged).total_cmp(&score(&b.judged));
+    let by_score = |a: &&Hypothesis, b: &&Hypothesis| a.judged.size().total_cmp(&b.judged.size());
     let Some(root) = roots.iter().min_by(by_score) else {
         return refused.map(Err);
     };
@@ -97,7 +97,7 @@ pub fn base_model(
         let Ok(judged) = judge.refitted(&model) else {
             continue;
         };
-        if score(&judged) < score(&found.best.judged) {
+        if judged.size() < found.best.judged.size() {
             let start = Hypothesis {
                 terms: found.best.terms.clone(),
                 ..Hypothesis::new(judged)
@@ -125,11 +125,6 @@ fn saturating(model: &Model) -> Delay {
     let rise = if rise.abs() < 1.0 { LEAST_RISE } else { rise };
     let parameters = [at(0.0) - rise, rise, LEVEL, 0.0];
     Delay::of::<SaturatingDelay<f64>>(&parameters, model.delay.factors(), true)
-}
-
-/// ln of the held-out error, and the price of all parameters: models with several laws are compared so.
-fn score(judged: &Judged) -> f64 {
-    judged.rmse().ln() + RULES.price * judged.model().coordinates().len() as f64
 }
 
 /// The model with its delays rounded to samples, as eq. (4) has them, if the held-out

@@ -36,6 +36,16 @@ impl Judged {
     pub fn rmse(&self) -> f64 {
         self.held_out.rmse()
     }
+
+    /// ln of that, and the price of all parameters: models of different laws are compared so.
+    pub(crate) fn size(&self) -> f64 {
+        size(self.rmse(), self.model())
+    }
+}
+
+/// ln of an error, and the price of all parameters of the model that leaves it.
+pub(crate) fn size(rmse: f64, model: &Model) -> f64 {
+    rmse.ln() + RULES.price * model.coordinates().len() as f64
 }
 
 /// What is learned from, what is judged on, and the noise there.

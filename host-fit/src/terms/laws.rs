@@ -1,9 +1,7 @@
 //! Delay laws of the catalogue, where they belong to the base.
 
-use super::RULES;
 use super::search::{Hypothesis, Search};
 use crate::fit::rows;
-use crate::model::Model;
 use model_core::effect::Place;
 use rayon::prelude::*;
 
@@ -32,9 +30,7 @@ impl Search<'_> {
         });
         let tried: Vec<_> = tried.collect();
         let best = (tried.into_iter()).min_by(|a, b| a.rmse().total_cmp(&b.rmse()))?;
-        let parameters = |model: &Model| model.coordinates().len() as f64;
-        let price = RULES.price * (parameters(best.model()) - parameters(model));
-        let pays = best.rmse().ln() + price < hypothesis.judged.rmse().ln();
+        let pays = best.size() < hypothesis.judged.size();
         pays.then(|| Hypothesis {
             terms: hypothesis.terms.clone(),
             ..Hypothesis::new(best)

@@ -34,6 +34,7 @@ pub use chance::Chance;
 pub(crate) use chance::Noise;
 pub(crate) use evidence::{HeldOut, p_value};
 pub use folds::HeldOutBy;
+pub(crate) use judge::size;
 pub use judge::{Judge, Judged};
 pub use proposal::Proposal;
 pub use rest::MovingZero;

@@ -1,7 +1,7 @@
 //! From an expression in Rust syntax to a [`Program`](super::program::Program):
 //! a small safe subset is allowed, the rest is refused with its column.
 
-use super::program::{Binary, Builder, Op, Register, Unary};
+use super::program::{Binary, Builder, Line, Lines, Op, Register, Unary};
 use proc_macro2::{Delimiter, Span, TokenStream, TokenTree};
 use std::str::FromStr;
 use syn::parse::Parser;
@@ -343,13 +343,14 @@ impl Compiler {
             return Err(Fault::at(span, TABLE));
         }
         let mut value = points[1];
+        let mut lines = Vec::new();
         for (i, pair) in points.windows(4).step_by(2).enumerate() {
             let (from, to) = (self.builder.number(pair[0]), self.builder.number(pair[2]));
             // Single precision, in which the board calculates, must tell them apart.
             let width = from
                 .zip(to)
                 .map(|(from, to)| (to - from, to as f32 > from as f32));
-            let Some((width, true)) = width else {
+            let (Some((width, true)), Some(to)) = (width, to) else {
                 let place = arguments.get(2 * i + 3).map_or(span, |x| x.span());
                 let problem = "the places of a table are numbers, each above the one before";
                 return Err(Fault::at(place, problem));
@@ -364,7 +365,19 @@ impl Compiler {
             let rise = number(Op::Binary(Binary::Subtract, pair[3], pair[1]));
             let part = number(Op::Binary(Binary::Multiply, along, rise));
             value = number(Op::Binary(Binary::Add, value, part));
+            lines.push(Line {
+                from: pair[0],
+                to,
+                steepness,
+                rise,
+                value,
+            });
         }
+        self.builder.is_table(Lines {
+            x: *x,
+            first: points[1],
+            lines,
+        });
         let kind = Kind::Number;
         Ok(Typed {
             register: value,

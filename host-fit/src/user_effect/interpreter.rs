@@ -1,7 +1,7 @@
 //! A user's effect run on the host, in any number type.
 
 use super::Definition;
-use super::program::{Op, Program, Register, Signal, select};
+use super::program::{Lines, Op, Program, Register, Signal, select};
 use crate::ring::Ring;
 use model_core::Real;
 use model_core::clock::Clock;
@@ -23,7 +23,84 @@ pub struct UserEffect<T> {
     results: Vec<T>,
     taps: Vec<Tap<T>>,
     /// What is computed at every sample.
-    each: Vec<(Register, Op)>,
+    each: Vec<(Register, Step)>,
+    tables: Vec<Table<T>>,
+}
+
+/// What is computed at once.
+#[derive(Clone, Copy, Debug)]
+enum Step {
+    Op(Op),
+    Table(usize),
+}
+
+/// Straight lines between points, looked up. To the bit what its operations make one after the other.
+#[derive(Clone, Debug)]
+struct Table<T> {
+    x: Register,
+    /// Beyond which of them a line is passed.
+    ends: Vec<f64>,
+    lines: Vec<TableLine<T>>,
+    /// The value beyond the last place.
+    last: T,
+}
+
+#[derive(Clone, Debug)]
+struct TableLine<T> {
+    from: T,
+    steepness: T,
+    rise: T,
+    /// The value where it begins.
+    below: T,
+}
+
+/// Beyond the end of a line by this share of the places, single precision does not bring it back.
+const ROUNDING: f64 = 1e-5;
+
+/// Beyond this the line from `from` to `to` counts in full.
+fn surely_passed(from: f64, to: f64) -> f64 {
+    to + ROUNDING * (from.abs() + 2.0 * to.abs())
+}
+
+impl<T: Real> Table<T> {
+    fn new(lines: &Lines, results: &[T]) -> Self {
+        let ends = lines.lines.iter().map(|line| {
+            let from = results[line.from].value();
+            surely_passed(from, line.to)
+        });
+        let mut value = results[lines.first];
+        let lines_of = lines.lines.iter().map(|line| {
+            let below = value;
+            value = value + results[line.rise];
+            TableLine {
+                from: results[line.from],
+                steepness: results[line.steepness],
+                rise: results[line.rise],
+                below,
+            }
+        });
+        Self {
+            x: lines.x,
+            lines: lines_of.collect(),
+            ends: ends.collect(),
+            last: value,
+        }
+    }
+
+    fn at(&self, x: T) -> T {
+        let place = x.value();
+        let passed = self.ends.iter().take_while(|end| place > **end);
+        let first = passed.count();
+        let mut value = self.lines.get(first).map_or(self.last, |line| line.below);
+        for line in &self.lines[first..] {
+            if place <= line.from.value() {
+                break;
+            }
+            let along = (x - line.from) * line.steepness;
+            value = value + along.at_least(T::ZERO).at_most(T::ONE) * line.rise;
+        }
+        value
+    }
 }
 
 /// What a user's effect remembers.
@@ -50,10 +127,12 @@ impl<T: Real> UserEffect<T> {
         let program = &definition.program;
         let mut results = vec![T::ZERO; program.ops.len()];
         let mut taps = vec![Tap::on(0); program.lines];
+        let needed = program.needed();
         let mut each = Vec::new();
         for (register, (op, once)) in program.ops.iter().zip(&program.once).enumerate() {
-            if !once {
-                each.push((register, *op));
+            if !once && needed[register] {
+                let table = program.table_at(register).map(Step::Table);
+                each.push((register, table.unwrap_or(Step::Op(*op))));
             }
             results[register] = match *op {
                 Op::Number(value) => T::from_f64(value),
@@ -87,10 +166,12 @@ impl<T: Real> UserEffect<T> {
                 | Op::State(_) => T::ZERO,
             };
         }
+        let tables = program.tables.iter();
         Self {
             program,
             place: definition.spec().place,
             setting: *setting,
+            tables: tables.map(|lines| Table::new(lines, &results)).collect(),
             results,
             taps,
             each,
@@ -111,8 +192,16 @@ impl<T: Real> UserEffect<T> {
         } = state;
         let at = signals.at;
         clock.tick(at.command);
-        for (register, op) in &self.each {
-            results[*register] = match *op {
+        for (register, step) in &self.each {
+            let op = match step {
+                Step::Op(op) => *op,
+                Step::Table(index) => {
+                    let table = &self.tables[*index];
+                    results[*register] = table.at(results[table.x]);
+                    continue;
+                }
+            };
+            results[*register] = match op {
                 Op::Unary(f, x) => f.of(results[x]),
                 Op::Binary(f, x, y) => f.of(results[x], results[y]),
                 Op::Select {
@@ -215,5 +304,50 @@ impl<T: Real> Effect<T> for UserEffect<T> {
             at,
         };
         self.run(state, &signals)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// What the board computes: every line, one after the other.
+    fn one_after_the_other(table: &Table<f32>, x: f32) -> f32 {
+        let first = table.lines[0].below;
+        table.lines.iter().fold(first, |value, line| {
+            let along = (x - line.from) * line.steepness;
+            value + along.at_least(0.0).at_most(1.0) * line.rise
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn a_table_is_looked_up_to_the_bit(
+            start in -100.0_f64..100.0,
+            points in prop::collection::vec((1e-4_f64..10.0, -3.0_f32..3.0), 2..9),
+            x in -150.0_f32..150.0,
+            nearest in 0_usize..8,
+        ) {
+            let mut table = Table { x: 0, ends: Vec::new(), lines: Vec::new(), last: 0.25_f32 };
+            let (mut from, mut corners) = (start, Vec::new());
+            for (width, rise) in points {
+                let to = from + width;
+                table.ends.push(surely_passed(from, to));
+                table.lines.push(TableLine {
+                    from: from as f32,
+                    steepness: (1.0 / width) as f32,
+                    rise,
+                    below: table.last,
+                });
+                corners.push(to as f32);
+                (from, table.last) = (to, table.last + rise);
+            }
+            let corner = corners[nearest % corners.len()];
+            for x in [x, corner, corner.next_up(), corner.next_down(), f32::INFINITY, f32::NEG_INFINITY] {
+                let (told, board) = (table.at(x), one_after_the_other(&table, x));
+                prop_assert_eq!(told.to_bits(), board.to_bits(), "at {}", x);
+            }
+        }
     }
 }

@@ -159,6 +159,49 @@ impl Op {
     }
 }
 
+/// Operations that together are straight lines between points, the places numbers and the values the same at every
+/// sample: of them only the lines around x count, and those before it as a sum that is known beforehand.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Lines {
+    pub(super) x: Register,
+    /// The value below the first place.
+    pub(super) first: Register,
+    pub(super) lines: Vec<Line>,
+}
+
+/// A line from one place to the next, `to`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Line {
+    pub(super) from: Register,
+    pub(super) to: f64,
+    pub(super) steepness: Register,
+    pub(super) rise: Register,
+    /// The sum with it.
+    pub(super) value: Register,
+}
+
+impl Lines {
+    /// The operation whose result is the value.
+    pub(super) fn value(&self) -> Register {
+        self.lines.last().map_or(self.first, |line| line.value)
+    }
+
+    fn with_registers(&self, to: impl Fn(Register) -> Register) -> Self {
+        let lines = self.lines.iter().map(|line| Line {
+            from: to(line.from),
+            to: line.to,
+            steepness: to(line.steepness),
+            rise: to(line.rise),
+            value: to(line.value),
+        });
+        Self {
+            x: to(self.x),
+            first: to(self.first),
+            lines: lines.collect(),
+        }
+    }
+}
+
 /// A state that is carried from sample to sample.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Carried {
@@ -177,6 +220,8 @@ pub(super) struct Program {
     pub(super) states: Vec<Carried>,
     /// Memories for delayed signals.
     pub(super) lines: usize,
+    /// Which operations make tables.
+    pub(super) tables: Vec<Lines>,
     pub(super) value: Register,
 }
 
@@ -184,6 +229,7 @@ pub(super) struct Program {
 #[derive(Debug, Default)]
 pub(super) struct Builder {
     ops: Vec<Op>,
+    tables: Vec<Lines>,
 }
 
 impl Builder {
@@ -226,6 +272,14 @@ impl Builder {
 
     pub(super) fn is_once(&self, register: Register) -> bool {
         once(&self.ops).get(register).copied().unwrap_or(false)
+    }
+
+    /// Says that operations make a table.
+    pub(super) fn is_table(&mut self, table: Lines) {
+        let steady = |r: Register| self.is_once(r);
+        if steady(table.first) && table.lines.iter().all(|line| steady(line.rise)) {
+            self.tables.push(table);
+        }
     }
 
     /// The number that a register holds, if it is one that was written down.
@@ -309,7 +363,10 @@ impl Builder {
                 ..state
             })
             .collect();
+        let tables = self.tables.iter().filter(|table| alive[table.value()]);
+        let tables = tables.map(|table| table.with_registers(|r| registers[r]));
         Program {
+            tables: tables.collect(),
             once: once(&ops),
             lines: ops
                 .iter()
@@ -334,6 +391,29 @@ fn once(ops: &[Op]) -> Vec<bool> {
 }
 
 impl Program {
+    /// What has to be computed at every sample if tables are looked up.
+    pub(super) fn needed(&self) -> Vec<bool> {
+        let mut needed = vec![false; self.ops.len()];
+        let updates = self.states.iter().map(|state| state.update);
+        let mut pending: Vec<Register> = updates.chain([self.value]).collect();
+        while let Some(register) = pending.pop() {
+            if std::mem::replace(&mut needed[register], true) {
+                continue;
+            }
+            match self.table_at(register) {
+                Some(table) => pending.push(self.tables[table].x),
+                None => pending.extend(self.ops[register].operands()),
+            }
+        }
+        needed
+    }
+
+    /// The table whose value an operation is.
+    pub(super) fn table_at(&self, register: Register) -> Option<usize> {
+        let mut tables = self.tables.iter();
+        tables.position(|table| table.value() == register)
+    }
+
     pub(super) fn reads(&self, op: Op) -> bool {
         self.ops.contains(&op)
     }

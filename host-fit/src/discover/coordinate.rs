@@ -173,11 +173,6 @@ impl Coordinate {
         other
     }
 
-    /// Whether both are the same but for a time.
-    pub(super) fn is_like(&self, other: &Self) -> bool {
-        self.slug() == other.slug()
-    }
-
     /// The channel that it reads.
     pub(super) fn channel(&self) -> Option<&str> {
         match self {

@@ -10,6 +10,7 @@
 
 mod coordinate;
 mod finder;
+mod follow;
 mod formula;
 mod outcome;
 mod place;
@@ -75,7 +76,7 @@ pub fn glance(model: &Model, records: &[Record], interrupt: &AtomicBool) -> Opti
         progress: &|_| {},
     };
     let context = screening::Context::new(&search, &bench.given, 1)?;
-    let first = context.all().into_iter().next()?;
+    let first = context.all(&Entry::ALL).into_iter().next()?;
     (first.score < 0.0).then(|| Glance {
         place: first.term.entry.place(),
         coordinate: outcome::coordinate_words(first.term.entry, &first.term),

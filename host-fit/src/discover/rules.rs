@@ -22,10 +22,16 @@ rules! {
     tried_leaner: usize = 4, "", "judgement";
     /// … no more of them of one place and one kind of coordinate than this …
     of_a_kind: usize = 2, "", "judgement: memories of neighbouring lengths promise alike";
-    /// … and how many of them are followed to the end, beside the best one of each base.
+    /// … and how many of them are followed to the end, beside the best one of each place and each base.
     finished: usize = 4, "", "judgement";
-    /// Of those, for how many the flow's own lags are searched again, beside the best one of each base.
+    /// Of those, for how many the flow's own lags are searched again, beside the best one of each place and each base.
     settled: usize = 2, "", "judgement: each takes as long as `identify`";
+    /// How often the coordinate of the best one at a place is chosen anew beside its lags.
+    rounds: usize = 2, "", "judgement: the second found nothing new on any rig yet";
+    /// … where it is no further than this behind the best of all with it.
+    in_reach: f64 = 1.5, "times the best error", "judgement: lags took a hot jet from 1.5 times the floor to 1.05";
+    /// A term that leaves no more than this leaves nothing for another one.
+    at_the_floor: f64 = 1.02, "times the noise floor", "a sensor that stood in for a hot jet left 1.09, the jet 1.05 as a curve";
     /// Curves at one place whose errors differ by less than this are the same curve.
     twins: f64 = 0.001, "share of the rms error", "two names of one signal differ by rounding";
     /// A term must lower the held-out error of the best base without it by this fraction.

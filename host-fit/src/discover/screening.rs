@@ -32,6 +32,8 @@ const FASTEST_S: f64 = 0.005;
 const SLOWEST_S: f64 = 0.2;
 /// A time that was found is looked for again at so many times it.
 const NEARBY: [f64; 6] = [0.5, 0.63, 0.79, 1.26, 1.59, 2.0];
+/// Times of the first look lie two to three apart; a closer one looks at these times them too.
+const BETWEEN: [f64; 2] = [0.63, 1.59];
 /// Samples that show where a coordinate spends its time.
 const SHOWN: usize = 20_000;
 
@@ -141,15 +143,31 @@ impl<'a> Context<'a> {
         })
     }
 
-    /// Every curve, the most promising first.
-    pub(super) fn all(&self) -> Vec<Screened> {
+    /// Every curve that enters in one of these ways, the most promising first.
+    pub(super) fn all(&self, entries: &[Entry]) -> Vec<Screened> {
+        self.curves(self.coordinates(), entries)
+    }
+
+    /// The same with times in smaller steps.
+    pub(super) fn finer(&self, entries: &[Entry]) -> Vec<Screened> {
+        let longest = remembered(self.longest);
+        let all = self.coordinates().into_iter().flat_map(|coordinate| {
+            let between = |factor: &f64| coordinate.with_time_times(*factor);
+            let times: Vec<Coordinate> = BETWEEN.iter().filter_map(between).collect();
+            let possible = |other: &Coordinate| other.fading().is_some() || other.fits(longest);
+            let times = times.into_iter().filter(possible);
+            std::iter::once(coordinate).chain(times).collect::<Vec<_>>()
+        });
+        self.curves(all.collect(), entries)
+    }
+
+    fn coordinates(&self) -> Vec<Coordinate> {
         let first = self.learning.first();
         let channels: Vec<String> = first
             .map(|record| record.channels.keys().cloned().collect())
             .unwrap_or_default();
         let time_constant = self.model.time_constant().clamp(FASTEST_S, SLOWEST_S);
-        let all = coordinates(time_constant, self.longest, &channels);
-        self.curves(all, &Entry::ALL)
+        coordinates(time_constant, self.longest, &channels)
     }
 
     /// The same term with its time nearby.

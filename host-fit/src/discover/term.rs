@@ -56,6 +56,11 @@ struct Parameter {
 }
 
 impl Term {
+    /// Whether both enter alike and depend on the same but for a time.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        self.entry == other.entry && self.coordinate.slug() == other.coordinate.slug()
+    }
+
     /// The name of its effect.
     pub(super) fn name(&self) -> String {
         let entry = match self.entry {

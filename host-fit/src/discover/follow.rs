@@ -1,0 +1,309 @@
+//! From promising curves to the best term: refitted with everything else, the flow's lags searched beside it, its
+//! coordinate chosen anew beside those.
+
+use super::RULES;
+use super::finder::Finder;
+use super::place::{Entry, Place};
+use super::screening::{Context, Screened, reference};
+use super::term::Term;
+use crate::fit::{Fit, FitOptions, fit};
+use crate::model::Model;
+use crate::terms::{self, Hypothesis};
+use model_core::recursion::Grading;
+use rayon::prelude::*;
+use std::sync::atomic::Ordering;
+
+/// A term and the model with it, fitted to the end.
+#[derive(Clone)]
+pub(super) struct Candidate {
+    pub(super) term: Term,
+    pub(super) with: Hypothesis,
+}
+
+impl Candidate {
+    /// ln of the held-out error, and the price of the model's parameters.
+    pub(super) fn size(&self) -> f64 {
+        self.with.judged.size()
+    }
+
+    fn place(&self) -> Place {
+        self.term.entry.place()
+    }
+
+    /// While it blows, the length of this pulse is the time since its edge.
+    fn is_twin(&self, other: &Self) -> bool {
+        let ratio = self.with.judged.rmse() / other.with.judged.rmse();
+        self.term.entry == other.term.entry && ratio - 1.0 < RULES.twins
+    }
+}
+
+/// The best of some, taken from them.
+pub(super) fn best(all: &mut Vec<Candidate>) -> Option<Candidate> {
+    let smaller = |a: &usize, b: &usize| all[*a].size().total_cmp(&all[*b].size());
+    let index = (0..all.len()).min_by(smaller)?;
+    Some(all.swap_remove(index))
+}
+
+/// A term beside a base, followed for a few steps.
+struct Tried {
+    term: Term,
+    brief: Fit,
+    /// The terms of the base: what the flow remembers.
+    memory: Vec<terms::Term>,
+}
+
+/// What a term beside a base is known by: where it acts, the number of terms of the base, and its delay law where that
+/// is one of the catalogue.
+type Kind = (Place, usize, Option<&'static str>);
+
+fn kind(term: &Term, memory: &[terms::Term], model: &Model) -> Kind {
+    (term.entry.place(), memory.len(), model.delay.effect_name())
+}
+
+/// Who is followed further, of many that come the best first: so many, the best at each place and the best beside
+/// each base. Beside a lean base a few steps say less, as it is further to go; at the wrong place a rich one bends
+/// further.
+struct Heirs {
+    free: usize,
+    taken: Vec<Kind>,
+}
+
+impl Heirs {
+    fn of(free: usize) -> Self {
+        Self {
+            free,
+            taken: Vec::new(),
+        }
+    }
+
+    fn takes(&mut self, (place, terms, law): Kind) -> bool {
+        let new_place = self.taken.iter().all(|other| other.0 != place);
+        let new_base = self
+            .taken
+            .iter()
+            .all(|other| (other.1, other.2) != (terms, law));
+        let taken = self.free > 0 || new_place || new_base;
+        self.free = self.free.saturating_sub(1);
+        if taken {
+            self.taken.push((place, terms, law));
+        }
+        taken
+    }
+}
+
+impl Finder<'_> {
+    /// What comes of some curves beside their models; one at the floor alone.
+    pub(super) fn followed(
+        &self,
+        curves: Vec<(&Hypothesis, Screened)>,
+        number: usize,
+    ) -> Vec<Candidate> {
+        let progress = self.search.progress;
+        progress(&format!("term {number}: refitting {} curves", curves.len()));
+        let tried = curves.into_par_iter();
+        let tried = tried.filter_map(|(beside, curve)| self.tried(beside, curve));
+        let mut all = self.finished(tried.collect());
+        progress(&format!("term {number}: the flow's lags beside it"));
+        for candidate in self.leading(&mut all) {
+            let with = self.search.run(candidate.with, || None).best;
+            let followed = Candidate { with, ..candidate };
+            // At the floor there is nothing to gain from others; what is as good is asked later.
+            if self.at_the_floor(&followed) {
+                return vec![followed];
+            }
+            all.push(followed);
+        }
+        progress(&format!("term {number}: its coordinate beside these lags"));
+        for candidate in best_of_each_place(&mut all) {
+            let least = all
+                .iter()
+                .map(Candidate::size)
+                .fold(f64::INFINITY, f64::min);
+            if let Some(settled) = self.settled(candidate, least, number) {
+                if self.at_the_floor(&settled) {
+                    return vec![settled];
+                }
+                all.push(settled);
+            }
+        }
+        all
+    }
+
+    /// Whether nothing is left that another term could explain.
+    fn at_the_floor(&self, candidate: &Candidate) -> bool {
+        let judge = self.search.judge;
+        judge.over_noise(candidate.with.judged.rmse()) < RULES.at_the_floor
+    }
+
+    /// Those beside which the flow's lags are searched again, what is at the floor and the leanest base first: a rich
+    /// base leaves less with any term, and its lags stand in for the right one.
+    fn leading(&self, all: &mut [Candidate]) -> Vec<Candidate> {
+        all.sort_by(|a, b| a.size().total_cmp(&b.size()));
+        let mut leading: Vec<Candidate> = Vec::new();
+        let mut heirs = Heirs::of(RULES.settled);
+        for one in all {
+            let own = kind(&one.term, &one.with.terms, one.with.judged.model());
+            if !leading.iter().any(|other| one.is_twin(other)) && heirs.takes(own) {
+                leading.push(one.clone());
+            }
+        }
+        leading.sort_by_key(|one| (!self.at_the_floor(one), one.with.terms.len()));
+        leading
+    }
+
+    /// A term with its lags, followed further: its coordinate is chosen anew beside these lags, and the lags beside
+    /// it, as long as that does better and is in reach of the best of all. Beside a lean base another coordinate may
+    /// stand in for lags that are missing.
+    fn settled(&self, from: Candidate, least: f64, number: usize) -> Option<Candidate> {
+        let reach = least + RULES.in_reach.ln();
+        let (mut last, mut settled) = (from, None);
+        for _ in 0..RULES.rounds {
+            let Some(other) = self.another_coordinate(&last, number) else {
+                break;
+            };
+            if other.size() >= last.size() || other.size() > reach {
+                break;
+            }
+            last = Candidate {
+                with: self.search.run(other.with, || None).best,
+                term: other.term,
+            };
+            settled = Some(last.clone());
+        }
+        settled
+    }
+
+    /// The best other term at the same place, beside the model without this one.
+    fn another_coordinate(&self, candidate: &Candidate, number: usize) -> Option<Candidate> {
+        let without = self.without(candidate)?;
+        let context = Context::new(self.search, without.judged.model(), number)?;
+        let place = candidate.place();
+        let there = Entry::ALL
+            .into_iter()
+            .filter(|entry| entry.place() == place);
+        let others = context.finer(&there.collect::<Vec<_>>());
+        let others = diverse(others, RULES.tried_leaner);
+        best(&mut self.refitted(&without, others))
+    }
+
+    /// The model without the term, refitted.
+    pub(super) fn without(&self, candidate: &Candidate) -> Option<Hypothesis> {
+        let bare = candidate.term.taken_from(candidate.with.judged.model());
+        let mut without = Hypothesis::new(self.search.judge.refitted(&bare).ok()?);
+        without.terms.clone_from(&candidate.with.terms);
+        Some(without)
+    }
+
+    /// The best of some curves beside one model.
+    pub(super) fn refitted(&self, beside: &Hypothesis, curves: Vec<Screened>) -> Vec<Candidate> {
+        let curves = curves.into_par_iter();
+        let tried = curves.filter_map(|curve| self.tried(beside, curve));
+        self.finished(tried.collect())
+    }
+
+    /// A model with the term, fitted for a few steps; from 0 where the promised values are too bold for a free run.
+    fn fitted(&self, model: &Model, term: &Term) -> Option<Fit> {
+        if self.search.interrupt.load(Ordering::Relaxed) {
+            return None;
+        }
+        let judge = self.search.judge;
+        let learning = judge.learning(0);
+        let reference = reference(&term.coordinate, &learning);
+        let from = |term: &Term| {
+            let with = term.added_to(model, reference)?;
+            let options = FitOptions {
+                iterations: terms::RULES.brief,
+                ..judge.options_for(&with)
+            };
+            fit(&with, &learning, &options).ok()
+        };
+        let nothing = vec![0.0; term.values().len()];
+        from(term).or_else(|| from(&term.with_values(&nothing)))
+    }
+
+    /// A curve beside a model, followed for a few steps.
+    fn tried(&self, beside: &Hypothesis, curve: Screened) -> Option<Tried> {
+        let model = beside.judged.model();
+        // On/off commands do not show how the flow takes jets of part strength, which a term at the jet makes of them.
+        let unknown = curve.term.entry == Entry::Jet && self.search.judge.on_off;
+        let responses = Grading::ALL
+            .into_par_iter()
+            .filter(|grading| unknown || *grading == model.grading);
+        let fits = responses.filter_map(|grading| {
+            let model = Model {
+                grading,
+                ..model.clone()
+            };
+            self.fitted(&model, &curve.term)
+        });
+        let by_error = |a: &Fit, b: &Fit| a.mean_square().total_cmp(&b.mean_square());
+        Some(Tried {
+            brief: fits.min_by(by_error)?,
+            term: curve.term,
+            memory: beside.terms.clone(),
+        })
+    }
+
+    /// The best of some brief fits, followed to the end: the base bent to stand in for what
+    /// was missing, and its lags move back.
+    fn finished(&self, tried: Vec<Tried>) -> Vec<Candidate> {
+        let judge = self.search.judge;
+        let rated = tried.into_par_iter().filter_map(|tried| {
+            let rmse = judge.held_out(|_| &tried.brief.model).ok()?.rmse();
+            Some((terms::size(rmse, &tried.brief.model), tried))
+        });
+        let mut rated: Vec<(f64, Tried)> = rated.collect();
+        rated.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut heirs = Heirs::of(RULES.finished);
+        rated
+            .retain(|(_, tried)| heirs.takes(kind(&tried.term, &tried.memory, &tried.brief.model)));
+        let finished = rated.into_par_iter().filter_map(|(_, tried)| {
+            let least = tried.memory.len();
+            let with = self.search.finish(tried.memory, tried.brief, least)?;
+            Some(Candidate {
+                term: tried.term,
+                with,
+            })
+        });
+        finished.collect()
+    }
+}
+
+/// The best of each place, the best first.
+fn best_of_each_place(all: &mut [Candidate]) -> Vec<Candidate> {
+    all.sort_by(|a, b| a.size().total_cmp(&b.size()));
+    let mut best: Vec<Candidate> = Vec::new();
+    for one in all {
+        if best.iter().all(|other| other.place() != one.place()) {
+            best.push(one.clone());
+        }
+    }
+    best
+}
+
+/// The first so many, no more of a kind than rules allow.
+pub(super) fn diverse(all: Vec<Screened>, most: usize) -> Vec<Screened> {
+    let mut kept: Vec<Screened> = Vec::new();
+    for one in all {
+        let of_a_kind = kept.iter().filter(|other| other.term.is_like(&one.term));
+        if kept.len() < most && of_a_kind.count() < RULES.of_a_kind {
+            kept.push(one);
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_best_are_followed_and_the_best_of_each_place_and_base() {
+        let mut heirs = Heirs::of(2);
+        let taken = [6, 6, 6, 0, 0, 3].map(|terms| heirs.takes((Place::Jet, terms, None)));
+        assert_eq!(taken, [true, true, false, true, false, true]);
+        assert!(heirs.takes((Place::Jet, 0, Some("edge-dependent-delay"))));
+        assert!(heirs.takes((Place::Sensor, 6, None)));
+        assert!(!heirs.takes((Place::Sensor, 0, None)));
+    }
+}

@@ -32,6 +32,9 @@ pub(crate) struct Args {
     /// File for the trace: the signal that would explain the misfit of the best base, at each place.
     #[arg(long, value_name = "trace.csv")]
     trace: Option<PathBuf>,
+    /// Write the command (columns t, u) that would tell apart what these records cannot.
+    #[arg(long, value_name = "command.csv")]
+    experiment: Option<PathBuf>,
     /// Most terms.
     #[arg(long, value_name = "COUNT", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=6))]
     terms: u32,
@@ -90,7 +93,15 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         write_atomic(path, |out| out.write_all(term.file.as_bytes()))?;
         written.push(path);
     }
+    let separation = found.discovery.separation.as_ref();
+    if let (Some(path), Some(separation)) = (&args.experiment, separation) {
+        separation.experiment.write_csv(path)?;
+        written.push(path);
+    }
     console.show(&found, &[], &written)?;
+    if args.experiment.is_some() && separation.is_none() {
+        console.say("no experiment was written: there is nothing to tell apart")?;
+    }
     if args.trace.is_some() && found.discovery.trace.is_none() {
         console.say(
             "no trace was written: the best base is at the noise floor, or its free run diverges",

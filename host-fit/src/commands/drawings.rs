@@ -3,7 +3,8 @@
 use closed_loop::{SAMPLE_PERIOD_S, Trace};
 use host_fit::data::{DataSet, Record};
 use host_fit::design::Proof;
-use host_fit::diagnose::{Diagnosis, Separation};
+use host_fit::diagnose::Diagnosis;
+use host_fit::experiment::Separation;
 use host_fit::picture::{
     ClosedLoop, LabelledRun, Ladder, LadderRecord, LadderStep, LoopRun, Overlay, closed_loop,
     ladder, overlay,

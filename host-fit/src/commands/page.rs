@@ -12,7 +12,7 @@ use host_fit::picture::{
 use host_fit::residual::Failures;
 use host_fit::steps::{Comparison, Extension, Finding, Identification, Terms};
 
-use super::drawings::{ladder_picture, proof_picture};
+use super::drawings::{experiment_picture, ladder_picture, proof_picture};
 use super::tried::Tried;
 use super::words::{Words, describe, ladder_rows, ranking_rows, role_name, score_rows, short};
 
@@ -168,6 +168,10 @@ pub(crate) fn discovery(given: &Model, set: &DataSet, found: &Terms, command: &s
         );
         report.paragraph("The effect file that the term makes:");
         report.code(&term.file);
+    }
+    if let Some(separation) = &found.discovery.separation {
+        report.section("How to tell it from what is like it");
+        report.figure(&experiment_picture(separation), &separation.words());
     }
     if let Some(trace) = &found.discovery.trace {
         report_trace(&mut report, trace);

@@ -2,22 +2,11 @@
 
 use super::ranking::{Rival, alike, rivals};
 use super::session::Session;
-use crate::experiment::{Experiment, Limits, separating};
+use crate::experiment::Separation;
 use crate::model::Model;
-use crate::terms::{Hypothesis, Term};
+use crate::terms::{Hypothesis, Judged, Term, is_out, shares_won};
 use model_core::effect::Spec;
 use std::sync::atomic::Ordering;
-
-/// How to tell apart what the data cannot.
-#[derive(Clone, Debug)]
-pub struct Separation {
-    /// The effects that one of the models has and another has not.
-    pub effects: Vec<String>,
-    /// The models: the final one first.
-    pub models: Vec<Model>,
-    /// The command that separates the models most.
-    pub experiment: Experiment,
-}
 
 /// An effect with what the records cannot tell from it.
 pub(super) struct Set {
@@ -53,12 +42,16 @@ impl Session<'_> {
                     owned = rivals(self.search, &without, &[spec.name]);
                     &owned
                 };
-                for rival in others {
-                    let Some(judged) = rival.judged() else {
-                        continue;
-                    };
-                    let present = order.iter().any(|s| s.name == rival.name);
-                    if !present && alike(&judged.held_out, &last.judged.held_out) {
+                let absent = |name: &str| !order.iter().any(|s| s.name == name);
+                let fitted = others.iter().filter(|rival| absent(&rival.name));
+                let fitted: Vec<(&Rival, &Judged)> = fitted
+                    .filter_map(|rival| Some((rival, rival.judged()?)))
+                    .collect();
+                let own = &last.judged.held_out;
+                let theirs = fitted.iter().map(|(_, judged)| &judged.held_out);
+                let shares = shares_won(&std::iter::once(own).chain(theirs).collect::<Vec<_>>());
+                for (index, (rival, judged)) in fitted.iter().enumerate() {
+                    if alike(&judged.held_out, own) || !is_out(&shares, index + 1) {
                         set.names.push(rival.name.clone());
                         set.models.push(judged.model().clone());
                     }
@@ -81,12 +74,7 @@ impl Session<'_> {
             return None;
         }
         let models: Vec<Model> = std::iter::once(model.clone()).chain(alternatives).collect();
-        let noise = (self.judge().measured_noise_rmse() * self.units.y).max(f64::MIN_POSITIVE);
-        let experiment = separating(&models, noise, &Limits::default(), self.options.seed).ok()?;
-        Some(Separation {
-            effects,
-            models,
-            experiment,
-        })
+        let noise = self.judge().measured_noise_rmse() * self.units.y;
+        Separation::of(models, effects, noise, self.options.seed)
     }
 }

@@ -15,7 +15,6 @@ mod session;
 mod verdict;
 
 pub use crate::terms::HeldOutBy;
-pub use alternatives::Separation;
 pub use estimate::ParameterEstimate;
 pub(crate) use estimate::estimates;
 pub use memory::Memory;

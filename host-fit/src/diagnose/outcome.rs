@@ -1,7 +1,8 @@
 //! What a diagnosis hands over.
 
 use super::memory::memory;
-use super::{Memory, ParameterEstimate, Quoted, Separation};
+use super::{Memory, ParameterEstimate, Quoted};
+use crate::experiment::Separation;
 use crate::model::Model;
 use crate::residual::NoiseSource;
 use crate::terms::{HeldOut, HeldOutBy, Hypothesis, Judge, Units};

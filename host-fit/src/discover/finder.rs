@@ -7,10 +7,15 @@ use super::place::Entry;
 use super::screening::{Context, Screened, reference};
 use super::term::{Shape, Term};
 use super::{Options, RULES};
+use crate::experiment::Separation;
 use crate::fit::Fit;
-use crate::terms::{self, HeldOut, Hypothesis, Judged, Screen, Search, Table, Units, p_value};
+use crate::model::Model;
+use crate::terms::{
+    self, HeldOut, Hypothesis, Judged, Screen, Search, Table, Units, is_out, p_value, shares_won,
+};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::sync::atomic::Ordering;
 
 /// What a round found, and what it looked at.
 pub(super) struct Round {
@@ -113,18 +118,27 @@ impl Finder<'_> {
         {
             return None;
         }
-        let words = coordinate_words(term.entry, &term);
-        let mut alike: Vec<Alike> = Vec::new();
-        for rival in all {
-            let other = Alike {
-                place: rival.term.entry.place(),
-                coordinate: coordinate_words(rival.term.entry, &rival.term),
-            };
-            // One coordinate may enter a place in two ways: for who reads it, that is the same finding.
-            let same = other.place == term.entry.place() && other.coordinate == words;
-            let new = !rival.term.is_like(&term) && !same && !alike.contains(&other);
-            if new && is_as_good(&rival.with.judged.held_out, &with.judged.held_out) {
-                alike.push(other);
+        let told = |term: &Term| Alike {
+            place: term.entry.place(),
+            coordinate: coordinate_words(term.entry, term),
+        };
+        // One coordinate may enter a place in two ways: for who reads it, that is the same finding.
+        let same = |other: &Term| other.is_like(&term) || told(other) == told(&term);
+        let held_out: Vec<&HeldOut> = std::iter::once(&with)
+            .chain(all.iter().map(|rival| &rival.with))
+            .map(|one| &one.judged.held_out)
+            .collect();
+        let shares = shares_won(&held_out);
+        let rivals = all.iter().enumerate();
+        let of_the_same = rivals.filter(|(_, rival)| same(&rival.term));
+        let stability = shares[0] + of_the_same.map(|(i, _)| shares[i + 1]).sum::<f64>();
+        let (mut alike, mut rivals) = (Vec::new(), Vec::new());
+        for (index, rival) in all.iter().enumerate() {
+            let new = !same(&rival.term) && !alike.contains(&told(&rival.term));
+            let as_good = is_as_good(held_out[index + 1], held_out[0]);
+            if new && (as_good || !is_out(&shares, index + 1)) {
+                alike.push(told(&rival.term));
+                rivals.push(rival.clone());
             }
         }
         let term = term.in_model(with.judged.model());
@@ -146,7 +160,47 @@ impl Finder<'_> {
             formula_taken: taken,
             resembles,
             alike,
+            rivals,
+            stability,
         })
+    }
+
+    /// A model in the user's units, and its `terms`, in the order they were added.
+    pub(super) fn outer(&self, model: &Model, terms: &[&Term]) -> (Model, Vec<Term>) {
+        let mut bare = model.clone();
+        let mut written = Vec::new();
+        for term in terms.iter().rev() {
+            let term = term.in_model(&bare);
+            bare = term.taken_from(&bare);
+            written.push(term.out(self.units));
+        }
+        written.reverse();
+        let mut outer = self.units.model_out(&bare);
+        for term in &written {
+            let reference = reference(&term.coordinate, &self.search.judge.learning(0));
+            outer = term.added_to(&outer, reference).unwrap_or(outer);
+        }
+        (outer, written)
+    }
+
+    /// The command that would tell `model`, which has all terms, from those in which another one stands for the first
+    /// that is not alone.
+    pub(super) fn separation(&self, found: &[Found], model: &Model) -> Option<Separation> {
+        let judge = self.search.judge;
+        let index = found.iter().position(|found| !found.rivals.is_empty())?;
+        if !judge.on_off || self.search.interrupt.load(Ordering::Relaxed) {
+            return None;
+        }
+        let (mut models, mut names) = (vec![model.clone()], vec![found[index].term.name()]);
+        for rival in &found[index].rivals {
+            // As curves: what came before it had no formulas yet.
+            let before = found[..index].iter().map(|found| &found.curve);
+            let terms: Vec<&Term> = before.chain([&rival.term]).collect();
+            models.push(self.outer(rival.with.judged.model(), &terms).0);
+            names.push(rival.term.name());
+        }
+        let noise = judge.measured_noise_rmse() * self.units.y;
+        Separation::of(models, names, noise, 0)
     }
 
     /// Effects of the catalogue that change the free run along `direction`.

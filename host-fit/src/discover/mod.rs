@@ -32,6 +32,7 @@ use crate::terms::{Bench, Found as Searched, Hypothesis, Known, Search};
 use finder::{Finder, size};
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
+use term::Term;
 
 /// What to look for.
 #[derive(Clone, Debug)]
@@ -188,21 +189,12 @@ pub fn discover(
         ladder.push(rung(&end, &names, "with formulas where one does as well"));
     }
     let fitted = judge.final_fit(&end.judged);
-    let mut inner = fitted.model.clone();
-    let mut written = Vec::new();
-    for found in terms.iter().rev() {
-        let term = found.term.in_model(&inner);
-        inner = term.taken_from(&inner);
-        written.push(term.out(units));
-    }
-    let mut model = units.model_out(&inner);
-    for term in written.iter().rev() {
-        let reference = screening::reference(&term.coordinate, &judge.learning(0));
-        model = term.added_to(&model, reference).unwrap_or(model);
-    }
+    let own: Vec<&Term> = terms.iter().map(|found| &found.term).collect();
+    let (model, written) = finder.outer(&fitted.model, &own);
+    let separation = finder.separation(&terms, &model);
     let terms = terms
         .iter()
-        .zip(written.iter().rev())
+        .zip(&written)
         .map(|(found, written)| outcome::told(found, written, &fitted, units))
         .collect();
     Ok(Discovery {
@@ -214,6 +206,7 @@ pub fn discover(
         noise_estimate: judge.measured_noise_rmse() * units.y,
         looked_at,
         trace,
+        separation,
         model,
     })
 }

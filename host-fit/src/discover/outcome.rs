@@ -1,9 +1,11 @@
 //! What a discovery hands over.
 
+use super::follow::Candidate;
 use super::place::{Entry, Place};
 use super::term::{Shape, Term};
 use super::trace::Trace;
 use crate::diagnose::{ParameterEstimate, Rung};
+use crate::experiment::Separation;
 use crate::fit::Fit;
 use crate::model::Model;
 use crate::residual::NoiseSource;
@@ -79,6 +81,8 @@ pub struct FoundTerm {
     pub parameters: BTreeMap<String, ParameterEstimate>,
     /// What else these records cannot tell from it.
     pub alike: Vec<Alike>,
+    /// In how many resamples of the held-out records this place and this coordinate come out best, %.
+    pub stability_percent: f64,
     /// Its effect file.
     #[serde(skip)]
     pub file: String,
@@ -104,6 +108,8 @@ pub struct Discovery {
     /// The signal that would explain the misfit of the base without the first term, or of the best base where none was
     /// found, at each place; none where nothing is left.
     pub trace: Option<Trace>,
+    /// The command that would tell the first term that is not alone from what is like it.
+    pub separation: Option<Separation>,
     /// The model with the terms.
     pub model: Model,
 }
@@ -128,6 +134,10 @@ pub(super) struct Found {
     pub(super) formula_taken: f64,
     pub(super) resembles: Vec<String>,
     pub(super) alike: Vec<Alike>,
+    /// Those.
+    pub(super) rivals: Vec<Candidate>,
+    /// Share of the resamples in which it, or one like it, is the best.
+    pub(super) stability: f64,
 }
 
 impl Found {
@@ -195,6 +205,7 @@ pub(super) fn told(found: &Found, written: &Term, fitted: &Fit, units: &Units) -
         is_formula,
         parameters,
         alike: found.alike.clone(),
+        stability_percent: share(found.stability),
         file: written.file(&comment),
     }
 }

@@ -6,8 +6,10 @@
 
 mod command;
 mod rules;
+mod separation;
 
 pub use rules::{RULES, Rules};
+pub use separation::Separation;
 
 use crate::model::Model;
 use crate::model::Rounding;

@@ -10,6 +10,7 @@ use crate::diagnose::{
     diagnose as search,
 };
 use crate::discover::{Glance, glance};
+use crate::experiment::Separation;
 use crate::indicators::{Scores, score, score_new};
 use crate::model::{Model, Training};
 use crate::power::{Detectable, detectable};
@@ -67,14 +68,8 @@ impl Serialize for Finding {
             restarted_s: Option<f64>,
             noise_source: NoiseSource,
             noise_estimate: f64,
-            experiment: Option<Experiment<'a>>,
+            experiment: Option<&'a Separation>,
             words: String,
-        }
-        #[derive(Serialize)]
-        struct Experiment<'a> {
-            effects: &'a [String],
-            description: &'a str,
-            separation_sigmas: f64,
         }
         let found = &self.diagnosis;
         let document = Document {
@@ -96,11 +91,7 @@ impl Serialize for Finding {
             restarted_s: found.restarted_s,
             noise_source: found.noise_source,
             noise_estimate: found.noise_estimate,
-            experiment: found.separation.as_ref().map(|separation| Experiment {
-                effects: &separation.effects,
-                description: &separation.experiment.description,
-                separation_sigmas: separation.experiment.separation_sigmas,
-            }),
+            experiment: found.separation.as_ref(),
             words: format!("{}. {}", self.headline, self.meaning),
         };
         document.serialize(serializer)

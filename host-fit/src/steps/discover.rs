@@ -5,6 +5,7 @@ use super::{Onlooker, StepError, check_period, trained_in_free_run};
 use crate::data::DataSet;
 use crate::diagnose::Rung;
 use crate::discover::{Discovery, FoundTerm, Options, Smallest, Trace, discover as search};
+use crate::experiment::Separation;
 use crate::indicators::{Scores, score};
 use crate::model::{Model, Training};
 use crate::picture::significant;
@@ -44,6 +45,7 @@ impl Serialize for Terms {
             noise_estimate: f64,
             curves_looked_at: usize,
             trace: Option<&'a Trace>,
+            experiment: Option<&'a Separation>,
             words: String,
         }
         let found = &self.discovery;
@@ -56,6 +58,7 @@ impl Serialize for Terms {
             noise_estimate: found.noise_estimate,
             curves_looked_at: found.looked_at,
             trace: found.trace.as_ref(),
+            experiment: found.separation.as_ref(),
             words: format!("{}. {}", self.headline, self.meaning),
         };
         document.serialize(serializer)
@@ -197,6 +200,13 @@ fn words(discovery: &Discovery) -> (String, String) {
                 others.collect::<Vec<_>>().join(", or ")
             );
         }
+        meaning += &format!(
+            "Place and coordinate come out best in {:.0} % of the resamples of the held-out records. ",
+            term.stability_percent
+        );
+    }
+    if let Some(separation) = &discovery.separation {
+        meaning += &format!("{} ", separation.words());
     }
     meaning += &format!("The held-out error is {}; {floor}.", significant(last, 3));
     (headline, meaning)

@@ -51,11 +51,7 @@ pub(super) fn words(diagnosis: &Diagnosis) -> (String, String) {
         ));
     }
     if let Some(separation) = &diagnosis.separation {
-        meaning.push_str(&format!(
-            " To tell {} apart, play this: {} (`--experiment command.csv` writes it).",
-            separation.effects.join(" and "),
-            separation.experiment.words().trim_end_matches('.')
-        ));
+        meaning.push_str(&format!(" {}", separation.words()));
     }
     (headline, meaning)
 }

@@ -142,6 +142,10 @@ rules! {
     fewest_blocks: usize = 24, "blocks", "judgement: a test of fewer has no power";
     /// Values that are enough to estimate a correlation time from.
     plenty: usize = 4000, "values", "judgement: for the time it takes";
+    /// Resamples of what is held out, records first and blocks of them then.
+    resamples: usize = 400, "", "shares are known to 0.025";
+    /// A model that resamples choose less often than the best by this over √2 is out of the question.
+    inflation: f64 = 0.1, "share of the resamples", "the ε of the inflated argmax (Adrian, Soloff and Willett, arXiv 2410.18268)";
     /// Most folds of a cross-validation.
     most_folds: usize = 4, "", "judgement: for the time it takes";
     /// What is learned from of the only record.

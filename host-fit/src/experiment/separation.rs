@@ -1,0 +1,63 @@
+//! Models that the records cannot tell apart, and the command that would.
+
+use super::{Experiment, Limits, separating};
+use crate::model::Model;
+use serde::{Serialize, Serializer};
+
+/// How to tell apart what the data cannot. Serialises to `experiment` of `diagnose --json` and `discover --json`.
+#[derive(Clone, Debug)]
+pub struct Separation {
+    /// The effects that one of the models has and another has not.
+    pub effects: Vec<String>,
+    /// The models: the final one first.
+    pub models: Vec<Model>,
+    /// The command that separates the models most.
+    pub experiment: Experiment,
+}
+
+impl Separation {
+    /// The command that tells the first of `models` and the others apart at noise of `noise_rmse`; `None` if there are
+    /// no others, or no command does.
+    #[must_use]
+    pub fn of(
+        models: Vec<Model>,
+        effects: Vec<String>,
+        noise_rmse: f64,
+        seed: u64,
+    ) -> Option<Self> {
+        let noise = noise_rmse.max(f64::MIN_POSITIVE);
+        let experiment = separating(&models, noise, &Limits::default(), seed).ok()?;
+        Some(Self {
+            effects,
+            models,
+            experiment,
+        })
+    }
+
+    /// What to play, in a sentence.
+    #[must_use]
+    pub fn words(&self) -> String {
+        format!(
+            "To tell {} apart, play this: {} (`--experiment command.csv` writes it).",
+            self.effects.join(" and "),
+            self.experiment.words().trim_end_matches('.')
+        )
+    }
+}
+
+impl Serialize for Separation {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Document<'a> {
+            effects: &'a [String],
+            description: &'a str,
+            separation_sigmas: f64,
+        }
+        let document = Document {
+            effects: &self.effects,
+            description: &self.experiment.description,
+            separation_sigmas: self.experiment.separation_sigmas,
+        };
+        document.serialize(serializer)
+    }
+}

@@ -69,6 +69,32 @@ impl Finder<'_> {
         }
     }
 
+    /// The same with more points where its curve is steepest, as long as they pay: a step lies between two of them.
+    fn finer(&self, candidate: Candidate) -> Candidate {
+        let judge = self.search.judge;
+        let mut last = candidate;
+        for _ in 0..RULES.refinements {
+            let term = last.term.in_model(last.with.judged.model());
+            let bare = term.taken_from(last.with.judged.model());
+            let reference = reference(&term.coordinate, &judge.learning(0));
+            let finer = term.finer(&errors(&term, &last.with.judged.fits[0]));
+            let finer = finer.and_then(|finer| {
+                let with = finer.added_to(&bare, reference)?;
+                let mut hypothesis = Hypothesis::new(judge.refitted(&with).ok()?);
+                hypothesis.terms.clone_from(&last.with.terms);
+                Some(Candidate {
+                    term: finer,
+                    with: hypothesis,
+                })
+            });
+            match finer.filter(|finer| finer.size() < last.size()) {
+                Some(finer) => last = finer,
+                None => break,
+            }
+        }
+        last
+    }
+
     /// How large a term would have to be at each place, in the user's units.
     fn smallest(&self, curves: &[Screened]) -> BTreeMap<String, Smallest> {
         let mut all = BTreeMap::new();
@@ -109,7 +135,7 @@ impl Finder<'_> {
         all.extend(self.refitted(&without, near.take(RULES.of_a_kind).collect()));
         // Beside the final base another one may do better.
         all.push(leader);
-        let Candidate { term, with } = best(&mut all)?;
+        let Candidate { term, with } = self.finer(best(&mut all)?);
         let gain = 1.0 - with.judged.rmse() / base.judged.rmse();
         let p = p_value(&base.judged.held_out, &with.judged.held_out) * looked_at as f64;
         if gain < RULES.worthwhile

@@ -10,6 +10,12 @@ rules! {
     points: usize = 8, "", "judgement: as many derivatives as one run carries";
     /// A coordinate with fewer distinct points than this shows no curve.
     fewest_points: usize = 3, "", "judgement: two points are a line at best";
+    /// Points that a curve gets where it is steepest, if they pay …
+    inserted: usize = 3, "", "judgement: a step is found four times as closely";
+    /// … so often …
+    refinements: usize = 2, "rounds", "judgement";
+    /// … and how many it has then, at most.
+    most_points: usize = 11, "", "judgement: derivatives of one run, and half as many again";
     /// Share of the samples beyond the first and the last point.
     beyond: f64 = 0.01, "share of the samples", "judgement";
     /// Points are at least this far apart.

@@ -184,6 +184,50 @@ impl Term {
         self.parameters().iter().map(|p| p.value).collect()
     }
 
+    /// The same curve with more points where it is steepest beyond its standard `errors`, and without those that are on a line with their
+    /// neighbours where they would be too many; `None` if it is none.
+    pub(super) fn finer(&self, errors: &[f64]) -> Option<Self> {
+        let Shape::Points { x, g, pinned } = &self.shape else {
+            return None;
+        };
+        let rise = |i: &usize| (g[i + 1] - g[*i]).abs() - 2.0 * errors[*i].hypot(errors[i + 1]);
+        let steepest = (0..x.len().checked_sub(1)?).max_by(|a, b| rise(a).total_cmp(&rise(b)))?;
+        let mut points: Vec<(f64, f64, bool)> = (0..x.len())
+            .map(|i| (x[i], g[i], *pinned == Some(i)))
+            .collect();
+        let between = |along: f64| {
+            let at = |from: f64, to: f64| from + along * (to - from);
+            let (i, j) = (steepest, steepest + 1);
+            (at(x[i], x[j]), at(g[i], g[j]), false)
+        };
+        let new = (1..=RULES.inserted).map(|k| between(k as f64 / (RULES.inserted + 1) as f64));
+        points.splice(steepest + 1..steepest + 1, new);
+        let kept = steepest..=steepest + 1 + RULES.inserted;
+        let mut spare: Vec<usize> = (1..points.len() - 1)
+            .filter(|i| !kept.contains(i))
+            .collect();
+        let off_line = |i: &usize| {
+            let [a, b, c] = [points[i - 1], points[*i], points[i + 1]];
+            (b.1 - (a.1 + (c.1 - a.1) * (b.0 - a.0) / (c.0 - a.0))).abs()
+        };
+        spare.retain(|i| !points[*i].2);
+        spare.sort_by(|a, b| off_line(a).total_cmp(&off_line(b)));
+        spare.truncate(points.len().saturating_sub(RULES.most_points));
+        let mut index = 0;
+        points.retain(|_| {
+            index += 1;
+            !spare.contains(&(index - 1))
+        });
+        Some(Self {
+            shape: Shape::Points {
+                x: points.iter().map(|point| point.0).collect(),
+                g: points.iter().map(|point| point.1).collect(),
+                pinned: points.iter().position(|point| point.2),
+            },
+            ..self.clone()
+        })
+    }
+
     /// The same with other values.
     pub(super) fn with_values(&self, values: &[f64]) -> Self {
         let mut other = self.clone();

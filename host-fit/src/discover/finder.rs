@@ -82,13 +82,11 @@ impl Finder<'_> {
                 let with = finer.added_to(&bare, reference)?;
                 let mut hypothesis = Hypothesis::new(judge.refitted(&with).ok()?);
                 hypothesis.terms.clone_from(&last.with.terms);
-                Some(Candidate {
-                    term: finer,
-                    with: hypothesis,
-                })
+                let pays = hypothesis.judged.size() < last.with.judged.size();
+                pays.then_some((finer, hypothesis))
             });
-            match finer.filter(|finer| finer.size() < last.size()) {
-                Some(finer) => last = finer,
+            match finer {
+                Some((term, with)) => (last.term, last.with) = (term, with),
                 None => break,
             }
         }
@@ -135,24 +133,23 @@ impl Finder<'_> {
         all.extend(self.refitted(&without, near.take(RULES.of_a_kind).collect()));
         // Beside the final base another one may do better.
         all.push(leader);
-        let Candidate { term, with } = self.finer(best(&mut all)?);
-        let gain = 1.0 - with.judged.rmse() / base.judged.rmse();
-        let p = p_value(&base.judged.held_out, &with.judged.held_out) * looked_at as f64;
-        if gain < RULES.worthwhile
-            || p >= RULES.level
-            || judge.drifts_more(&with.judged, &base.judged)
-        {
+        let found = self.finer(best(&mut all)?);
+        let last = found.judged();
+        let gain = 1.0 - last.rmse() / base.judged.rmse();
+        let p = p_value(&base.judged.held_out, &last.held_out) * looked_at as f64;
+        if gain < RULES.worthwhile || p >= RULES.level || judge.drifts_more(last, &base.judged) {
             return None;
         }
+        let term = &found.term;
         let told = |term: &Term| Alike {
             place: term.entry.place(),
             coordinate: coordinate_words(term.entry, term),
         };
         // One coordinate may enter a place in two ways: for who reads it, that is the same finding.
-        let same = |other: &Term| other.is_like(&term) || told(other) == told(&term);
-        let held_out: Vec<&HeldOut> = std::iter::once(&with)
-            .chain(all.iter().map(|rival| &rival.with))
-            .map(|one| &one.judged.held_out)
+        let same = |other: &Term| other.is_like(term) || told(other) == told(term);
+        let held_out: Vec<&HeldOut> = std::iter::once(&found)
+            .chain(&all)
+            .map(|one| &one.judged().held_out)
             .collect();
         let shares = shares_won(&held_out);
         let rivals = all.iter().enumerate();
@@ -167,6 +164,7 @@ impl Finder<'_> {
                 rivals.push(rival.clone());
             }
         }
+        let Candidate { term, with, .. } = found;
         let term = term.in_model(with.judged.model());
         let errors = errors(&term, &with.judged.fits[0]);
         let direction = context.direction(&term);
@@ -255,7 +253,7 @@ impl Finder<'_> {
     ) -> (Vec<Found>, Hypothesis) {
         let mut told = Vec::new();
         for mut found in found {
-            if let Some((term, judged)) = self.formula(&found, &current) {
+            if let Some((term, judged)) = self.formula(&found.curve, &current.judged) {
                 let excess = |held_out: &HeldOut| self.search.judge.excess(held_out);
                 let without = excess(&found.without.held_out).max(f64::MIN_POSITIVE);
                 // Other terms may have come since: what the formula loses, it loses here.
@@ -269,19 +267,21 @@ impl Finder<'_> {
         (told, current)
     }
 
-    fn formula(&self, found: &Found, current: &Hypothesis) -> Option<(Term, Judged)> {
+    /// The shortest formula that does as well as a curve that is part of a model.
+    pub(super) fn formula(&self, curve: &Term, with_curve: &Judged) -> Option<(Term, Judged)> {
         let judge = self.search.judge;
-        let model = current.judged.model();
-        let curve = found.curve.in_model(model);
+        let model = with_curve.model();
+        let curve = curve.in_model(model);
+        let errors = errors(&curve, &with_curve.fits[0]);
         let Shape::Points { x, g, pinned } = &curve.shape else {
             return None;
         };
         let typical = {
-            let mut sizes = found.errors.clone();
+            let mut sizes = errors.clone();
             sizes.sort_by(f64::total_cmp);
             sizes.get(sizes.len() / 2).copied().unwrap_or(1.0).max(1e-9)
         };
-        let weights: Vec<f64> = found.errors.iter().map(|e| 1.0 / e.max(typical)).collect();
+        let weights: Vec<f64> = errors.iter().map(|e| 1.0 / e.max(typical)).collect();
         let base = curve.taken_from(model);
         let reference = reference(&curve.coordinate, &judge.learning(0));
         let range = [*x.first()?, *x.last()?];
@@ -319,7 +319,6 @@ impl Finder<'_> {
         });
         let mut fits: Vec<(Term, Judged)> = fits.collect();
         fits.retain(|(_, judged)| {
-            let with_curve = &current.judged;
             judged.rmse() <= (1.0 + RULES.formula) * with_curve.rmse()
                 || p_value(&judged.held_out, &with_curve.held_out) >= RULES.level
         });

@@ -8,7 +8,7 @@ use super::screening::{Context, Screened, reference};
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit};
 use crate::model::Model;
-use crate::terms::{self, Hypothesis};
+use crate::terms::{self, Hypothesis, Judged};
 use model_core::recursion::Grading;
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
@@ -16,14 +16,38 @@ use std::sync::atomic::Ordering;
 /// A term and the model with it, fitted to the end.
 #[derive(Clone)]
 pub(super) struct Candidate {
+    /// Its curve.
     pub(super) term: Term,
     pub(super) with: Hypothesis,
+    /// The same as a formula, where one was looked for and does as well.
+    pub(super) formula: Option<(Term, Judged)>,
 }
 
 impl Candidate {
+    fn of(term: Term, with: Hypothesis) -> Self {
+        Self {
+            term,
+            with,
+            formula: None,
+        }
+    }
+
+    /// As a curve or as a formula, whichever is better: what is smooth, straight lines leave some of.
+    pub(super) fn judged(&self) -> &Judged {
+        let curve = &self.with.judged;
+        let formula = self.formula.iter().map(|(_, judged)| judged);
+        formula.fold(curve, |best, other| {
+            if other.size() < best.size() {
+                other
+            } else {
+                best
+            }
+        })
+    }
+
     /// ln of the held-out error, and the price of the model's parameters.
     pub(super) fn size(&self) -> f64 {
-        self.with.judged.size()
+        self.judged().size()
     }
 
     fn place(&self) -> Place {
@@ -106,7 +130,7 @@ impl Finder<'_> {
         progress(&format!("term {number}: the flow's lags beside it"));
         for candidate in self.leading(&mut all) {
             let with = self.search.run(candidate.with, || None).best;
-            let followed = Candidate { with, ..candidate };
+            let followed = Candidate::of(candidate.term, with);
             // At the floor there is nothing to gain from others; what is as good is asked later.
             if self.at_the_floor(&followed) {
                 return vec![followed];
@@ -125,6 +149,21 @@ impl Finder<'_> {
                 }
                 all.push(settled);
             }
+        }
+        let mut contenders = best_of_each_place(&mut all);
+        let reach = contenders
+            .first()
+            .map_or(0.0, |best| best.size() + RULES.contends.ln());
+        contenders.retain(|one| one.size() < reach);
+        if contenders.len() > 1 {
+            progress(&format!(
+                "term {number}: formulas of {} places",
+                contenders.len()
+            ));
+            all.extend(contenders.into_iter().map(|one| Candidate {
+                formula: self.formula(&one.term, &one.with.judged),
+                ..one
+            }));
         }
         all
     }
@@ -164,10 +203,7 @@ impl Finder<'_> {
             if other.size() >= last.size() || other.size() > reach {
                 break;
             }
-            last = Candidate {
-                with: self.search.run(other.with, || None).best,
-                term: other.term,
-            };
+            last = Candidate::of(other.term, self.search.run(other.with, || None).best);
             settled = Some(last.clone());
         }
         settled
@@ -260,10 +296,7 @@ impl Finder<'_> {
         let finished = rated.into_par_iter().filter_map(|(_, tried)| {
             let least = tried.memory.len();
             let with = self.search.finish(tried.memory, tried.brief, least)?;
-            Some(Candidate {
-                term: tried.term,
-                with,
-            })
+            Some(Candidate::of(tried.term, with))
         });
         finished.collect()
     }

@@ -36,6 +36,8 @@ rules! {
     rounds: usize = 2, "", "judgement: the second found nothing new on any rig yet";
     /// … where it is no further than this behind the best of all with it.
     in_reach: f64 = 1.5, "times the best error", "judgement: lags took a hot jet from 1.5 times the floor to 1.05";
+    /// The best of a place is compared as a formula too where it is no further than this behind the best of all.
+    contends: f64 = 1.1, "times the best error", "straight lines through a square of y left 1.066, the wrong place 1.025";
     /// A term that leaves no more than this leaves nothing for another one.
     at_the_floor: f64 = 1.02, "times the noise floor", "a sensor that stood in for a hot jet left 1.09, the jet 1.05 as a curve";
     /// Curves at one place whose errors differ by less than this are the same curve.

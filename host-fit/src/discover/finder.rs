@@ -137,7 +137,14 @@ impl Finder<'_> {
         let last = found.judged();
         let gain = 1.0 - last.rmse() / base.judged.rmse();
         let p = p_value(&base.judged.held_out, &last.held_out) * looked_at as f64;
-        if gain < RULES.worthwhile || p >= RULES.level || judge.drifts_more(last, &base.judged) {
+        let excess = |judged: &Judged| judge.excess(&judged.held_out);
+        let share = 1.0 - excess(last) / excess(&base.judged).max(f64::MIN_POSITIVE);
+        let little = judge.over_noise(1.0).is_finite() && share < RULES.least_share;
+        if gain < RULES.worthwhile
+            || p >= RULES.level
+            || little
+            || judge.drifts_more(last, &base.judged)
+        {
             return None;
         }
         let term = &found.term;
@@ -171,7 +178,6 @@ impl Finder<'_> {
         let resembles = direction.map_or_else(Vec::new, |direction| {
             self.resembling(context.screen(), &direction)
         });
-        let excess = |judged: &Judged| judge.excess(&judged.held_out);
         let taken = 1.0 - excess(&with.judged) / excess(&without.judged).max(f64::MIN_POSITIVE);
         Some(Found {
             curve: term.clone(),

@@ -37,13 +37,15 @@ rules! {
     /// … where it is no further than this behind the best of all with it.
     in_reach: f64 = 1.5, "times the best error", "judgement: lags took a hot jet from 1.5 times the floor to 1.05";
     /// The best of a place is compared as a formula too where it is no further than this behind the best of all.
-    contends: f64 = 1.1, "times the best error", "straight lines through a square of y left 1.066, the wrong place 1.025";
+    contends: f64 = 1.5, "times the best error", "straight lines through a square of y left 1.066, the wrong place 1.025";
     /// A term that leaves no more than this leaves nothing for another one.
     at_the_floor: f64 = 1.02, "times the noise floor", "a sensor that stood in for a hot jet left 1.09, the jet 1.05 as a curve";
     /// Curves at one place whose errors differ by less than this are the same curve.
     twins: f64 = 0.001, "share of the rms error", "two names of one signal differ by rounding";
     /// A term must lower the held-out error of the best base without it by this fraction.
     worthwhile: f64 = 0.015, "share of the rms error", "as for effects of the catalogue";
+    /// … and, where the noise floor is known, take this share of its excess at least.
+    least_share: f64 = 0.25, "share of the excess", "as for the stand-ins of `diagnose`; a rig that drifted as a whole had 19 % taken by a delay";
     /// Level of the tests; p-values are multiplied by the number of curves that were looked at.
     level: f64 = 0.05, "p-value", "convention";
     /// Held-out errors that differ by less than this are the same for any purpose.

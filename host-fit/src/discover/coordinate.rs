@@ -147,6 +147,11 @@ impl Coordinate {
         }
     }
 
+    /// Whether it has a time that was chosen.
+    pub(super) fn has_time(&self) -> bool {
+        self.clone().time_mut().is_some()
+    }
+
     /// The same with its time multiplied; `None` if it has none.
     pub(super) fn with_time_times(&self, factor: f64) -> Option<Self> {
         let mut other = self.clone();

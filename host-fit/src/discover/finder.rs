@@ -138,8 +138,9 @@ impl Finder<'_> {
         let gain = 1.0 - last.rmse() / base.judged.rmse();
         let p = p_value(&base.judged.held_out, &last.held_out) * looked_at as f64;
         let excess = |judged: &Judged| judge.excess(&judged.held_out);
-        let share = 1.0 - excess(last) / excess(&base.judged).max(f64::MIN_POSITIVE);
-        let little = judge.over_noise(1.0).is_finite() && share < RULES.least_share;
+        let of_excess =
+            |judged: &Judged| 1.0 - excess(judged) / excess(&without.judged).max(f64::MIN_POSITIVE);
+        let little = judge.over_noise(1.0).is_finite() && of_excess(last) < RULES.least_share;
         if gain < RULES.worthwhile
             || p >= RULES.level
             || little
@@ -178,7 +179,7 @@ impl Finder<'_> {
         let resembles = direction.map_or_else(Vec::new, |direction| {
             self.resembling(context.screen(), &direction)
         });
-        let taken = 1.0 - excess(&with.judged) / excess(&without.judged).max(f64::MIN_POSITIVE);
+        let taken = of_excess(&with.judged);
         Some(Found {
             curve: term.clone(),
             errors,

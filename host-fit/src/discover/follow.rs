@@ -45,9 +45,10 @@ impl Candidate {
         })
     }
 
-    /// ln of the held-out error, and the price of the model's parameters.
+    /// ln of the held-out error, and the price of the model's parameters and of the time that was chosen.
     pub(super) fn size(&self) -> f64 {
-        self.judged().size()
+        let chosen = self.term.coordinate.has_time();
+        self.judged().size() + if chosen { terms::RULES.price } else { 0.0 }
     }
 
     fn place(&self) -> Place {
@@ -200,10 +201,13 @@ impl Finder<'_> {
             let Some(other) = self.another_coordinate(&last, number) else {
                 break;
             };
-            if other.size() >= last.size() || other.size() > reach {
+            if other.size() > last.size() - RULES.twins || other.size() > reach {
                 break;
             }
-            last = Candidate::of(other.term, self.search.run(other.with, || None).best);
+            let with = self.search.run(other.with.clone(), || None).best;
+            let followed = Candidate::of(other.term.clone(), with);
+            let better = followed.size() < other.size();
+            last = if better { followed } else { other };
             settled = Some(last.clone());
         }
         settled

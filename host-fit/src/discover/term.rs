@@ -341,3 +341,50 @@ impl Term {
         own.map_or_else(|| self.clone(), |own| self.with_values(&own.parameters))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curve(x: &[f64], g: &[f64], pinned: Option<usize>) -> Term {
+        Term {
+            entry: Entry::Sensitivity,
+            coordinate: Coordinate::Time,
+            shape: Shape::Points {
+                x: x.to_vec(),
+                g: g.to_vec(),
+                pinned,
+            },
+            on: 0.5,
+            shift: 0.0,
+            time: 1.0,
+            number: 1,
+        }
+    }
+
+    #[test]
+    fn a_curve_gets_points_where_it_is_steepest_beyond_its_errors() {
+        let x: Vec<f64> = (0..8).map(f64::from).collect();
+        let g = [0.0, 0.01, 0.0, 0.0, 0.0, -0.2, -0.2, -0.5];
+        // The last value is hardly known.
+        let errors = [0.01, 0.01, 0.01, 0.01, 0.0, 0.01, 0.01, 0.3];
+        let finer = curve(&x, &g, Some(4)).finer(&errors).expect("a curve");
+        let Shape::Points { x, g, pinned } = &finer.shape else {
+            panic!("a curve stays one");
+        };
+        assert_eq!(x.len(), RULES.most_points);
+        assert_eq!(x[4..9], [4.0, 4.25, 4.5, 4.75, 5.0]);
+        assert!((g[6] + 0.1).abs() < 1e-12);
+        assert_eq!(*pinned, Some(4));
+        // The next time, points on a line with their neighbours make room, the pinned one and the ends never.
+        let errors = [0.0; 11];
+        let finest = finer.finer(&errors).expect("a curve");
+        let Shape::Points { x, g, pinned } = &finest.shape else {
+            panic!("a curve stays one");
+        };
+        assert_eq!(x.len(), RULES.most_points);
+        assert_eq!((x[0], x[10]), (0.0, 7.0));
+        assert!(x.windows(2).all(|pair| pair[0] < pair[1]));
+        assert_eq!(pinned.map(|i| (x[i], g[i])), Some((4.0, 0.0)));
+    }
+}

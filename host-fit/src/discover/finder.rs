@@ -192,6 +192,7 @@ impl Finder<'_> {
             resembles,
             alike,
             rivals,
+            beside: Vec::new(),
             stability,
         })
     }
@@ -224,9 +225,7 @@ impl Finder<'_> {
         }
         let (mut models, mut names) = (vec![model.clone()], vec![found[index].term.name()]);
         for rival in &found[index].rivals {
-            // As curves: what came before it had no formulas yet.
-            let before = found[..index].iter().map(|found| &found.curve);
-            let terms: Vec<&Term> = before.chain([&rival.term]).collect();
+            let terms: Vec<&Term> = found[index].beside.iter().chain([&rival.term]).collect();
             models.push(self.outer(rival.with.judged.model(), &terms).0);
             names.push(rival.term.name());
         }
@@ -260,18 +259,41 @@ impl Finder<'_> {
     ) -> (Vec<Found>, Hypothesis) {
         let mut told = Vec::new();
         for mut found in found {
-            if let Some((term, judged)) = self.formula(&found.curve, &current.judged) {
-                let excess = |held_out: &HeldOut| self.search.judge.excess(held_out);
-                let without = excess(&found.without.held_out).max(f64::MIN_POSITIVE);
-                // Other terms may have come since: what the formula loses, it loses here.
-                let lost = excess(&judged.held_out) - excess(&current.judged.held_out);
-                found.formula_taken = found.taken - lost / without;
-                found.term = term;
-                current = Hypothesis::new(judged);
+            if let Some((term, judged)) = self.formula_of(&found, &current) {
+                self.tell(&mut found, term, &judged, &mut current);
             }
             told.push(found);
         }
         (told, current)
+    }
+
+    /// A term as a formula at once where that is better than its curve: what straight lines leave of something smooth
+    /// is no other term.
+    pub(super) fn better_as_formula(&self, found: &mut Found, current: &mut Hypothesis) {
+        if let Some((term, judged)) = self.formula_of(found, current)
+            && judged.size() < current.judged.size()
+        {
+            self.tell(found, term, &judged, current);
+        }
+    }
+
+    /// The formula of a term that is told as a curve yet.
+    fn formula_of(&self, found: &Found, current: &Hypothesis) -> Option<(Term, Judged)> {
+        let is_curve = matches!(found.term.shape, Shape::Points { .. });
+        let formula = is_curve.then(|| self.formula(&found.curve, &current.judged));
+        formula.flatten()
+    }
+
+    fn tell(&self, found: &mut Found, term: Term, judged: &Judged, current: &mut Hypothesis) {
+        let excess = |held_out: &HeldOut| self.search.judge.excess(held_out);
+        let without = excess(&found.without.held_out).max(f64::MIN_POSITIVE);
+        // Other terms may have come since: what the formula loses, it loses here.
+        let lost = excess(&judged.held_out) - excess(&current.judged.held_out);
+        found.formula_taken = found.taken - lost / without;
+        found.term = term;
+        let terms = std::mem::take(&mut current.terms);
+        *current = Hypothesis::new(judged.clone());
+        current.terms = terms;
     }
 
     /// The shortest formula that does as well as a curve that is part of a model.

@@ -30,6 +30,7 @@ use crate::diagnose::{DiagnoseError, Rung};
 use crate::model::Model;
 use crate::terms::{Bench, Found as Searched, Hypothesis, Known, Search};
 use finder::{Finder, size};
+use outcome::Found;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
 use term::Term;
@@ -164,11 +165,18 @@ pub fn discover(
         let next = finder.next(&contexts, &current, found.len() + 1);
         looked_at += next.looked_at;
         smallest.get_or_insert(next.smallest);
-        let Some(term) = next.found else { break };
+        let Some(mut term) = next.found else { break };
+        term.beside = found
+            .iter()
+            .map(|before: &Found| before.term.clone())
+            .collect();
         current = term.with.clone();
         names.push(term.term.name());
         let step = format!("with {}", term.term.name());
         ladder.push(rung(&current, &names, &step));
+        if missing(current.judged.rmse()) && found.len() + 1 < options.terms {
+            finder.better_as_formula(&mut term, &mut current);
+        }
         contexts = vec![current.clone()];
         found.push(term);
         if !missing(current.judged.rmse()) {

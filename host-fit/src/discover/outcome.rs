@@ -134,8 +134,10 @@ pub(super) struct Found {
     pub(super) formula_taken: f64,
     pub(super) resembles: Vec<String>,
     pub(super) alike: Vec<Alike>,
-    /// Those.
+    /// Those, in models …
     pub(super) rivals: Vec<Candidate>,
+    /// … that have these terms, found before, as well.
+    pub(super) beside: Vec<Term>,
     /// Share of the resamples in which it, or one like it, is the best.
     pub(super) stability: f64,
 }

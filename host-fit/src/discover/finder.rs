@@ -1,19 +1,16 @@
-//! From screened curves to a term, and from its curve to a formula.
+//! From screened curves to a term that counts, with what else it could be.
 
-use super::follow::{Candidate, best, diverse};
-use super::formula::FORMS;
+use super::candidate::{Candidate, best};
 use super::outcome::{Alike, Found, Smallest, coordinate_words};
 use super::place::Entry;
-use super::screening::{Context, Screened, reference};
-use super::term::{Shape, Term};
+use super::screening::{Context, Screened, diverse, reference};
+use super::term::Term;
 use super::{Options, RULES};
 use crate::experiment::Separation;
-use crate::fit::Fit;
 use crate::model::Model;
 use crate::terms::{
-    self, HeldOut, Hypothesis, Judged, Screen, Search, Table, Units, is_out, p_value, shares_won,
+    HeldOut, Hypothesis, Judged, Screen, Search, Table, Units, is_out, p_value, shares_won,
 };
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 
@@ -22,11 +19,6 @@ pub(super) struct Round {
     pub(super) found: Option<Found>,
     pub(super) looked_at: usize,
     pub(super) smallest: BTreeMap<String, Smallest>,
-}
-
-/// ln of the held-out error, and the price of the model's parameters.
-pub(super) fn size(hypothesis: &Hypothesis) -> f64 {
-    hypothesis.judged.size()
 }
 
 /// The search for terms and what it works on.
@@ -77,7 +69,7 @@ impl Finder<'_> {
             let term = last.term.in_model(last.with.judged.model());
             let bare = term.taken_from(last.with.judged.model());
             let reference = reference(&term.coordinate, &judge.learning(0));
-            let finer = term.finer(&errors(&term, &last.with.judged.fits[0]));
+            let finer = term.finer(&term.errors(&last.with.judged.fits[0]));
             let finer = finer.and_then(|finer| {
                 let with = finer.added_to(&bare, reference)?;
                 let mut hypothesis = Hypothesis::new(judge.refitted(&with).ok()?);
@@ -174,7 +166,7 @@ impl Finder<'_> {
         }
         let Candidate { term, with, .. } = found;
         let term = term.in_model(with.judged.model());
-        let errors = errors(&term, &with.judged.fits[0]);
+        let errors = term.errors(&with.judged.fits[0]);
         let direction = context.direction(&term);
         let resembles = direction.map_or_else(Vec::new, |direction| {
             self.resembling(context.screen(), &direction)
@@ -249,134 +241,9 @@ impl Finder<'_> {
         }
         names
     }
-
-    /// The terms with formulas where one does as well as the curve, and the model with
-    /// them.
-    pub(super) fn formulas(
-        &self,
-        found: Vec<Found>,
-        mut current: Hypothesis,
-    ) -> (Vec<Found>, Hypothesis) {
-        let mut told = Vec::new();
-        for mut found in found {
-            if let Some((term, judged)) = self.formula_of(&found, &current) {
-                self.tell(&mut found, term, &judged, &mut current);
-            }
-            told.push(found);
-        }
-        (told, current)
-    }
-
-    /// A term as a formula at once where that is better than its curve: what straight lines leave of something smooth
-    /// is no other term.
-    pub(super) fn better_as_formula(&self, found: &mut Found, current: &mut Hypothesis) {
-        if let Some((term, judged)) = self.formula_of(found, current)
-            && judged.size() < current.judged.size()
-        {
-            self.tell(found, term, &judged, current);
-        }
-    }
-
-    /// The formula of a term that is told as a curve yet.
-    fn formula_of(&self, found: &Found, current: &Hypothesis) -> Option<(Term, Judged)> {
-        let is_curve = matches!(found.term.shape, Shape::Points { .. });
-        let formula = is_curve.then(|| self.formula(&found.curve, &current.judged));
-        formula.flatten()
-    }
-
-    fn tell(&self, found: &mut Found, term: Term, judged: &Judged, current: &mut Hypothesis) {
-        let excess = |held_out: &HeldOut| self.search.judge.excess(held_out);
-        let without = excess(&found.without.held_out).max(f64::MIN_POSITIVE);
-        // Other terms may have come since: what the formula loses, it loses here.
-        let lost = excess(&judged.held_out) - excess(&current.judged.held_out);
-        found.formula_taken = found.taken - lost / without;
-        found.term = term;
-        let terms = std::mem::take(&mut current.terms);
-        *current = Hypothesis::new(judged.clone());
-        current.terms = terms;
-    }
-
-    /// The shortest formula that does as well as a curve that is part of a model.
-    pub(super) fn formula(&self, curve: &Term, with_curve: &Judged) -> Option<(Term, Judged)> {
-        let judge = self.search.judge;
-        let model = with_curve.model();
-        let curve = curve.in_model(model);
-        let errors = errors(&curve, &with_curve.fits[0]);
-        let Shape::Points { x, g, pinned } = &curve.shape else {
-            return None;
-        };
-        let typical = {
-            let mut sizes = errors.clone();
-            sizes.sort_by(f64::total_cmp);
-            sizes.get(sizes.len() / 2).copied().unwrap_or(1.0).max(1e-9)
-        };
-        let weights: Vec<f64> = errors.iter().map(|e| 1.0 / e.max(typical)).collect();
-        let base = curve.taken_from(model);
-        let reference = reference(&curve.coordinate, &judge.learning(0));
-        let range = [*x.first()?, *x.last()?];
-        let forms: Vec<_> = FORMS
-            .iter()
-            .filter(|form| !(pinned.is_some() && form.has_level()))
-            .collect();
-        let fits = forms.into_par_iter().filter_map(|form| {
-            let (parameters, _) = form.nearest(x, g, &weights, pinned.is_some())?;
-            let formula = |fading: Option<f64>| Term {
-                shape: Shape::Formula {
-                    form,
-                    parameters: parameters.clone(),
-                    range,
-                    fading,
-                },
-                ..curve.clone()
-            };
-            let refitted = |term: Term| {
-                let with = term.added_to(&base, reference)?;
-                let judged = judge.refitted(&with).ok()?;
-                Some((term.in_model(judged.model()), judged))
-            };
-            let plain = refitted(formula(None));
-            let faded = curve
-                .coordinate
-                .fading()
-                .and_then(|t| refitted(formula(Some(t))));
-            let least = |judged: &Judged| terms::size(judged.rmse(), judged.model());
-            match (plain, faded) {
-                (Some(a), Some(b)) if least(&b.1) < least(&a.1) => Some(b),
-                (Some(a), _) => Some(a),
-                (None, b) => b,
-            }
-        });
-        let mut fits: Vec<(Term, Judged)> = fits.collect();
-        fits.retain(|(_, judged)| {
-            judged.rmse() <= (1.0 + RULES.formula) * with_curve.rmse()
-                || p_value(&judged.held_out, &with_curve.held_out) >= RULES.level
-        });
-        fits.into_iter().min_by(|a, b| {
-            terms::size(a.1.rmse(), a.1.model()).total_cmp(&terms::size(b.1.rmse(), b.1.model()))
-        })
-    }
 }
 
 /// Whether a model is as good as a better one, for all that the records say.
 fn is_as_good(worse: &HeldOut, better: &HeldOut) -> bool {
     worse.rmse() <= (1.0 + RULES.alike) * better.rmse() || p_value(worse, better) >= RULES.level
-}
-
-/// Standard errors of a curve's values, 0 where it is pinned.
-fn errors(term: &Term, fitted: &Fit) -> Vec<f64> {
-    let Shape::Points { g, pinned, .. } = &term.shape else {
-        return Vec::new();
-    };
-    let coordinates = fitted.model.coordinates();
-    let name = term.name();
-    let error = |i: usize| {
-        if Some(i) == *pinned {
-            return 0.0;
-        }
-        let full = format!("{name}.g{i}");
-        let index = coordinates.iter().position(|c| c.name == full);
-        let known = index.and_then(|index| fitted.standard_error(index));
-        known.unwrap_or(f64::INFINITY)
-    };
-    (0..g.len()).map(error).collect()
 }

@@ -2,72 +2,17 @@
 //! coordinate chosen anew beside those.
 
 use super::RULES;
+use super::candidate::{Candidate, best, best_of_each_place};
 use super::finder::Finder;
 use super::place::{Entry, Place};
-use super::screening::{Context, Screened, reference};
+use super::screening::{Context, Screened, diverse, reference};
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit};
 use crate::model::Model;
-use crate::terms::{self, Hypothesis, Judged};
+use crate::terms::{self, Hypothesis};
 use model_core::recursion::Grading;
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
-
-/// A term and the model with it, fitted to the end.
-#[derive(Clone)]
-pub(super) struct Candidate {
-    /// Its curve.
-    pub(super) term: Term,
-    pub(super) with: Hypothesis,
-    /// The same as a formula, where one was looked for and does as well.
-    pub(super) formula: Option<(Term, Judged)>,
-}
-
-impl Candidate {
-    fn of(term: Term, with: Hypothesis) -> Self {
-        Self {
-            term,
-            with,
-            formula: None,
-        }
-    }
-
-    /// As a curve or as a formula, whichever is better: what is smooth, straight lines leave some of.
-    pub(super) fn judged(&self) -> &Judged {
-        let curve = &self.with.judged;
-        let formula = self.formula.iter().map(|(_, judged)| judged);
-        formula.fold(curve, |best, other| {
-            if other.size() < best.size() {
-                other
-            } else {
-                best
-            }
-        })
-    }
-
-    /// ln of the held-out error, and the price of the model's parameters and of the time that was chosen.
-    pub(super) fn size(&self) -> f64 {
-        let chosen = self.term.coordinate.has_time();
-        self.judged().size() + if chosen { terms::RULES.price } else { 0.0 }
-    }
-
-    fn place(&self) -> Place {
-        self.term.entry.place()
-    }
-
-    /// While it blows, the length of this pulse is the time since its edge.
-    fn is_twin(&self, other: &Self) -> bool {
-        let ratio = self.with.judged.rmse() / other.with.judged.rmse();
-        self.term.entry == other.term.entry && ratio - 1.0 < RULES.twins
-    }
-}
-
-/// The best of some, taken from them.
-pub(super) fn best(all: &mut Vec<Candidate>) -> Option<Candidate> {
-    let smaller = |a: &usize, b: &usize| all[*a].size().total_cmp(&all[*b].size());
-    let index = (0..all.len()).min_by(smaller)?;
-    Some(all.swap_remove(index))
-}
 
 /// A term beside a base, followed for a few steps.
 struct Tried {
@@ -139,12 +84,10 @@ impl Finder<'_> {
             all.push(followed);
         }
         progress(&format!("term {number}: its coordinate beside these lags"));
-        for candidate in best_of_each_place(&mut all) {
-            let least = all
-                .iter()
-                .map(Candidate::size)
-                .fold(f64::INFINITY, f64::min);
-            if let Some(settled) = self.settled(candidate, least, number) {
+        for index in best_of_each_place(&mut all) {
+            let least = all.iter().map(Candidate::size);
+            let least = least.fold(f64::INFINITY, f64::min);
+            if let Some(settled) = self.settled(all[index].clone(), least, number) {
                 if self.at_the_floor(&settled) {
                     return vec![settled];
                 }
@@ -152,19 +95,16 @@ impl Finder<'_> {
             }
         }
         let mut contenders = best_of_each_place(&mut all);
-        let reach = contenders
-            .first()
-            .map_or(0.0, |best| best.size() + RULES.contends.ln());
-        contenders.retain(|one| one.size() < reach);
+        let reach = all.first().map_or(0.0, Candidate::size) + RULES.contends.ln();
+        contenders.retain(|index| all[*index].size() < reach);
         if contenders.len() > 1 {
             progress(&format!(
                 "term {number}: formulas of {} places",
                 contenders.len()
             ));
-            all.extend(contenders.into_iter().map(|one| Candidate {
-                formula: self.formula(&one.term, &one.with.judged),
-                ..one
-            }));
+            for index in contenders {
+                all[index].formula = self.formula(&all[index].term, &all[index].with.judged);
+            }
         }
         all
     }
@@ -221,7 +161,7 @@ impl Finder<'_> {
         let there = Entry::ALL
             .into_iter()
             .filter(|entry| entry.place() == place);
-        let others = context.finer(&there.collect::<Vec<_>>());
+        let others = context.closer(&there.collect::<Vec<_>>());
         let others = diverse(others, RULES.tried_leaner);
         best(&mut self.refitted(&without, others))
     }
@@ -304,30 +244,6 @@ impl Finder<'_> {
         });
         finished.collect()
     }
-}
-
-/// The best of each place, the best first.
-fn best_of_each_place(all: &mut [Candidate]) -> Vec<Candidate> {
-    all.sort_by(|a, b| a.size().total_cmp(&b.size()));
-    let mut best: Vec<Candidate> = Vec::new();
-    for one in all {
-        if best.iter().all(|other| other.place() != one.place()) {
-            best.push(one.clone());
-        }
-    }
-    best
-}
-
-/// The first so many, no more of a kind than rules allow.
-pub(super) fn diverse(all: Vec<Screened>, most: usize) -> Vec<Screened> {
-    let mut kept: Vec<Screened> = Vec::new();
-    for one in all {
-        let of_a_kind = kept.iter().filter(|other| other.term.is_like(&one.term));
-        if kept.len() < most && of_a_kind.count() < RULES.of_a_kind {
-            kept.push(one);
-        }
-    }
-    kept
 }
 
 #[cfg(test)]

@@ -8,10 +8,12 @@
 //! and what is left on held-out records decides. A term has to beat the best base
 //! without it, with all curves that were looked at as alternatives.
 
+mod candidate;
 mod coordinate;
 mod finder;
 mod follow;
 mod formula;
+mod formulas;
 mod outcome;
 mod place;
 mod rules;
@@ -29,7 +31,7 @@ use crate::data::Record;
 use crate::diagnose::{DiagnoseError, Rung};
 use crate::model::Model;
 use crate::terms::{Bench, Found as Searched, Hypothesis, Known, Search};
-use finder::{Finder, size};
+use finder::Finder;
 use outcome::Found;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -92,7 +94,9 @@ fn halfway(found: &Searched) -> Option<Hypothesis> {
     let most = found.best.terms.len() / 2;
     let all = found.all.iter();
     let leaner = all.filter(|other| (1..=most).contains(&other.terms.len()));
-    leaner.min_by(|a, b| size(a).total_cmp(&size(b))).cloned()
+    leaner
+        .min_by(|a, b| a.judged.size().total_cmp(&b.judged.size()))
+        .cloned()
 }
 
 /// Looks for the terms that `given` lacks on `records`. `progress` is told what is
@@ -148,7 +152,7 @@ pub fn discover(
     let half = halfway(&found);
     let last = after_another_law(&found.best);
     let bases = leanest.iter().cloned().chain(given).chain([found.best]);
-    let by_size = |a: &Hypothesis, b: &Hypothesis| size(a).total_cmp(&size(b));
+    let by_size = |a: &Hypothesis, b: &Hypothesis| a.judged.size().total_cmp(&b.judged.size());
     let base = bases.chain(last).min_by(by_size).unwrap_or(root);
     ladder.push(rung(&base, &[], "the best base without a new term"));
     let mut current = base.clone();
@@ -156,7 +160,7 @@ pub fn discover(
     let leaner = half.into_iter().chain(leanest);
     let missing = |rmse: f64| judge.over_noise(rmse) > crate::terms::RULES.at_the_floor;
     if missing(base.judged.rmse()) {
-        contexts.extend(leaner.filter(|leaner| size(leaner) > size(&base)));
+        contexts.extend(leaner.filter(|leaner| leaner.judged.size() > base.judged.size()));
     }
     let mut found = Vec::new();
     let mut smallest = None;

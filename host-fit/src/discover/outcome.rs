@@ -1,6 +1,6 @@
 //! What a discovery hands over.
 
-use super::follow::Candidate;
+use super::candidate::Candidate;
 use super::place::{Entry, Place};
 use super::term::{Shape, Term};
 use super::trace::Trace;

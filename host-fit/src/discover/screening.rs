@@ -149,16 +149,23 @@ impl<'a> Context<'a> {
     }
 
     /// The same with times in smaller steps.
-    pub(super) fn finer(&self, entries: &[Entry]) -> Vec<Screened> {
+    pub(super) fn closer(&self, entries: &[Entry]) -> Vec<Screened> {
+        let mut all = self.coordinates();
+        let between: Vec<_> = all
+            .iter()
+            .flat_map(|one| self.times(one, &BETWEEN))
+            .collect();
+        all.extend(between);
+        self.curves(all, entries)
+    }
+
+    /// A coordinate with its time multiplied by each of these, where the records are long enough.
+    fn times(&self, coordinate: &Coordinate, factors: &[f64]) -> Vec<Coordinate> {
         let longest = remembered(self.longest);
-        let all = self.coordinates().into_iter().flat_map(|coordinate| {
-            let between = |factor: &f64| coordinate.with_time_times(*factor);
-            let times: Vec<Coordinate> = BETWEEN.iter().filter_map(between).collect();
-            let possible = |other: &Coordinate| other.fading().is_some() || other.fits(longest);
-            let times = times.into_iter().filter(possible);
-            std::iter::once(coordinate).chain(times).collect::<Vec<_>>()
-        });
-        self.curves(all.collect(), entries)
+        let others = factors
+            .iter()
+            .filter_map(|factor| coordinate.with_time_times(*factor));
+        others.filter(|other| other.fits(longest)).collect()
     }
 
     fn coordinates(&self) -> Vec<Coordinate> {
@@ -172,11 +179,7 @@ impl<'a> Context<'a> {
 
     /// The same term with its time nearby.
     pub(super) fn near(&self, term: &Term) -> Vec<Screened> {
-        let longest = remembered(self.longest);
-        let other = |factor: &f64| term.coordinate.with_time_times(*factor);
-        let nearby = NEARBY.iter().filter_map(other);
-        let possible = nearby.filter(|other| other.fading().is_some() || other.fits(longest));
-        self.curves(possible.collect(), &[term.entry])
+        self.curves(self.times(&term.coordinate, &NEARBY), &[term.entry])
     }
 
     /// What a term changes in the free run, to first order.
@@ -262,4 +265,16 @@ impl<'a> Context<'a> {
             term,
         })
     }
+}
+
+/// The first so many, no more of a kind than rules allow.
+pub(super) fn diverse(all: Vec<Screened>, most: usize) -> Vec<Screened> {
+    let mut kept: Vec<Screened> = Vec::new();
+    for one in all {
+        let of_a_kind = kept.iter().filter(|other| other.term.is_like(&one.term));
+        if kept.len() < most && of_a_kind.count() < RULES.of_a_kind {
+            kept.push(one);
+        }
+    }
+    kept
 }

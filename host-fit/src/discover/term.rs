@@ -4,6 +4,7 @@ use super::RULES;
 use super::coordinate::{Coordinate, FADING};
 use super::formula::Form;
 use super::place::Entry;
+use crate::fit::Fit;
 use crate::model::Model;
 use crate::terms::Units;
 use crate::user_effect::{Definition, DefinitionError};
@@ -59,6 +60,37 @@ impl Term {
     /// Whether both enter alike and depend on the same but for a time.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         self.entry == other.entry && self.coordinate.slug() == other.coordinate.slug()
+    }
+
+    /// Whether it depends on a time that was chosen, and is none of its parameters.
+    pub(super) fn has_chosen_time(&self) -> bool {
+        let is_fitted = matches!(
+            &self.shape,
+            Shape::Formula {
+                fading: Some(_),
+                ..
+            }
+        );
+        self.coordinate.has_time() && !is_fitted
+    }
+
+    /// Standard errors of the values of a curve that is part of a fitted model, 0 where it is pinned.
+    pub(super) fn errors(&self, fitted: &Fit) -> Vec<f64> {
+        let Shape::Points { g, pinned, .. } = &self.shape else {
+            return Vec::new();
+        };
+        let coordinates = fitted.model.coordinates();
+        let name = self.name();
+        let error = |i: usize| {
+            if Some(i) == *pinned {
+                return 0.0;
+            }
+            let full = format!("{name}.g{i}");
+            let index = coordinates.iter().position(|c| c.name == full);
+            let known = index.and_then(|index| fitted.standard_error(index));
+            known.unwrap_or(f64::INFINITY)
+        };
+        (0..g.len()).map(error).collect()
     }
 
     /// The name of its effect.
@@ -184,8 +216,8 @@ impl Term {
         self.parameters().iter().map(|p| p.value).collect()
     }
 
-    /// The same curve with more points where it is steepest beyond its standard `errors`, and without those that are on a line with their
-    /// neighbours where they would be too many; `None` if it is none.
+    /// The same curve with more points where it is steepest beyond its standard `errors`, and without those that are
+    /// on a line with their neighbours where they would be too many; `None` if it is none.
     pub(super) fn finer(&self, errors: &[f64]) -> Option<Self> {
         let Shape::Points { x, g, pinned } = &self.shape else {
             return None;

@@ -16,8 +16,8 @@ pub struct Separation {
 }
 
 impl Separation {
-    /// The command that tells the first of `models` and the others apart at noise of `noise_rmse`; `None` if there are
-    /// no others, or no command does.
+    /// The command that tells the first of `models` and the others apart within the default [`Limits`], at a noise of
+    /// `noise_rmse` (y, 0 or more); `None` if there are no others, or no command does.
     #[must_use]
     pub fn of(
         models: Vec<Model>,

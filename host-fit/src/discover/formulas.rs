@@ -1,0 +1,116 @@
+//! From a term's curve to its formula.
+
+use super::RULES;
+use super::finder::Finder;
+use super::formula::FORMS;
+use super::outcome::Found;
+use super::screening::reference;
+use super::term::{Shape, Term};
+use crate::terms::{HeldOut, Hypothesis, Judged, p_value};
+use rayon::prelude::*;
+
+impl Finder<'_> {
+    /// The terms with formulas where one does as well as the curve, and the model with
+    /// them.
+    pub(super) fn formulas(
+        &self,
+        found: Vec<Found>,
+        mut current: Hypothesis,
+    ) -> (Vec<Found>, Hypothesis) {
+        let mut told = Vec::new();
+        for mut found in found {
+            if let Some((term, judged)) = self.formula_of(&found, &current) {
+                self.tell(&mut found, term, &judged, &mut current);
+            }
+            told.push(found);
+        }
+        (told, current)
+    }
+
+    /// A term as a formula at once where that is better than its curve: what straight lines leave of something smooth
+    /// is no other term.
+    pub(super) fn better_as_formula(&self, found: &mut Found, current: &mut Hypothesis) {
+        if let Some((term, judged)) = self.formula_of(found, current)
+            && judged.size() < current.judged.size()
+        {
+            self.tell(found, term, &judged, current);
+        }
+    }
+
+    /// The formula of a term that is told as a curve yet.
+    fn formula_of(&self, found: &Found, current: &Hypothesis) -> Option<(Term, Judged)> {
+        let is_curve = matches!(found.term.shape, Shape::Points { .. });
+        let formula = is_curve.then(|| self.formula(&found.curve, &current.judged));
+        formula.flatten()
+    }
+
+    fn tell(&self, found: &mut Found, term: Term, judged: &Judged, current: &mut Hypothesis) {
+        let excess = |held_out: &HeldOut| self.search.judge.excess(held_out);
+        let without = excess(&found.without.held_out).max(f64::MIN_POSITIVE);
+        // Other terms may have come since: what the formula loses, it loses here.
+        let lost = excess(&judged.held_out) - excess(&current.judged.held_out);
+        found.formula_taken = found.taken - lost / without;
+        found.term = term;
+        let terms = std::mem::take(&mut current.terms);
+        *current = Hypothesis::new(judged.clone());
+        current.terms = terms;
+    }
+
+    /// The shortest formula that does as well as a curve that is part of a model.
+    pub(super) fn formula(&self, curve: &Term, with_curve: &Judged) -> Option<(Term, Judged)> {
+        let judge = self.search.judge;
+        let model = with_curve.model();
+        let curve = curve.in_model(model);
+        let errors = curve.errors(&with_curve.fits[0]);
+        let Shape::Points { x, g, pinned } = &curve.shape else {
+            return None;
+        };
+        let typical = {
+            let mut sizes = errors.clone();
+            sizes.sort_by(f64::total_cmp);
+            sizes.get(sizes.len() / 2).copied().unwrap_or(1.0).max(1e-9)
+        };
+        let weights: Vec<f64> = errors.iter().map(|e| 1.0 / e.max(typical)).collect();
+        let base = curve.taken_from(model);
+        let reference = reference(&curve.coordinate, &judge.learning(0));
+        let range = [*x.first()?, *x.last()?];
+        let forms: Vec<_> = FORMS
+            .iter()
+            .filter(|form| !(pinned.is_some() && form.has_level()))
+            .collect();
+        let fits = forms.into_par_iter().filter_map(|form| {
+            let (parameters, _) = form.nearest(x, g, &weights, pinned.is_some())?;
+            let formula = |fading: Option<f64>| Term {
+                shape: Shape::Formula {
+                    form,
+                    parameters: parameters.clone(),
+                    range,
+                    fading,
+                },
+                ..curve.clone()
+            };
+            let refitted = |term: Term| {
+                let with = term.added_to(&base, reference)?;
+                let judged = judge.refitted(&with).ok()?;
+                Some((term.in_model(judged.model()), judged))
+            };
+            let plain = refitted(formula(None));
+            let faded = curve
+                .coordinate
+                .fading()
+                .and_then(|t| refitted(formula(Some(t))));
+            match (plain, faded) {
+                (Some(a), Some(b)) if b.1.size() < a.1.size() => Some(b),
+                (Some(a), _) => Some(a),
+                (None, b) => b,
+            }
+        });
+        let mut fits: Vec<(Term, Judged)> = fits.collect();
+        fits.retain(|(_, judged)| {
+            judged.rmse() <= (1.0 + RULES.formula) * with_curve.rmse()
+                || p_value(&judged.held_out, &with_curve.held_out) >= RULES.level
+        });
+        fits.into_iter()
+            .min_by(|a, b| a.1.size().total_cmp(&b.1.size()))
+    }
+}

@@ -26,6 +26,8 @@ pub(super) struct Finder<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) units: &'a Units,
     pub(super) options: &'a Options,
+    /// Whether the sensor's zero is not the same in all records.
+    pub(super) zero_moves: bool,
 }
 
 impl Finder<'_> {
@@ -128,16 +130,20 @@ impl Finder<'_> {
         let found = self.finer(best(&mut all)?);
         let last = found.judged();
         let gain = 1.0 - last.rmse() / base.judged.rmse();
-        let p = p_value(&base.judged.held_out, &last.held_out) * looked_at as f64;
         let excess = |judged: &Judged| judge.excess(&judged.held_out);
         let of_excess =
             |judged: &Judged| 1.0 - excess(judged) / excess(&without.judged).max(f64::MIN_POSITIVE);
         let little = judge.over_noise(1.0).is_finite() && of_excess(last) < RULES.least_share;
-        if gain < RULES.worthwhile
-            || p >= RULES.level
-            || little
-            || judge.drifts_more(last, &base.judged)
-        {
+        // What is the same all through a record tells records apart, and imitates a zero that moves between them.
+        let least = (1.0 - RULES.worthwhile).powi(2);
+        let is_zero = self.zero_moves
+            && last.held_out.about_the_means() > least * base.judged.held_out.about_the_means();
+        let drifts_more = judge.drifts_more(last, &base.judged);
+        if gain < RULES.worthwhile || little || is_zero || drifts_more {
+            return None;
+        }
+        let p = self.by_chance(base, last, looked_at, number);
+        if p >= RULES.level {
             return None;
         }
         let term = &found.term;
@@ -178,7 +184,7 @@ impl Finder<'_> {
             term,
             with,
             without: without.judged,
-            p: p.min(1.0),
+            p,
             taken,
             formula_taken: taken,
             resembles,
@@ -187,6 +193,20 @@ impl Finder<'_> {
             beside: Vec::new(),
             stability,
         })
+    }
+
+    /// How often noise alone would let one of all curves do as much for `base` as the one that `with` has.
+    fn by_chance(&self, base: &Hypothesis, with: &Judged, looked_at: usize, number: usize) -> f64 {
+        let one = p_value(&base.judged.held_out, &with.held_out);
+        let at_most = one * looked_at as f64;
+        if at_most < RULES.level || one >= RULES.level {
+            return at_most.min(1.0);
+        }
+        // Most curves are much alike: that one of so many does it by chance is far less likely than all together.
+        let chance = Context::new(self.search, base.judged.model(), number)
+            .and_then(|context| context.chance(with.model(), &with.held_out));
+        let left = (with.rmse() / base.judged.rmse()).powi(2);
+        chance.map_or(1.0, |chance| chance.p_value(1.0 - left))
     }
 
     /// A model in the user's units, and its `terms`, in the order they were added.

@@ -30,7 +30,7 @@ pub use trace::{Signal, TRACED, Trace, TracedRecord};
 use crate::data::Record;
 use crate::diagnose::{DiagnoseError, Rung};
 use crate::model::Model;
-use crate::terms::{Bench, Found as Searched, Hypothesis, Known, Search};
+use crate::terms::{Bench, Found as Searched, Hypothesis, Known, MovingZero, Search};
 use finder::Finder;
 use outcome::Found;
 use serde::Serialize;
@@ -121,10 +121,12 @@ pub fn discover(
         interrupt,
         progress,
     };
+    let moving_zero = MovingZero::of(records);
     let finder = Finder {
         search: &search,
         units,
         options,
+        zero_moves: moving_zero.is_some(),
     };
     let rung = |hypothesis: &Hypothesis, terms: &[String], step: &str| {
         let held_out = &hypothesis.judged.held_out;
@@ -219,6 +221,7 @@ pub fn discover(
         looked_at,
         trace,
         separation,
+        moving_zero,
         model,
     })
 }

@@ -9,7 +9,7 @@ use crate::experiment::Separation;
 use crate::fit::Fit;
 use crate::model::Model;
 use crate::residual::NoiseSource;
-use crate::terms::{HeldOutBy, Hypothesis, Judged, Units};
+use crate::terms::{HeldOutBy, Hypothesis, Judged, MovingZero, Units};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -110,6 +110,8 @@ pub struct Discovery {
     pub trace: Option<Trace>,
     /// The command that would tell the first term that is not alone from what is like it.
     pub separation: Option<Separation>,
+    /// A zero of the sensor that is not the same in all records: a term has to do more than imitate it.
+    pub moving_zero: Option<MovingZero>,
     /// The model with the terms.
     pub model: Model,
 }

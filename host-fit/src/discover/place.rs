@@ -103,6 +103,15 @@ impl Entry {
         !matches!(self, Self::Level | Self::Reading)
     }
 
+    /// How much a sample shows of g: a jet has to blow for it, and what multiplies y shows by the square of y.
+    pub(super) fn shown_by(self, blowing: bool, y: f64) -> f64 {
+        match self {
+            Self::Jet => f64::from(u8::from(blowing)),
+            Self::Rate | Self::Sensitivity => y * y,
+            Self::Delay | Self::Level | Self::Reading => 1.0,
+        }
+    }
+
     /// The place in an effect file.
     pub(super) fn of_effect(self) -> &'static str {
         match self {

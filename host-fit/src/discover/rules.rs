@@ -46,7 +46,7 @@ rules! {
     worthwhile: f64 = 0.015, "share of the rms error", "as for effects of the catalogue";
     /// … and, where the noise floor is known, take this share of its excess at least.
     least_share: f64 = 0.25, "share of the excess", "as for the stand-ins of `diagnose`; a rig that drifted as a whole had 19 % taken by a delay";
-    /// Level of the tests; p-values are multiplied by the number of curves that were looked at.
+    /// Level of the test of the best of all curves, and of comparisons of two of them.
     level: f64 = 0.05, "p-value", "convention";
     /// Held-out errors that differ by less than this are the same for any purpose.
     alike: f64 = 0.01, "share of the rms error", "judgement: twice what is asked of effects; a curve has more freedom";

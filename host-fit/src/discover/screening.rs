@@ -7,7 +7,7 @@ use super::place::{Entry, Place};
 use super::term::{Shape, Term};
 use crate::data::Record;
 use crate::model::Model;
-use crate::terms::{Screen, Search, Tangent};
+use crate::terms::{Chance, HeldOut, Noise, Screen, Search, Tangent};
 use crate::user_effect::Definition;
 use model_core::effects::ZERO_OFFSET;
 use rayon::prelude::*;
@@ -73,12 +73,19 @@ pub(super) fn reference(coordinate: &Coordinate, records: &[&Record]) -> Option<
     Some(values().sum::<f64>() / values().count().max(1) as f64)
 }
 
-/// Where a coordinate spends equal times, and which of these places it is at most.
-fn points(mut values: Vec<f64>) -> Option<(Vec<f64>, usize)> {
-    values.retain(|x| x.is_finite());
-    values.sort_by(f64::total_cmp);
-    let last = values.len().checked_sub(1)?;
-    let at = |share: f64| values[(share * last as f64).round() as usize];
+/// Between which of its values a coordinate has equal weight, and which of these is nearest to the middle.
+fn points(mut weighted: Vec<(f64, f64)>) -> Option<(Vec<f64>, usize)> {
+    weighted.retain(|(x, weight)| x.is_finite() && *weight > 0.0);
+    weighted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut whole = 0.0;
+    let mut up_to = Vec::with_capacity(weighted.len());
+    for (_, weight) in &weighted {
+        whole += weight;
+        up_to.push(whole);
+    }
+    let last = weighted.len().checked_sub(1)?;
+    let reaching = |sum: f64| weighted[up_to.partition_point(|own| *own < sum).min(last)].0;
+    let at = |share: f64| reaching(share * whole);
     let (low, high) = (at(RULES.beyond), at(1.0 - RULES.beyond));
     if high - low <= 1e-6 * low.abs().max(high.abs()).max(1e-6) {
         return None;
@@ -86,14 +93,32 @@ fn points(mut values: Vec<f64>) -> Option<(Vec<f64>, usize)> {
     // Rests of a fraction of a second and one of ten: what is apart is a matter of place.
     let least = (0.01 * (at(0.5) - low)).max(1e-6 * (high - low));
     let count = RULES.points;
+    let are_apart = |a: f64, b: f64| b - a > (RULES.apart * (a - low)).max(least);
     let mut x: Vec<f64> = vec![low];
     for i in 1..count {
         let along = i as f64 / (count - 1) as f64;
         let place = at(RULES.beyond + along * (1.0 - 2.0 * RULES.beyond));
-        let last = x[x.len() - 1];
-        if place - last > (RULES.apart * (last - low)).max(least) {
+        if are_apart(x[x.len() - 1], place) {
             x.push(place);
         }
+    }
+    // Rests that are the same all through a record take several of them, and others lie in between.
+    let from = |x: f64| weighted.partition_point(|(own, _)| *own <= x);
+    let to = |x: f64| weighted.partition_point(|(own, _)| *own < x);
+    let before = |index: usize| index.checked_sub(1).map_or(0.0, |last| up_to[last]);
+    while x.len() < count {
+        let gaps = x.windows(2).enumerate().filter_map(|(i, ends)| {
+            let (low, high) = (before(from(ends[0])), before(to(ends[1])));
+            let middle = reaching(0.5 * (low + high));
+            let fits = high - low > RULES.beyond * whole
+                && are_apart(ends[0], middle)
+                && are_apart(middle, ends[1]);
+            fits.then_some((high - low, i, middle))
+        });
+        let Some((_, i, middle)) = gaps.max_by(|a, b| a.0.total_cmp(&b.0)) else {
+            break;
+        };
+        x.insert(i + 1, middle);
     }
     if x.len() < RULES.fewest_points {
         return None;
@@ -194,12 +219,37 @@ impl<'a> Context<'a> {
         &self.screen
     }
 
+    /// What noise alone, as `last` leaves it, would make of the best of all curves.
+    pub(super) fn chance(&self, last: &Model, held_out: &HeldOut) -> Option<Chance> {
+        let noise = Noise::new(&self.screen, last, held_out.block(), 0)?;
+        let shares = self.each(self.coordinates(), &Entry::ALL, |(term, with)| {
+            let columns = self.screen.columns(&with, &term.name())?;
+            let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+            noise.taken_together(&self.screen, &columns)
+        });
+        Some(Chance::of_all(&shares))
+    }
+
     fn curves(&self, coordinates: Vec<Coordinate>, entries: &[Entry]) -> Vec<Screened> {
+        let mut curves = self.each(coordinates, entries, |(term, with)| {
+            self.screened(term, &with)
+        });
+        curves.sort_by(|a, b| a.score.total_cmp(&b.score));
+        curves
+    }
+
+    /// What is made of every curve, and of the model with it, that the records show.
+    fn each<T: Send>(
+        &self,
+        coordinates: Vec<Coordinate>,
+        entries: &[Entry],
+        make: impl Fn((Term, Model)) -> Option<T> + Sync,
+    ) -> Vec<T> {
         let each = coordinates.into_par_iter().map(|coordinate| {
             let Some(series) = values_of(&coordinate, self.model, &self.learning) else {
                 return Vec::new();
             };
-            let screened = |entry: &Entry| {
+            let shown = |entry: &Entry| {
                 let coordinate = match (&coordinate, entry.place()) {
                     // The sensor sees the reading.
                     (Coordinate::Y, Place::Sensor) => Coordinate::Reading,
@@ -207,22 +257,24 @@ impl<'a> Context<'a> {
                 };
                 self.curve(*entry, coordinate, &series)
             };
-            entries.iter().filter_map(screened).collect::<Vec<_>>()
+            let shown = entries.iter().filter_map(shown);
+            shown.filter_map(&make).collect::<Vec<_>>()
         });
-        let mut curves: Vec<Screened> = each.flatten().collect();
-        curves.sort_by(|a, b| a.score.total_cmp(&b.score));
-        curves
+        each.flatten().collect()
     }
 
-    fn curve(&self, entry: Entry, coordinate: Coordinate, series: &[Vec<f64>]) -> Option<Screened> {
-        // A jet knows its coordinate only while it blows.
-        let of_jet = entry == Entry::Jet;
+    /// A curve of zeros over what the coordinate shows there, and the model with it.
+    fn curve(
+        &self,
+        entry: Entry,
+        coordinate: Coordinate,
+        series: &[Vec<f64>],
+    ) -> Option<(Term, Model)> {
         let pairs = series.iter().zip(&self.learning);
-        let shown: Vec<f64> = pairs
+        let shown: Vec<(f64, f64)> = pairs
             .flat_map(|(series, record)| {
-                let pairs = series.iter().zip(&record.u);
-                let kept = pairs.filter(move |(_, u)| !of_jet || **u > ON);
-                kept.map(|(x, _)| *x)
+                let samples = series.iter().zip(record.u.iter().zip(&record.y));
+                samples.map(|(x, (u, y))| (*x, entry.shown_by(*u > ON, *y)))
             })
             .collect();
         let stride = shown.len().div_ceil(SHOWN).max(1);
@@ -231,7 +283,7 @@ impl<'a> Context<'a> {
         // The sensor's zero is a constant reading.
         let zero = entry == Entry::Reading && self.model.has_effect(ZERO_OFFSET.name);
         let pinned = (zero || entry.has_free_level()).then_some(pinned);
-        let mut term = Term {
+        let term = Term {
             entry,
             coordinate,
             shape: Shape::Points {
@@ -246,23 +298,26 @@ impl<'a> Context<'a> {
         };
         let reference = reference(&term.coordinate, &self.learning);
         let with = term.added_to(self.model, reference)?;
+        Some((term, with))
+    }
+
+    fn screened(&self, term: Term, with: &Model) -> Option<Screened> {
         let Tangent {
             coefficients,
             learned,
             held_out,
             ..
-        } = self.screen.tangent(&with, &term.name())?;
+        } = self.screen.tangent(with, &term.name())?;
         let cost = coefficients.len() as f64;
         let size = (coefficients.iter().map(|c| c * c).sum::<f64>() / cost).sqrt();
         // What would have been worth it takes so much of the error.
         let wanted = 1.0 - (1.0 - RULES.worthwhile).powi(2);
         let smallest = size * (wanted / learned.max(1e-12)).sqrt();
-        term = term.with_values(&coefficients);
         Some(Screened {
             score: 0.5 * (1.0 - held_out).max(1e-6).ln() + crate::terms::RULES.price * cost,
             held_out,
             smallest,
-            term,
+            term: term.with_values(&coefficients),
         })
     }
 }
@@ -277,4 +332,26 @@ pub(super) fn diverse(all: Vec<Screened>, most: usize) -> Vec<Screened> {
         }
     }
     kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Square waves keep one rest for long; what random commands show in between gets points too, and what shows
+    /// nothing gets none.
+    #[test]
+    fn points_lie_between_rests_that_take_most_of_the_time() {
+        let mut shown = vec![(0.05, 1.0); 4000];
+        shown.extend(vec![(0.5, 1.0); 5000]);
+        shown.extend((0..800).map(|i| (0.1 + 0.0005 * f64::from(i), 1.0)));
+        shown.extend(vec![(3.0, 0.0); 1000]);
+        let (x, nearest) = points(shown).expect("a curve");
+        assert_eq!((x[0], x[x.len() - 1]), (0.05, 0.5));
+        assert_eq!(x.len(), RULES.points);
+        let between = x.windows(2).map(|ends| ends[1] - ends[0]);
+        assert!(between.fold(0.0, f64::max) < 0.15, "{x:?}");
+        assert_eq!(nearest, x.len() - 1);
+        assert!(points(vec![(0.05, 1.0); 100]).is_none());
+    }
 }

@@ -101,6 +101,9 @@ pub fn discover(
     if let Some(trace) = &discovery.trace {
         meaning += &where_it_enters(trace);
     }
+    if let Some(moving) = &discovery.moving_zero {
+        meaning += &format!(" {moving}");
+    }
     let found = discovery.terms.iter().map(|term| term.effect.clone());
     Ok(Terms {
         model: Model {

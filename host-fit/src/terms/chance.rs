@@ -9,7 +9,7 @@
 
 use super::RULES;
 use super::screen::Screen;
-use crate::linalg::dot;
+use crate::linalg::{dot, solve_symmetric};
 use crate::model::Model;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -136,6 +136,36 @@ impl Noise {
         });
         taken.collect()
     }
+
+    /// The share of the held-out energy of each draw that residualised columns take together; `None` if they are
+    /// not independent.
+    pub(crate) fn taken_together(&self, screen: &Screen, columns: &[&[f64]]) -> Option<Vec<f64>> {
+        let learned = screen.learned;
+        let square = screen.square(columns, RULES.ridge);
+        let sums: Vec<Vec<f64>> = columns.iter().map(|column| self.sums(column)).collect();
+        let columns: Vec<&[f64]> = columns.iter().map(|column| &column[learned..]).collect();
+        let with = |other: &[f64]| -> Vec<f64> {
+            let each = columns.iter().map(|column| dot(column, other));
+            each.collect()
+        };
+        let own: Vec<Vec<f64>> = columns.iter().map(|column| with(column)).collect();
+        let basis: Vec<Vec<f64>> = screen.basis.iter().map(|q| with(&q[learned..])).collect();
+        let draws = self.signs.iter().zip(&self.along).zip(&self.held_out);
+        let taken = draws.map(|((signs, along), energy)| {
+            let halves = sums.iter().map(|sums| self.halves(sums, signs, learned));
+            let (right, mut error): (Vec<f64>, Vec<f64>) = halves.unzip();
+            let scales = solve_symmetric(&square, &right)?;
+            let moved = along.iter().zip(&basis).map(|(x, with)| (2.0 * x, with));
+            let taken = scales.iter().zip(&own).map(|(x, with)| (*x, with));
+            error.iter_mut().for_each(|x| *x *= 2.0);
+            for (scale, with) in moved.chain(taken) {
+                let pairs = error.iter_mut().zip(with);
+                pairs.for_each(|(sum, x)| *sum -= scale * x);
+            }
+            Some(dot(&scales, &error) / energy.max(f64::MIN_POSITIVE))
+        });
+        taken.collect()
+    }
 }
 
 /// What noise alone would make of the best of all candidates.
@@ -171,12 +201,19 @@ impl Chance {
                 .fold(0.0, f64::max)
         };
         let draws = candidates.first().map_or(0, |(_, taken)| taken.len());
-        let mut best: Vec<f64> = (0..draws).map(best_of).collect();
+        Self::sorted((0..draws).map(best_of).collect(), candidates.len())
+    }
+
+    /// Of candidates that were all judged on what is held out: the share each takes, one a draw.
+    pub(crate) fn of_all(shares: &[Vec<f64>]) -> Self {
+        let draws = shares.first().map_or(0, Vec::len);
+        let best_of = |draw: usize| shares.iter().map(|own| own[draw]).fold(0.0, f64::max);
+        Self::sorted((0..draws).map(best_of).collect(), shares.len())
+    }
+
+    fn sorted(mut best: Vec<f64>, alternatives: usize) -> Self {
         best.sort_by(f64::total_cmp);
-        Self {
-            best,
-            alternatives: candidates.len(),
-        }
+        Self { best, alternatives }
     }
 
     /// How often noise alone lets some candidate take this share of the held-out energy, or more.
@@ -197,6 +234,8 @@ impl Chance {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::residual::plants::{base, records};
+    use crate::terms::Bench;
 
     fn taken(pairs: &[(f64, f64)]) -> Vec<Taken> {
         let each = pairs.iter().map(|(learned, held_out)| Taken {
@@ -204,6 +243,45 @@ mod tests {
             held_out: *held_out,
         });
         each.collect()
+    }
+
+    /// What columns take together of a draw is what a regression on that draw finds.
+    #[test]
+    fn columns_that_are_fitted_as_one_take_what_a_regression_finds() {
+        let records = records(&["plenum-droop"], &[], 4);
+        let model = base(&records);
+        let bench = Bench::of(&model, &records).expect("records to learn from");
+        let fitted = bench.judge.refitted(&bench.given).expect("a stable model");
+        let screen = Screen::new(&bench.judge, fitted.model()).expect("a stable model");
+        let noise = Noise::new(&screen, fitted.model(), 500, 1).expect("a stable model");
+        let columns: Vec<Vec<f64>> = [70.0, 310.0]
+            .iter()
+            .map(|period| {
+                let wave = |k: usize| (k as f64 / period).sin();
+                let mut column = (0..screen.error.len()).map(wave).collect::<Vec<_>>();
+                screen.residualise(&mut column);
+                column
+            })
+            .collect();
+        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let taken = noise
+            .taken_together(&screen, &columns)
+            .expect("two directions");
+        assert_eq!(taken.len(), RULES.draws);
+        for (signs, taken) in noise.signs.iter().zip(taken).take(20) {
+            let mut drawn = noise.error.clone();
+            for (block, sign) in noise.blocks.iter().zip(signs) {
+                drawn[block.clone()].iter_mut().for_each(|e| *e *= sign);
+            }
+            screen.residualise(&mut drawn);
+            let rest = screen.rest_of(&drawn, &columns).expect("two directions");
+            let held_out = |series: &[f64]| {
+                let own = &series[screen.learned..];
+                dot(own, own)
+            };
+            let direct = 1.0 - held_out(&rest) / held_out(&drawn);
+            assert!((taken - direct).abs() < 1e-4, "{taken} {direct}");
+        }
     }
 
     /// One draw: of three points of a kind the two that take most where they are learned

@@ -229,7 +229,7 @@ impl<'a> Screen<'a> {
     }
 
     pub(super) fn learned_square(&self, column: &[f64]) -> f64 {
-        dot(&column[..self.learned], &column[..self.learned])
+        self.product(column, column)
     }
 
     /// Takes away what the model's own parameters can do, to first order, and says how much of each
@@ -285,18 +285,27 @@ impl<'a> Screen<'a> {
 
     /// Coefficients of columns fitted to a series where it is learned.
     fn coefficients(&self, series: &[f64], columns: &[&[f64]], ridge: f64) -> Option<Vec<f64>> {
+        let products = self.square(columns, ridge);
+        let right: Vec<f64> = columns.iter().map(|c| self.product(c, series)).collect();
+        solve_symmetric(&products, &right)
+    }
+
+    fn product(&self, a: &[f64], b: &[f64]) -> f64 {
+        dot(&a[..self.learned], &b[..self.learned])
+    }
+
+    /// Products of columns with each other where it is learned, and a ridge as a share of their mean square.
+    pub(super) fn square(&self, columns: &[&[f64]], ridge: f64) -> Vec<f64> {
         let n = columns.len();
-        let learned = |a: &[f64], b: &[f64]| dot(&a[..self.learned], &b[..self.learned]);
         let mut products: Vec<f64> = (0..n * n)
-            .map(|cell| learned(columns[cell / n], columns[cell % n]))
+            .map(|cell| self.product(columns[cell / n], columns[cell % n]))
             .collect();
-        let right: Vec<f64> = columns.iter().map(|c| learned(c, series)).collect();
         let mean = (0..n).map(|i| products[i * n + i]).sum::<f64>() / n.max(1) as f64;
         for i in 0..n {
             products[i * n + i] *= 1.0 + 1e-9;
             products[i * n + i] += ridge * mean;
         }
-        solve_symmetric(&products, &right)
+        products
     }
 
     /// What columns fitted to a series leave of it.
@@ -357,9 +366,9 @@ impl<'a> Screen<'a> {
         values
     }
 
-    /// What the parameters of an effect do together, from where `other` has them: the
-    /// model with that effect, which runs as this one does. `None` if they do nothing.
-    pub(crate) fn tangent(&self, other: &Model, effect: &str) -> Option<Tangent> {
+    /// What each parameter of an effect does, from where `other` has it: the model with that effect, which runs as
+    /// this one does. `None` if it diverges.
+    pub(crate) fn columns(&self, other: &Model, effect: &str) -> Option<Vec<Vec<f64>>> {
         let coordinates = other.coordinates();
         let own = |name: &str| name.split('.').next() == Some(effect);
         let indices: Vec<usize> = (0..coordinates.len())
@@ -371,13 +380,17 @@ impl<'a> Screen<'a> {
             .map(|record| Some(sensitivities(other, record, &indices)?.1))
             .collect();
         let slopes = slopes?;
-        let columns: Vec<Vec<f64>> = (0..indices.len())
-            .map(|i| {
-                let mut column = self.joined(slopes.iter().map(|record| record[i].as_slice()));
-                self.residualise(&mut column);
-                column
-            })
-            .collect();
+        let columns = (0..indices.len()).map(|i| {
+            let mut column = self.joined(slopes.iter().map(|record| record[i].as_slice()));
+            self.residualise(&mut column);
+            column
+        });
+        Some(columns.collect())
+    }
+
+    /// What they do together; `None` if that is nothing.
+    pub(crate) fn tangent(&self, other: &Model, effect: &str) -> Option<Tangent> {
+        let columns = self.columns(other, effect)?;
         let all: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let (coefficients, learned, held_out) = self.regress_with(&all, RULES.ridge)?;
         let mut direction = vec![0.0; self.error.len()];

@@ -71,13 +71,18 @@ const fn amplitude(power: i32) -> Card {
     }
 }
 
+const fn place(name: &'static str) -> Card {
+    let kind = Kind::Place;
+    Card { name, kind }
+}
+
 const fn width(name: &'static str) -> Card {
     let kind = Kind::Width;
     Card { name, kind }
 }
 
 /// The forms, shorter ones first.
-pub(super) static FORMS: [Form; 12] = [
+pub(super) static FORMS: [Form; 14] = [
     Form {
         expression: "amplitude * {x}",
         parameters: &[amplitude(1)],
@@ -132,15 +137,23 @@ pub(super) static FORMS: [Form; 12] = [
     },
     Form {
         expression: "if {x} > threshold { amplitude } else { 0.0 }",
-        parameters: &[
-            amplitude(0),
-            Card {
-                name: "threshold",
-                kind: Kind::Place,
-            },
-        ],
+        parameters: &[amplitude(0), place("threshold")],
         amplitudes: 1,
         value: |x, p| if x > p[1] { p[0] } else { 0.0 },
+        positive: false,
+    },
+    Form {
+        expression: "amplitude * max({x} - threshold, 0.0)",
+        parameters: &[amplitude(1), place("threshold")],
+        amplitudes: 1,
+        value: |x, p| p[0] * (x - p[1]).max(0.0),
+        positive: false,
+    },
+    Form {
+        expression: "amplitude * max(threshold - {x}, 0.0)",
+        parameters: &[amplitude(1), place("threshold")],
+        amplitudes: 1,
+        value: |x, p| p[0] * (p[1] - x).max(0.0),
         positive: false,
     },
     Form {
@@ -171,14 +184,7 @@ pub(super) static FORMS: [Form; 12] = [
     },
     Form {
         expression: "amplitude / (1.0 + exp((middle - {x}) / width))",
-        parameters: &[
-            amplitude(0),
-            Card {
-                name: "middle",
-                kind: Kind::Place,
-            },
-            width("width"),
-        ],
+        parameters: &[amplitude(0), place("middle"), width("width")],
         amplitudes: 1,
         value: |x, p| p[0] / (1.0 + ((p[1] - x) / p[2]).exp()),
         positive: false,
@@ -247,11 +253,11 @@ impl Form {
             .iter()
             .map(|card| {
                 let [from, to] = card.range(1.0, [low, high]);
-                let along = |i: usize| (i as f64 + 0.5) / STEPS as f64;
-                (0..STEPS)
-                    .map(|i| match card.kind {
-                        Kind::Place => from + (to - from) * along(i),
-                        _ => from * (to / from).powf(along(i)),
+                let along = (0..STEPS).map(|i| (i as f64 + 0.5) / STEPS as f64);
+                along
+                    .map(|along| match card.kind {
+                        Kind::Place => between(x, along),
+                        _ => from * (to / from).powf(along),
                     })
                     .collect()
             })
@@ -310,6 +316,14 @@ impl Form {
     }
 }
 
+/// The point that lies so far along some: they are where a coordinate spends its time, which may span decades.
+fn between(points: &[f64], along: f64) -> f64 {
+    let index = along * (points.len() - 1) as f64;
+    let before = (index as usize).min(points.len() - 2);
+    let share = index - before as f64;
+    points[before] + share * (points[before + 1] - points[before])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -323,7 +337,9 @@ mod tests {
             (&FORMS[0], vec![0.4]),
             (&FORMS[4], vec![-0.3, 0.35]),
             (&FORMS[7], vec![0.5, 0.8]),
-            (&FORMS[8], vec![0.2, -0.4]),
+            (&FORMS[8], vec![-0.7, 0.6]),
+            (&FORMS[9], vec![0.5, 0.6]),
+            (&FORMS[10], vec![0.2, -0.4]),
         ] {
             let g: Vec<f64> = x.iter().map(|x| (form.value)(*x, &truth)).collect();
             let (found, left) = form.nearest(&x, &g, &weights, false).unwrap();

@@ -110,6 +110,8 @@ pub struct Simulator<T: Real> {
     start: Start,
     memory: Footprint,
     followed: usize,
+    /// What the sensor shows at rest: what was measured is the flow and this.
+    zero: T,
 }
 
 impl<T: Real> Simulator<T> {
@@ -127,6 +129,7 @@ impl<T: Real> Simulator<T> {
             start: model.start,
             memory,
             followed: model.warm_up(),
+            zero: model.zero_among(values),
         }
     }
 
@@ -156,7 +159,7 @@ impl<T: Real> Simulator<T> {
         let window = self.prepared.averaging().window;
         let mut channels = vec![T::ZERO; signals.channels.len()];
         if self.start == Start::Measured {
-            self.hold_first(signals, &mut state, &mut channels);
+            self.hold_first(signals, &mut state, &mut channels, self.zero);
         }
         for (k, u) in signals.u.iter().enumerate() {
             let output = self.observe(signals, &mut state, &mut channels, k, *u);
@@ -165,7 +168,7 @@ impl<T: Real> Simulator<T> {
             }
             let follows = self.start == Start::Measured && k + 1 < self.followed;
             let measured = signals.y.and_then(|y| y.get(k + 1)).filter(|_| follows);
-            let next = measured.map_or(output.next, |y| T::from_f64(*y));
+            let next = measured.map_or(output.next, |y| T::from_f64(*y) - self.zero);
             let size = next.value().abs();
             if size > bound || size.is_nan() {
                 return Some(k + 1);
@@ -184,7 +187,7 @@ impl<T: Real> Simulator<T> {
         let y = signals.y.unwrap_or(&[]);
         if let Some(first) = y.first() {
             if self.start == Start::Measured {
-                self.hold_first(signals, &mut state, &mut channels);
+                self.hold_first(signals, &mut state, &mut channels, T::ZERO);
             } else {
                 self.advance(&mut state, T::from_f64(*first), window);
             }
@@ -233,14 +236,20 @@ impl<T: Real> Simulator<T> {
     }
 
     /// Lives through the first sample until the memories are full of it.
-    fn hold_first(&self, signals: &Signals<'_>, state: &mut HostState<T>, channels: &mut [T]) {
+    fn hold_first(
+        &self,
+        signals: &Signals<'_>,
+        state: &mut HostState<T>,
+        channels: &mut [T],
+        zero: T,
+    ) {
         let (Some(u), Some(y)) = (signals.u.first(), signals.y.and_then(<[f64]>::first)) else {
             return;
         };
         let window = self.prepared.averaging().window;
         let full = self.memory.outputs.max(self.memory.jets);
         for _ in 0..full.max(self.followed) {
-            self.advance(state, T::from_f64(*y), window);
+            self.advance(state, T::from_f64(*y) - zero, window);
             self.observe(signals, state, channels, 0, *u);
         }
     }

@@ -2,6 +2,7 @@
 
 use host_fit::data::{DataSet, InputFile, Record, Use};
 use host_fit::diagnose::{Diagnosis, Options, Ranked, Verdict, diagnose};
+use host_fit::discover;
 use host_fit::fit::{FitOptions, fit};
 use host_fit::indicators::score;
 use host_fit::model::{Delay, Model, Start};
@@ -74,6 +75,46 @@ fn silverbox_lacks_a_cubic_stiffness() {
     assert_eq!(found.missing, ["amplitude-saturation"]);
     let after = found.ladder.last().expect("a rung").validate_rmse;
     assert!(after < 0.0015, "with the cubic term: {after}");
+}
+
+/// A hair dryer whose command is in volts and whose thermocouple rests at none: the model that is handed back does
+/// on the test record, in the user's units, what the search for terms says of it.
+#[test]
+fn what_discover_says_of_a_dryer_its_model_does() {
+    let period_s = 0.08;
+    let (train, test) = (
+        "hair_dryer/hair_dryer_train.csv",
+        "hair_dryer/hair_dryer_test.csv",
+    );
+    let Some((train, test)) = halves(train, test, period_s) else {
+        return;
+    };
+    let linear = second_order(period_s, 2, [1.3, -0.4], 0.1);
+    let options = FitOptions {
+        constant: true,
+        ..FitOptions::default()
+    };
+    let linear = fit(&linear, &[&train], &options)
+        .expect("a linear fit")
+        .model;
+    let before = held_out(&linear, &test);
+    let records = [train, test];
+    let options = discover::Options {
+        terms: 1,
+        ..discover::Options::default()
+    };
+    let found = discover::discover(
+        &linear,
+        &records,
+        &options,
+        &AtomicBool::new(false),
+        &|_| {},
+    );
+    let found = found.expect("records to learn from");
+    let told = found.ladder.last().expect("a rung").validate_rmse;
+    let after = held_out(&found.model, &records[1]);
+    assert!((after / told - 1.0).abs() < 0.01, "told {told}, {after}");
+    assert!(after < 0.8 * before, "{before} with {after}");
 }
 
 /// A linear model of second order, as an engineer would hand it in.

@@ -44,6 +44,13 @@ pub enum DiagnoseError {
     /// The model cannot be run on the data.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
+    /// What was found reads the command as a share of a full jet, and a full jet is another command than 1.
+    #[error(
+        "the largest command of the records is {0:.3}, and what was found means something else there than for commands \
+         up to 1; nothing was written. Scale the command (`import --u-scale {scale:.4}`), identify and search again.",
+        scale = 1.0 / .0
+    )]
+    FullJet(f64),
     /// The user stopped it.
     #[error("the diagnosis was interrupted before it had a result; nothing was written.")]
     Interrupted,

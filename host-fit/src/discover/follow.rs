@@ -10,7 +10,6 @@ use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit};
 use crate::model::Model;
 use crate::terms::{self, Hypothesis};
-use model_core::recursion::Grading;
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
 
@@ -206,10 +205,11 @@ impl Finder<'_> {
         let model = beside.judged.model();
         // On/off commands do not show how the flow takes jets of part strength, which a term at the jet makes of them.
         let unknown = curve.term.entry == Entry::Jet && self.search.judge.on_off;
-        let responses = Grading::ALL
-            .into_par_iter()
-            .filter(|grading| unknown || *grading == model.grading);
-        let fits = responses.filter_map(|grading| {
+        let mut responses = vec![model.grading];
+        if unknown {
+            responses.extend(self.search.judge.other_gradings(model.grading));
+        }
+        let fits = responses.into_par_iter().filter_map(|grading| {
             let model = Model {
                 grading,
                 ..model.clone()

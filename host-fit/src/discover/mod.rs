@@ -99,19 +99,19 @@ fn halfway(found: &Searched) -> Option<Hypothesis> {
         .cloned()
 }
 
-/// Looks for the terms that `given` lacks on `records`. `progress` is told what is
-/// being tried.
+/// Looks for the terms that the model `handed_in` lacks on `records`; where none is found, that model or a better base
+/// comes back. `progress` is told what is being tried.
 ///
 /// # Errors
 /// [`DiagnoseError`].
 pub fn discover(
-    given: &Model,
+    handed_in: &Model,
     records: &[Record],
     options: &Options,
     interrupt: &AtomicBool,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Discovery, DiagnoseError> {
-    let bench = Bench::of(given, records).ok_or(DiagnoseError::NothingToLearnFrom)?;
+    let bench = Bench::of(handed_in, records).ok_or(DiagnoseError::NothingToLearnFrom)?;
     let (judge, units) = (&bench.judge, &bench.units);
     let search = Search {
         judge,
@@ -204,7 +204,13 @@ pub fn discover(
     }
     let fitted = judge.final_fit(&end.judged);
     let own: Vec<&Term> = terms.iter().map(|found| &found.term).collect();
-    let (model, written) = finder.outer(&fitted.model, &own);
+    let (mut model, written) = finder.outer(&fitted.model, &own);
+    if !own.is_empty() && !units.keep(&fitted.model, &model, records) {
+        return Err(DiagnoseError::FullJet(units.u));
+    }
+    if own.is_empty() && as_given.rmse() <= end.judged.rmse() {
+        model = handed_in.clone();
+    }
     let separation = finder.separation(&terms, &model);
     let terms = terms
         .iter()

@@ -1,7 +1,9 @@
 //! A model's parameters as one vector, for whoever searches or differentiates.
 
 use super::{Added, Delay, Model};
+use model_core::Real;
 use model_core::effect::{Influence, Parameter};
+use model_core::effects::ZERO_OFFSET;
 
 /// What a coordinate of the parameter vector is.
 #[derive(Clone, Debug, PartialEq)]
@@ -87,6 +89,18 @@ impl Model {
         }
         values.extend(self.effects.iter().flat_map(|added| &added.parameters));
         values
+    }
+
+    /// What the sensor shows at rest, among the values of a parameter vector; 0 for a model without a zero.
+    #[must_use]
+    pub fn zero_among<T: Real>(&self, values: &[T]) -> T {
+        let Some(own) = self.effects.iter().position(|e| e.name == ZERO_OFFSET.name) else {
+            return T::ZERO;
+        };
+        let from = self.effects[own..].iter().map(|e| e.parameters.len());
+        let index = values.len().checked_sub(from.sum());
+        let value = index.and_then(|index| values.get(index));
+        value.copied().unwrap_or(T::ZERO)
     }
 
     /// The same model with another parameter vector; missing values keep theirs.

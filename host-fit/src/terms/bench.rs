@@ -33,8 +33,10 @@ impl Bench {
         };
         let given = units.model_in(given);
         let restarted = restart_after(&given, &inner);
+        let mut judge = Judge::new(&inner, restarted, options)?;
+        judge.full_is_one = units.u == 1.0;
         Some(Self {
-            judge: Judge::new(&inner, restarted, options)?,
+            judge,
             units,
             given,
             mid_run,

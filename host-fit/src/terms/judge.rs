@@ -10,6 +10,7 @@ use crate::linalg::dot;
 use crate::model::Model;
 use crate::residual::{NoiseSource, noise_floor};
 use crate::simulate::SimulateError;
+use model_core::recursion::Grading;
 use rayon::prelude::*;
 
 /// A model with its fits, one per fold, and its held-out error.
@@ -59,6 +60,8 @@ pub struct Judge {
     identify: Vec<Record>,
     /// Whether the command is on/off.
     pub on_off: bool,
+    /// Whether a full jet is a command of 1 in the user's units: the share of full strength means nothing in others.
+    pub(crate) full_is_one: bool,
     /// σ² of the noise per judged sample, what the level scatters by not counted …
     floor: Vec<Vec<f64>>,
     /// … and the root mean square of all of it, y.
@@ -120,6 +123,7 @@ impl Judge {
             measured_noise,
             identify,
             on_off: records.iter().all(Record::is_on_off),
+            full_is_one: true,
             folds,
             whole: whole_runs,
             held_out_by,
@@ -331,6 +335,14 @@ impl Judge {
     /// p-value of "the error is not above `margin` times the noise floor".
     pub(crate) fn p_above_noise(&self, held_out: &HeldOut, margin: f64) -> f64 {
         p_above_noise(held_out, &self.floor, margin * margin)
+    }
+
+    /// How else than as in `own` the flow may take jets of part strength.
+    pub(crate) fn other_gradings(&self, own: Grading) -> Vec<Grading> {
+        let others = Grading::ALL.into_iter();
+        others
+            .filter(|other| self.full_is_one && *other != own)
+            .collect()
     }
 
     /// Whether one model leaves the measurement further than the other where free

@@ -13,7 +13,6 @@ use crate::residual::NoiseSource;
 use crate::simulate::SimulateError;
 use model_core::effect::Spec;
 use model_core::effects::NUISANCES;
-use model_core::recursion::Grading;
 use rayon::prelude::*;
 use std::cmp::Ordering;
 use std::sync::atomic::{AtomicBool, Ordering as Memory};
@@ -172,9 +171,9 @@ impl Search<'_> {
         let mut judged = self.judge.refitted(&model)?;
         if !self.judge.on_off {
             // Graded commands show how the flow takes jets of part strength.
-            let others: Vec<Judged> = Grading::ALL
+            let others = self.judge.other_gradings(judged.model().grading);
+            let others: Vec<Judged> = others
                 .into_par_iter()
-                .filter(|grading| *grading != judged.model().grading)
                 .filter_map(|grading| {
                     let other = Model {
                         grading,
@@ -495,7 +494,7 @@ impl Search<'_> {
             return None;
         }
         let learning = self.judge.learning(0);
-        let others = Grading::ALL.into_par_iter().filter(|g| *g != model.grading);
+        let others = self.judge.other_gradings(model.grading).into_par_iter();
         let fits = others.filter_map(|grading| {
             let other = Model {
                 grading,

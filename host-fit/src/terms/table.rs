@@ -197,7 +197,7 @@ impl Screen<'_> {
 
     /// Changes by a rate that depends on the level, without jets and under them.
     fn level_rate(&self) -> Option<[Vec<f64>; 2]> {
-        if self.model.has_effect(LEVEL_RATE.name) {
+        if self.model.has_effect(LEVEL_RATE.name) || !self.judge.full_is_one {
             return None;
         }
         let of = |slopes: [f64; 2]| {
@@ -422,10 +422,12 @@ impl Screen<'_> {
                     continue;
                 }
                 met.push(spec.name);
-                let gradings = Grading::ALL
-                    .into_iter()
-                    .filter(|g| *g != self.model.grading);
-                others.extend(gradings.map(|g| with_grading(spec, parameters.clone(), g)));
+                let gradings = self.judge.other_gradings(self.model.grading);
+                others.extend(
+                    gradings
+                        .into_iter()
+                        .map(|g| with_grading(spec, parameters.clone(), g)),
+                );
             }
             rated.extend(self.rated(others, noise, &mut by_chance));
             rated.sort_by(|a, b| b.learned.total_cmp(&a.learned));

@@ -130,6 +130,25 @@ impl Units {
         model
     }
 
+    /// Whether a model runs in the user's units as it does within, to a hundredth of the size of y. What reads the share
+    /// of a full jet, or an edge between commands of 0 and 1, does not where a full jet is another command.
+    #[must_use]
+    pub fn keep(&self, inner: &Model, outer: &Model, records: &[Record]) -> bool {
+        records.iter().all(|record| {
+            let Ok(inside) = inner.free_run(&self.record_in(record)) else {
+                return true;
+            };
+            let apart = |outside: Vec<f64>| {
+                let pairs = outside.iter().zip(&inside);
+                let squares = pairs.map(|(a, b)| (a - self.zero - self.y * b).powi(2));
+                (squares.sum::<f64>() / inside.len().max(1) as f64).sqrt()
+            };
+            outer
+                .free_run(record)
+                .is_ok_and(|outside| apart(outside) < 0.01 * self.y)
+        })
+    }
+
     /// A parameter's value in the user's units.
     #[must_use]
     pub fn value_out(&self, unit: model_core::effect::Unit, value: f64) -> f64 {
@@ -250,5 +269,46 @@ mod tests {
         for (one, other) in run.iter().zip(&back) {
             assert!((one - other).abs() < 1e-9);
         }
+    }
+
+    /// A model that starts from measurements and gets an effect within: its zero is the sensor's outside.
+    #[test]
+    fn effects_that_were_found_inside_run_outside_as_they_do_there() {
+        let record = record(40.0, 300.0, 20.0);
+        let inner = record.y.len() / 2..;
+        let record = Record {
+            u: record.u[inner.clone()].to_vec(),
+            y: record.y[inner].to_vec(),
+            ..record
+        };
+        let model = Model {
+            sample_period_s: record.sample_period_s,
+            start: Start::Measured,
+            ..Model::default()
+        };
+        let units = Units::of(&model, std::slice::from_ref(&record));
+        assert!(units.zero > 0.0);
+        let mut found = Model {
+            a: vec![0.98],
+            b: vec![0.02],
+            c: vec![-0.002],
+            delay: Delay::of::<StateDependentDelay<f64>>(&[20.0, 8.0, 0.1], vec![1.0], true),
+            ..units.model_in(&model)
+        };
+        found.constant = 0.001;
+        found.effects.clear();
+        found.add(spec("amplitude-saturation").unwrap(), &[0.01], None);
+        let inside = found.free_run(&units.record_in(&record)).unwrap();
+        let outside = units.model_out(&found).free_run(&record).unwrap();
+        for (outer, inner) in outside.iter().zip(&inside) {
+            assert!((outer - (units.zero + units.y * inner)).abs() < 1e-6);
+        }
+        let outer = units.model_out(&found);
+        assert!(units.keep(&found, &outer, std::slice::from_ref(&record)));
+        let other = Model {
+            constant: 1.5 * outer.constant,
+            ..outer
+        };
+        assert!(!units.keep(&found, &other, std::slice::from_ref(&record)));
     }
 }

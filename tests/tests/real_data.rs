@@ -49,6 +49,16 @@ fn held_out(model: &Model, record: &Record) -> f64 {
     scores.validate.expect("a held-out record").rmse
 }
 
+/// A linear model as an engineer fits it, with a constant.
+fn fitted(linear: &Model, train: &Record) -> Model {
+    let options = FitOptions {
+        constant: true,
+        ..FitOptions::default()
+    };
+    let fit = fit(linear, &[train], &options).expect("a linear fit");
+    fit.model
+}
+
 /// Silverbox, an electronic Duffing circuit: a linear model leaves 6.95 mV, the
 /// best published models 0.3 mV; what is missing is a cubic stiffness.
 #[test]
@@ -71,13 +81,7 @@ fn silverbox_lacks_a_cubic_stiffness() {
         delay: Delay::Fixed { delays: vec![0, 2] },
         ..Model::default()
     };
-    let options = FitOptions {
-        constant: true,
-        ..FitOptions::default()
-    };
-    let linear = fit(&linear, &[&train], &options)
-        .expect("a linear fit")
-        .model;
+    let linear = fitted(&linear, &train);
     let before = held_out(&linear, &test);
     assert!((0.0066..0.0075).contains(&before), "linear: {before}");
     let found = diagnosed(&linear, &[train, test], 1);
@@ -100,13 +104,7 @@ fn what_discover_says_of_a_dryer_its_model_does() {
         return;
     };
     let linear = second_order(period_s, 2, [1.3, -0.4], 0.1);
-    let options = FitOptions {
-        constant: true,
-        ..FitOptions::default()
-    };
-    let linear = fit(&linear, &[&train], &options)
-        .expect("a linear fit")
-        .model;
+    let linear = fitted(&linear, &train);
     let before = held_out(&linear, &test);
     let records = [train, test];
     let options = discover::Options {
@@ -160,15 +158,9 @@ fn the_ball_screws_dry_friction_is_that_of_the_literature() {
     else {
         return;
     };
-    let options = FitOptions {
-        constant: true,
-        ..FitOptions::default()
-    };
     for delay in [1, 10] {
         let model = second_order(0.001, delay, [1.9979, -0.9979], 3.3e-7);
-        let linear = fit(&model, &[&train], &options)
-            .expect("a linear fit")
-            .model;
+        let linear = fitted(&model, &train);
         let found = diagnosed(&linear, &[train.clone(), test.clone()], 4);
         // It leads; whether it is named depends on how much the free run drifts, and
         // today it is not.

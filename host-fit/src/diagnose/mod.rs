@@ -44,7 +44,8 @@ pub enum DiagnoseError {
     /// The model cannot be run on the data.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
-    /// What was found reads the command as a share of a full jet, and a full jet is another command than 1.
+    /// What was found reads the command as a share of a full jet, and the largest command of the records, in their
+    /// unit, is not 1.
     #[error(
         "the largest command of the records is {0:.3}, and what was found means something else there than for commands \
          up to 1; nothing was written. Scale the command (`import --u-scale {scale:.4}`), identify and search again.",

@@ -205,7 +205,7 @@ pub fn discover(
     let fitted = judge.final_fit(&end.judged);
     let own: Vec<&Term> = terms.iter().map(|found| &found.term).collect();
     let (mut model, written) = finder.outer(&fitted.model, &own);
-    if !own.is_empty() && !units.keep(&fitted.model, &model, records) {
+    if !judge.full_is_one && !own.is_empty() && !units.keep(&fitted.model, &model, records) {
         return Err(DiagnoseError::FullJet(units.u));
     }
     if own.is_empty() && as_given.rmse() <= end.judged.rmse() {

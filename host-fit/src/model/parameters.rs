@@ -91,7 +91,8 @@ impl Model {
         values
     }
 
-    /// What the sensor shows at rest, among the values of a parameter vector; 0 for a model without a zero.
+    /// What the sensor shows at rest, in units of y, among the values of a parameter vector in the order of
+    /// [`coordinates`](Self::coordinates); 0 for a model without a zero.
     #[must_use]
     pub fn zero_among<T: Real>(&self, values: &[T]) -> T {
         let Some(own) = self.effects.iter().position(|e| e.name == ZERO_OFFSET.name) else {

@@ -1,13 +1,15 @@
-//! `host-fit demo`: the whole way on bundled data, from recordings to constants and a loop.
+//! `host-fit demo`: the whole way on bundled and simulated data, from recordings to constants and a loop.
 
 use std::path::{Path, PathBuf};
 
 use closed_loop::{Figures, OpenLoop, Relay, SAMPLE_PERIOD_S, run as close_the_loop};
+use firmware_sim::family::{Family, NoiseKind, RigPlan};
 use firmware_sim::hidden_set::HiddenSetPlan;
 use firmware_sim::plant::{PlantSpec, Rig};
 use host_fit::data::DataSet;
 use host_fit::design::{TrackRequest, run_law};
 use host_fit::diagnose::Options;
+use host_fit::discover;
 use host_fit::indicators::Indicators;
 use host_fit::model::Model;
 use host_fit::output::{Staging, write_atomic};
@@ -18,12 +20,13 @@ use model_core::control::HoldTimes;
 use super::Console;
 use super::drawings::{LoopPicture, ladder_picture, loop_picture};
 use super::page::{
-    command_line, provenance, report_climb, report_finding, report_runs, report_scores,
+    command_line, provenance, report_climb, report_discovery, report_finding, report_runs,
+    report_scores,
 };
 use super::words::{aligned, ladder_table};
 
-/// Show the whole way on bundled data: identify, compare, find the missing effect, add it, generate constants, close
-/// the loop; leaves a report, models and data to play with.
+/// Show the whole way on bundled data: identify, compare, find the missing effect, add it, find a term that no
+/// catalogue has, generate constants, close the loop; leaves a report, models and data to play with.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Folder for the report, the pictures, the models and the data.
@@ -62,6 +65,8 @@ const FILES: [(&str, &str); 16] = [
 
 /// What really made the hidden set; only the loop is run on it.
 const ANSWER: &str = include_str!("../../../data/hidden-ramp/answer.toml");
+/// What no effect of the catalogue does, hidden in a rig of this seed, and the folder of its recordings.
+const BEYOND: (&str, u64, &str) = ("tiring-jet", 4, "tiring-ramp");
 /// Friction to hold in the loop (y), about 0.8 of steady blowing.
 const TARGET: f64 = 0.7;
 /// Shortest on and off times of the valve, samples.
@@ -96,6 +101,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     );
     let fits = real_input(&data, out, console, &mut report)?;
     let (model, words) = hidden_effect(&data, out, console, &mut report)?;
+    let found = beyond_the_catalogue(&data, out, console, &mut report)?;
     let design = steps::design(
         &model,
         &DesignRequest::Track(TrackRequest {
@@ -121,6 +127,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         "out": out,
         "ramp_cfd_validate_fit_percent": {"fixed": fits[0], "state_dependent": fits[1]},
         "words": words,
+        "beyond_the_catalogue": found,
         "loop": figures,
     }))
 }
@@ -200,6 +207,42 @@ fn hidden_effect(
     provenance(report, &set, 0, &command_line());
     let words = format!("{headline}. {meaning}");
     Ok((finding.model, words))
+}
+
+/// Recordings of a rig whose physics no catalogue has, and the term that is found in them, in words.
+fn beyond_the_catalogue(
+    data: &Path,
+    out: &Path,
+    console: Console,
+    report: &mut Report,
+) -> anyhow::Result<String> {
+    let (hidden, seed, name) = BEYOND;
+    let plan = RigPlan::draw(Family::FirstOrder, &[hidden], NoiseKind::White, &[], seed)?;
+    let folder = data.join(name);
+    plan.build()?.data.save(&folder)?;
+    let set = DataSet::load(&folder)?;
+    let request = request(DelayKind::StateDependent);
+    let given = steps::identify(&set, &request, &console.watch())?.model;
+    given.save(&out.join("beyond-before.toml"))?;
+    let options = discover::Options {
+        terms: 1,
+        ..discover::Options::default()
+    };
+    let found = steps::discover(&given, &set, &options, &console.watch())?;
+    console.say(&format!(
+        "\na ramp with physics that no catalogue has: {}\n{}",
+        found.headline, found.meaning
+    ))?;
+    console.say(&ladder_table(&found.discovery.ladder))?;
+    report_discovery(report, &given.targets(&set.records), &found);
+    provenance(report, &set, 0, &command_line());
+    found.model.save(&out.join("beyond-after.toml"))?;
+    if let Some(term) = found.discovery.terms.first() {
+        write_atomic(&out.join("beyond-effect.toml"), |file| {
+            file.write_all(term.file.as_bytes())
+        })?;
+    }
+    Ok(format!("{}. {}", found.headline, found.meaning))
 }
 
 #[derive(Clone, Copy, serde::Serialize)]

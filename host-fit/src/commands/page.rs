@@ -151,6 +151,13 @@ pub(crate) fn finding(
 /// The page of a discovery beside `given`.
 pub(crate) fn discovery(given: &Model, set: &DataSet, found: &Terms, command: &str) -> String {
     let mut report = Report::new("Discovery", title(set));
+    report_discovery(&mut report, &given.targets(&set.records), found);
+    provenance(&mut report, set, 0, command);
+    report.html()
+}
+
+/// What was found on `records`, with its curves, and the runs before and after.
+pub(crate) fn report_discovery(report: &mut Report, records: &[Record], found: &Terms) {
     let terms = &found.discovery.terms;
     let tone = if terms.is_empty() {
         Tone::Warning
@@ -174,19 +181,17 @@ pub(crate) fn discovery(given: &Model, set: &DataSet, found: &Terms, command: &s
         report.figure(&experiment_picture(separation), &separation.words());
     }
     if let Some(trace) = &found.discovery.trace {
-        report_trace(&mut report, trace);
+        report_trace(report, trace);
     }
     report.section("The model with the terms");
     report.paragraph(&describe(&found.model));
-    report_scores(&mut report, &found.scores);
+    report_scores(report, &found.scores);
     let mut all: Vec<(&str, &[Vec<f64>])> = Vec::new();
     if let Some(before) = &found.runs_before {
         all.push(("as given", before));
     }
     all.push(("with the terms", &found.runs));
-    report_runs(&mut report, &given.targets(&set.records), &all, None);
-    provenance(&mut report, set, 0, command);
-    report.html()
+    report_runs(report, records, &all, None);
 }
 
 /// The page of a law for `model` that was tried in the loop.

@@ -18,7 +18,7 @@ pub(super) struct Candidate {
 impl Candidate {
     pub(super) fn of(term: Term, with: Hypothesis) -> Self {
         Self {
-            term,
+            term: term.in_model(with.judged.model()),
             with,
             formula: None,
         }

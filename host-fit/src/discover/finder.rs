@@ -26,8 +26,6 @@ pub(super) struct Finder<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) units: &'a Units,
     pub(super) options: &'a Options,
-    /// Whether the sensor's zero is not the same in all records.
-    pub(super) zero_moves: bool,
 }
 
 impl Finder<'_> {
@@ -134,12 +132,8 @@ impl Finder<'_> {
         let of_excess =
             |judged: &Judged| 1.0 - excess(judged) / excess(&without.judged).max(f64::MIN_POSITIVE);
         let little = judge.over_noise(1.0).is_finite() && of_excess(last) < RULES.least_share;
-        // What is the same all through a record tells records apart, and imitates a zero that moves between them.
-        let least = (1.0 - RULES.worthwhile).powi(2);
-        let is_zero = self.zero_moves
-            && last.held_out.about_the_means() > least * base.judged.held_out.about_the_means();
         let drifts_more = judge.drifts_more(last, &base.judged);
-        if gain < RULES.worthwhile || little || is_zero || drifts_more {
+        if gain < RULES.worthwhile || little || drifts_more {
             return None;
         }
         let p = self.by_chance(base, last, looked_at, number);

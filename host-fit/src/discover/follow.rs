@@ -204,7 +204,8 @@ impl Finder<'_> {
     fn tried(&self, beside: &Hypothesis, curve: Screened) -> Option<Tried> {
         let model = beside.judged.model();
         // On/off commands do not show how the flow takes jets of part strength, which a term at the jet makes of them.
-        let unknown = curve.term.entry == Entry::Jet && self.search.judge.on_off;
+        let term = curve.term.with_free_time();
+        let unknown = term.entry == Entry::Jet && self.search.judge.on_off;
         let mut responses = vec![model.grading];
         if unknown {
             responses.extend(self.search.judge.other_gradings(model.grading));
@@ -214,12 +215,12 @@ impl Finder<'_> {
                 grading,
                 ..model.clone()
             };
-            self.fitted(&model, &curve.term)
+            self.fitted(&model, &term)
         });
         let by_error = |a: &Fit, b: &Fit| a.mean_square().total_cmp(&b.mean_square());
         Some(Tried {
             brief: fits.min_by(by_error)?,
-            term: curve.term,
+            term,
             memory: beside.terms.clone(),
         })
     }

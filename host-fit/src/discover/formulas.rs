@@ -80,30 +80,17 @@ impl Finder<'_> {
             .collect();
         let fits = forms.into_par_iter().filter_map(|form| {
             let (parameters, _) = form.nearest(x, g, &weights, pinned.is_some())?;
-            let formula = |fading: Option<f64>| Term {
+            let term = Term {
                 shape: Shape::Formula {
                     form,
-                    parameters: parameters.clone(),
+                    parameters,
                     range,
-                    fading,
                 },
                 ..curve.clone()
             };
-            let refitted = |term: Term| {
-                let with = term.added_to(&base, reference)?;
-                let judged = judge.refitted(&with).ok()?;
-                Some((term.in_model(judged.model()), judged))
-            };
-            let plain = refitted(formula(None));
-            let faded = curve
-                .coordinate
-                .fading()
-                .and_then(|t| refitted(formula(Some(t))));
-            match (plain, faded) {
-                (Some(a), Some(b)) if b.1.size() < a.1.size() => Some(b),
-                (Some(a), _) => Some(a),
-                (None, b) => b,
-            }
+            let with = term.added_to(&base, reference)?;
+            let judged = judge.refitted(&with).ok()?;
+            Some((term.in_model(judged.model()), judged))
         });
         let mut fits: Vec<(Term, Judged)> = fits.collect();
         fits.retain(|(_, judged)| {

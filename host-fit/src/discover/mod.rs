@@ -121,12 +121,10 @@ pub fn discover(
         interrupt,
         progress,
     };
-    let moving_zero = MovingZero::of(records);
     let finder = Finder {
         search: &search,
         units,
         options,
-        zero_moves: moving_zero.is_some(),
     };
     let rung = |hypothesis: &Hypothesis, terms: &[String], step: &str| {
         let held_out = &hypothesis.judged.held_out;
@@ -227,7 +225,7 @@ pub fn discover(
         looked_at,
         trace,
         separation,
-        moving_zero,
+        moving_zero: MovingZero::of(records),
         model,
     })
 }

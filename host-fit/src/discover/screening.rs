@@ -202,8 +202,11 @@ impl<'a> Context<'a> {
         coordinates(time_constant, self.longest, &channels)
     }
 
-    /// The same term with its time nearby.
+    /// The same term with its time nearby, where that was chosen.
     pub(super) fn near(&self, term: &Term) -> Vec<Screened> {
+        if term.fits_time {
+            return Vec::new();
+        }
         self.curves(self.times(&term.coordinate, &NEARBY), &[term.entry])
     }
 
@@ -291,6 +294,7 @@ impl<'a> Context<'a> {
                 x,
                 pinned,
             },
+            fits_time: false,
             on: ON,
             shift,
             time: 1.0,

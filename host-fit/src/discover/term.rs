@@ -26,8 +26,6 @@ pub(super) enum Shape {
         parameters: Vec<f64>,
         /// Extent of the coordinate.
         range: [f64; 2],
-        /// The fading time, where it is fitted.
-        fading: Option<f64>,
     },
 }
 
@@ -37,6 +35,8 @@ pub(super) struct Term {
     pub(super) entry: Entry,
     pub(super) coordinate: Coordinate,
     pub(super) shape: Shape,
+    /// Whether its coordinate's fading time is one of its parameters.
+    pub(super) fits_time: bool,
     /// The command is on above this.
     pub(super) on: f64,
     /// By how much the model's own delay is shorter, s: room for a delay that shrinks.
@@ -64,14 +64,15 @@ impl Term {
 
     /// Whether it depends on a time that was chosen, and is none of its parameters.
     pub(super) fn has_chosen_time(&self) -> bool {
-        let is_fitted = matches!(
-            &self.shape,
-            Shape::Formula {
-                fading: Some(_),
-                ..
-            }
-        );
-        self.coordinate.has_time() && !is_fitted
+        self.coordinate.has_time() && !self.fits_time
+    }
+
+    /// The same with its coordinate's fading time free, where it has one.
+    pub(super) fn with_free_time(self) -> Self {
+        Self {
+            fits_time: self.coordinate.fading().is_some(),
+            ..self
+        }
     }
 
     /// Standard errors of the values of a curve that is part of a fitted model, 0 where it is pinned.
@@ -126,12 +127,10 @@ impl Term {
                 form,
                 parameters,
                 range,
-                fading,
             } => Shape::Formula {
                 form,
                 parameters: form.scaled(parameters, of_x, of_g),
                 range: range.map(|x| x * of_x),
-                fading: fading.map(|time| time * units.time),
             },
         };
         Self {
@@ -166,27 +165,26 @@ impl Term {
 
     fn parameters(&self) -> Vec<Parameter> {
         let of_g = self.entry.unit().symbol();
-        match &self.shape {
+        let mut all: Vec<Parameter> = match &self.shape {
             Shape::Points { g, pinned, .. } => {
                 let size = match self.entry {
                     Entry::Delay => RULES.longest_delay_s * self.time,
                     _ => RULES.largest * g.iter().fold(1.0, |m: f64, g| m.max(g.abs())),
                 };
                 let free = (0..g.len()).filter(|i| Some(*i) != *pinned);
-                let all = free.map(|i| Parameter {
+                let values = free.map(|i| Parameter {
                     name: format!("g{i}"),
                     value: g[i].clamp(-size, size),
                     unit: of_g,
                     low: -size,
                     high: size,
                 });
-                all.collect()
+                values.collect()
             }
             Shape::Formula {
                 form,
                 parameters,
                 range,
-                fading,
             } => {
                 let cards = form.parameters.iter().zip(parameters);
                 let own = cards.map(|(card, value)| {
@@ -199,16 +197,18 @@ impl Term {
                         high,
                     }
                 });
-                let fading = fading.map(|time| Parameter {
-                    name: FADING.to_owned(),
-                    value: time,
-                    unit: "s",
-                    low: 0.1 * time,
-                    high: 10.0 * time,
-                });
-                own.chain(fading).collect()
+                own.collect()
             }
-        }
+        };
+        let time = self.coordinate.fading().filter(|_| self.fits_time);
+        all.extend(time.map(|time| Parameter {
+            name: FADING.to_owned(),
+            value: time,
+            unit: "s",
+            low: 0.1 * time,
+            high: 10.0 * time,
+        }));
+        all
     }
 
     /// Values of its effect's parameters.
@@ -263,26 +263,20 @@ impl Term {
     /// The same with other values.
     pub(super) fn with_values(&self, values: &[f64]) -> Self {
         let mut other = self.clone();
-        match &mut other.shape {
+        let own: Vec<&mut f64> = match &mut other.shape {
             Shape::Points { g, pinned, .. } => {
-                let free = g
-                    .iter_mut()
-                    .enumerate()
-                    .filter(|(i, _)| Some(*i) != *pinned);
-                for ((_, own), value) in free.zip(values) {
-                    *own = *value;
-                }
+                let free = g.iter_mut().enumerate();
+                let free = free.filter(|(i, _)| Some(*i) != *pinned);
+                free.map(|(_, value)| value).collect()
             }
-            Shape::Formula {
-                parameters, fading, ..
-            } => {
-                let count = parameters.len().min(values.len());
-                parameters.copy_from_slice(&values[..count]);
-                if let (Some(own), Some(value)) = (fading.as_mut(), values.get(count)) {
-                    *own = *value;
-                    other.coordinate = other.coordinate.with_fading(*value);
-                }
-            }
+            Shape::Formula { parameters, .. } => parameters.iter_mut().collect(),
+        };
+        let time = values.get(own.len()).filter(|_| self.fits_time);
+        for (own, value) in own.into_iter().zip(values) {
+            *own = *value;
+        }
+        if let Some(time) = time {
+            other.coordinate = other.coordinate.with_fading(*time);
         }
         other
     }
@@ -290,13 +284,6 @@ impl Term {
     /// Its effect file; every line of `comment` comes first.
     pub(super) fn file(&self, comment: &str) -> String {
         let longest = self.shift + RULES.longest_delay_s * self.time;
-        let fitted = matches!(
-            self.shape,
-            Shape::Formula {
-                fading: Some(_),
-                ..
-            }
-        );
         let mut text = String::new();
         for line in comment.lines() {
             let _ = writeln!(text, "# {line}");
@@ -320,7 +307,7 @@ impl Term {
             let _ = writeln!(text, "channel = \"{channel}\"");
         }
         let _ = writeln!(text, "expression = \"{expression}\"");
-        for state in self.coordinate.states(self.on, self.time, fitted) {
+        for state in self.coordinate.states(self.on, self.time, self.fits_time) {
             let _ = writeln!(
                 text,
                 "\n[[state]]\nname = \"{}\"\nstart = {:?}\nupdate = \"{}\"",
@@ -387,6 +374,7 @@ mod tests {
                 g: g.to_vec(),
                 pinned,
             },
+            fits_time: false,
             on: 0.5,
             shift: 0.0,
             time: 1.0,

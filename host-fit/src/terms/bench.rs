@@ -1,6 +1,7 @@
 //! What every search starts from: records in their own units, and a judge over them.
 
 use super::judge::Judge;
+use super::rest::tared;
 use super::units::{Units, begins_in_mid_run};
 use crate::data::Record;
 use crate::fit::{FitOptions, restart_after};
@@ -21,10 +22,12 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// The bench for `given` on `records`; `None` if there is nothing to learn from.
+    /// The bench for `given` on `records`, each from its own zero where that moves; `None` if there is nothing to learn
+    /// from.
     #[must_use]
     pub fn of(given: &Model, records: &[Record]) -> Option<Self> {
-        let units = Units::of(given, records);
+        let records = tared(records);
+        let units = Units::of(given, &records);
         let inner: Vec<Record> = records.iter().map(|r| units.record_in(r)).collect();
         let mid_run = inner.iter().any(begins_in_mid_run);
         let options = FitOptions {

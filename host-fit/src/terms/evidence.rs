@@ -54,12 +54,6 @@ impl HeldOut {
         self.block
     }
 
-    /// Σ e² with the mean error of each record taken away.
-    pub(crate) fn about_the_means(&self) -> f64 {
-        let of = |e: &Vec<f64>| dot(e, e) - e.iter().sum::<f64>().powi(2) / e.len().max(1) as f64;
-        self.errors.iter().map(of).sum()
-    }
-
     /// Infinite if nothing was judged.
     pub(crate) fn rmse(&self) -> f64 {
         if self.samples == 0 {
@@ -182,12 +176,6 @@ mod tests {
                 state + rng.random_range(-0.5..0.5)
             })
             .collect()
-    }
-
-    #[test]
-    fn the_level_of_a_record_is_no_error_about_the_means() {
-        let held_out = HeldOut::new(vec![vec![0.1, 0.3], vec![-0.5, -0.5], Vec::new()]);
-        assert!((held_out.about_the_means() - 0.02).abs() < 1e-12);
     }
 
     /// Two models that err equally, each with noise of its own: the stated

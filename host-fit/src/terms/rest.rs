@@ -2,6 +2,7 @@
 
 use super::RULES;
 use crate::data::Record;
+use std::borrow::Cow;
 use std::fmt;
 
 /// The means of the pieces of a record before its first command.
@@ -14,6 +15,17 @@ fn quiet_pieces(record: &Record) -> Vec<f64> {
 
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// The standard error of y before the first commands, rms over the records; none where one does not say it.
+fn noise_at_rest(records: &[Record]) -> Option<f64> {
+    let mut squares = Vec::new();
+    for record in records {
+        let sd = record.y_sd.as_ref()?;
+        let at_rest = sd.iter().zip(&record.u).take_while(|(_, u)| **u == 0.0);
+        squares.extend(at_rest.map(|(sd, _)| sd * sd));
+    }
+    (!squares.is_empty()).then(|| mean(&squares).sqrt())
 }
 
 /// Mean of some pieces, and its standard error; none of fewer than count.
@@ -45,8 +57,8 @@ pub struct MovingZero {
 }
 
 impl MovingZero {
-    /// Whether records rest at different levels before their first command: by more than chance, and by
-    /// more than a small share of all that y does.
+    /// Whether records rest at different levels before their first command: by more than chance, and by more than slow
+    /// noise makes of a rest: some standard errors of y where they are known, otherwise a small share of all that y does.
     #[must_use]
     pub fn of(records: &[Record]) -> Option<Self> {
         let levels = records
@@ -58,10 +70,16 @@ impl MovingZero {
         let lowest = levels.iter().min_by(by_level)?;
         let highest = levels.iter().max_by(by_level)?;
         let apart = highest.1.0 - lowest.1.0;
-        let y = || records.iter().flat_map(|record| record.y.iter().copied());
-        let range = y().fold(f64::MIN, f64::max) - y().fold(f64::MAX, f64::min);
+        let least = noise_at_rest(records).map_or_else(
+            || {
+                let y = || records.iter().flat_map(|record| record.y.iter().copied());
+                let range = y().fold(f64::MIN, f64::max) - y().fold(f64::MAX, f64::min);
+                RULES.moving_zero * range
+            },
+            |noise| RULES.moving_zero_noise * noise,
+        );
         let error = lowest.1.1.hypot(highest.1.1);
-        let moves = apart > RULES.off_zero * error && apart > RULES.moving_zero * range;
+        let moves = apart > RULES.off_zero * error && apart > least;
         let named = |of: &(&Record, (f64, f64))| (of.0.name.clone(), of.1.0);
         moves.then(|| Self {
             lowest: named(lowest),
@@ -70,13 +88,32 @@ impl MovingZero {
     }
 }
 
+/// The records, each from its own zero where that moves between them: all rest where they do in the mean. Records
+/// that do not rest before their first command stay as they are.
+pub(super) fn tared(records: &[Record]) -> Cow<'_, [Record]> {
+    let mean = MovingZero::of(records).and_then(|_| level_of_rest(records));
+    let Some(mean) = mean else {
+        return Cow::Borrowed(records);
+    };
+    let tared = records.iter().map(|record| {
+        let mut record = record.clone();
+        if let Some((own, _)) = level(&quiet_pieces(&record)) {
+            let envelope = [&mut record.y_min, &mut record.y_max];
+            let series = envelope.into_iter().flatten().chain([&mut record.y]);
+            series.flatten().for_each(|y| *y -= own - mean);
+        }
+        record
+    });
+    Cow::Owned(tared.collect())
+}
+
 impl fmt::Display for MovingZero {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ((low, lowest), (high, highest)) = (&self.lowest, &self.highest);
         write!(
             f,
-            "The sensor's zero moves: before the first blowing `{low}` rests at {lowest:.3} and `{high}` at {highest:.3}. A model has one zero \
-             for all records: subtract each record's own first (`import` has `--y-offset`), or the error that it makes hides the rest."
+            "The sensor's zero moves: before the first blowing `{low}` rests at {lowest:.3} and `{high}` at {highest:.3}. Each record is taken from its \
+             own here; a model has one for all, and `compare` shows what that makes: subtract each record's own first (`import` has `--y-offset`)."
         )
     }
 }
@@ -112,6 +149,33 @@ mod tests {
             "{found:?}"
         );
         assert!(found.to_string().contains("--y-offset"));
+    }
+
+    #[test]
+    fn slow_noise_of_the_size_of_its_standard_error_is_no_zero_that_moves() {
+        let noisy = |name: &str, zero: f64, sd: f64| Record {
+            y_sd: Some(vec![sd; 2000]),
+            ..resting(name, zero)
+        };
+        let moves = |sd: f64| {
+            let records = [noisy("a", 0.0, sd), noisy("b", 0.06, sd)];
+            MovingZero::of(&records).is_some()
+        };
+        assert!(moves(0.012) && !moves(0.02));
+    }
+
+    #[test]
+    fn each_record_is_taken_from_its_own_zero_where_that_moves() {
+        let mut blown = resting("c", 0.3);
+        blown.u.fill(1.0);
+        let records = [resting("a", 0.0), resting("b", 0.08), blown];
+        let tared = tared(&records);
+        let rest = |record: &Record| level(&quiet_pieces(record)).map(|(level, _)| level);
+        let (a, b) = (rest(&tared[0]).unwrap(), rest(&tared[1]).unwrap());
+        assert!((a - b).abs() < 1e-12 && (a - 0.04).abs() < 0.005, "{a} {b}");
+        assert_eq!(tared[2], records[2]);
+        let still = [resting("a", 0.05), resting("b", 0.05)];
+        assert!(matches!(super::tared(&still), Cow::Borrowed(_)));
     }
 
     #[test]

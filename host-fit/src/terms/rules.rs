@@ -84,6 +84,8 @@ rules! {
     off_zero: f64 = 5.0, "standard errors", "convention";
     /// The zero moves if records rest further apart than this, and than chance.
     moving_zero: f64 = 0.03, "share of the range of y", "judgement: what slow noise makes of the mean of half a second stays below it";
+    /// … or, where its standard errors are known, more than so many of them.
+    moving_zero_noise: f64 = 4.0, "standard errors of y", "in 30 sets slow noise reached 2.9, and zeros that drifted began at 4.7";
     /// Where records do not begin at rest, 0 is the level of rest unless it is further from all of y than this.
     far: f64 = 1.0, "times the range of y", "judgement";
 

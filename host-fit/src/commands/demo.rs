@@ -221,8 +221,7 @@ fn beyond_the_catalogue(
     let folder = data.join(name);
     plan.build()?.data.save(&folder)?;
     let set = DataSet::load(&folder)?;
-    let request = request(DelayKind::StateDependent);
-    let given = steps::identify(&set, &request, &console.watch())?.model;
+    let given = steps::identify(&set, &IdentifyRequest::default(), &console.watch())?.model;
     given.save(&out.join("beyond-before.toml"))?;
     let options = discover::Options {
         terms: 1,

@@ -204,7 +204,7 @@ impl Finder<'_> {
     fn tried(&self, beside: &Hypothesis, curve: Screened) -> Option<Tried> {
         let model = beside.judged.model();
         // On/off commands do not show how the flow takes jets of part strength, which a term at the jet makes of them.
-        let term = curve.term.with_free_time();
+        let term = curve.term.with_free_time(RULES.time_of_a_curve);
         let unknown = term.entry == Entry::Jet && self.search.judge.on_off;
         let mut responses = vec![model.grading];
         if unknown {

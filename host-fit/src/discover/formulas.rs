@@ -86,7 +86,7 @@ impl Finder<'_> {
                     parameters,
                     range,
                 },
-                ..curve.clone()
+                ..curve.clone().with_free_time(RULES.time_of_a_formula)
             };
             let with = term.added_to(&base, reference)?;
             let judged = judge.refitted(&with).ok()?;

@@ -62,6 +62,10 @@ rules! {
     likely: f64 = 0.9, "probability", "convention";
     /// A delay may become this much longer.
     longest_delay_s: f64 = 0.1, "s at 1 kHz", "judgement: three times the delays of the rigs at hand";
+    /// A fading time is fitted with a curve up to so many times shorter or longer than it was looked for …
+    time_of_a_curve: f64 = 1.7, "", "half of the step to the next; a memory of y that shrank freely stood in for y";
+    /// … and with a formula from there on.
+    time_of_a_formula: f64 = 10.0, "", "judgement";
     /// Largest change that is searched, relative or in units of y.
     largest: f64 = 5.0, "", "judgement";
 }

@@ -204,7 +204,7 @@ impl<'a> Context<'a> {
 
     /// The same term with its time nearby, where that was chosen.
     pub(super) fn near(&self, term: &Term) -> Vec<Screened> {
-        if term.fits_time {
+        if term.fading.is_some() {
             return Vec::new();
         }
         self.curves(self.times(&term.coordinate, &NEARBY), &[term.entry])
@@ -294,7 +294,7 @@ impl<'a> Context<'a> {
                 x,
                 pinned,
             },
-            fits_time: false,
+            fading: None,
             on: ON,
             shift,
             time: 1.0,

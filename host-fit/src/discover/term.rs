@@ -35,8 +35,8 @@ pub(super) struct Term {
     pub(super) entry: Entry,
     pub(super) coordinate: Coordinate,
     pub(super) shape: Shape,
-    /// Whether its coordinate's fading time is one of its parameters.
-    pub(super) fits_time: bool,
+    /// Between which its coordinate's fading time is fitted, s, where it is one of its parameters.
+    pub(super) fading: Option<[f64; 2]>,
     /// The command is on above this.
     pub(super) on: f64,
     /// By how much the model's own delay is shorter, s: room for a delay that shrinks.
@@ -64,13 +64,14 @@ impl Term {
 
     /// Whether it depends on a time that was chosen, and is none of its parameters.
     pub(super) fn has_chosen_time(&self) -> bool {
-        self.coordinate.has_time() && !self.fits_time
+        self.coordinate.has_time() && self.fading.is_none()
     }
 
-    /// The same with its coordinate's fading time free, where it has one.
-    pub(super) fn with_free_time(self) -> Self {
+    /// The same with its coordinate's fading time, where it has one, fitted up to `factor` times shorter or longer.
+    pub(super) fn with_free_time(self, factor: f64) -> Self {
+        let time = self.coordinate.fading();
         Self {
-            fits_time: self.coordinate.fading().is_some(),
+            fading: time.map(|time| [time / factor, time * factor]),
             ..self
         }
     }
@@ -136,6 +137,7 @@ impl Term {
         Self {
             shape,
             coordinate: self.coordinate.out(units),
+            fading: self.fading.map(|range| range.map(|t| t * units.time)),
             on: self.on * units.u,
             shift: self.shift * units.time,
             time: self.time * units.time,
@@ -200,13 +202,13 @@ impl Term {
                 own.collect()
             }
         };
-        let time = self.coordinate.fading().filter(|_| self.fits_time);
-        all.extend(time.map(|time| Parameter {
+        let time = self.coordinate.fading().zip(self.fading);
+        all.extend(time.map(|(time, [low, high])| Parameter {
             name: FADING.to_owned(),
-            value: time,
+            value: time.clamp(low, high),
             unit: "s",
-            low: 0.1 * time,
-            high: 10.0 * time,
+            low,
+            high,
         }));
         all
     }
@@ -271,7 +273,7 @@ impl Term {
             }
             Shape::Formula { parameters, .. } => parameters.iter_mut().collect(),
         };
-        let time = values.get(own.len()).filter(|_| self.fits_time);
+        let time = values.get(own.len()).filter(|_| self.fading.is_some());
         for (own, value) in own.into_iter().zip(values) {
             *own = *value;
         }
@@ -307,7 +309,10 @@ impl Term {
             let _ = writeln!(text, "channel = \"{channel}\"");
         }
         let _ = writeln!(text, "expression = \"{expression}\"");
-        for state in self.coordinate.states(self.on, self.time, self.fits_time) {
+        for state in self
+            .coordinate
+            .states(self.on, self.time, self.fading.is_some())
+        {
             let _ = writeln!(
                 text,
                 "\n[[state]]\nname = \"{}\"\nstart = {:?}\nupdate = \"{}\"",
@@ -374,7 +379,7 @@ mod tests {
                 g: g.to_vec(),
                 pinned,
             },
-            fits_time: false,
+            fading: None,
             on: 0.5,
             shift: 0.0,
             time: 1.0,

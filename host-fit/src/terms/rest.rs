@@ -91,13 +91,15 @@ impl MovingZero {
 /// The records, each from its own zero where that moves between them: all rest where they do in the mean. Records
 /// that do not rest before their first command stay as they are.
 pub(super) fn tared(records: &[Record]) -> Cow<'_, [Record]> {
-    let mean = MovingZero::of(records).and_then(|_| level_of_rest(records));
-    let Some(mean) = mean else {
+    if MovingZero::of(records).is_none() {
         return Cow::Borrowed(records);
-    };
+    }
+    let own = |record: &Record| level(&quiet_pieces(record)).map(|(level, _)| level);
+    let levels: Vec<f64> = records.iter().filter_map(own).collect();
+    let mean = mean(&levels);
     let tared = records.iter().map(|record| {
         let mut record = record.clone();
-        if let Some((own, _)) = level(&quiet_pieces(&record)) {
+        if let Some(own) = own(&record) {
             let envelope = [&mut record.y_min, &mut record.y_max];
             let series = envelope.into_iter().flatten().chain([&mut record.y]);
             series.flatten().for_each(|y| *y -= own - mean);
@@ -173,6 +175,8 @@ mod tests {
         let rest = |record: &Record| level(&quiet_pieces(record)).map(|(level, _)| level);
         let (a, b) = (rest(&tared[0]).unwrap(), rest(&tared[1]).unwrap());
         assert!((a - b).abs() < 1e-12 && (a - 0.04).abs() < 0.005, "{a} {b}");
+        let off = level_of_rest(&tared).expect("they rest");
+        assert!((off - a).abs() < 1e-12, "{off} {a}");
         assert_eq!(tared[2], records[2]);
         let still = [resting("a", 0.05), resting("b", 0.05)];
         assert!(matches!(super::tared(&still), Cow::Borrowed(_)));

@@ -195,6 +195,7 @@ fn hidden_effect(
         "\na ramp with a hidden effect: {headline}\n{meaning}"
     ))?;
     console.say(&ladder_table(&finding.diagnosis.ladder))?;
+    report.section("A ramp with a hidden effect");
     report_finding(report, &set, &finding);
     let svg = ladder_picture(&finding.diagnosis, &set);
     write_atomic(&out.join("ladder.svg"), |file| {
@@ -233,6 +234,7 @@ fn beyond_the_catalogue(
         found.headline, found.meaning
     ))?;
     console.say(&ladder_table(&found.discovery.ladder))?;
+    report.section("A ramp with physics that no catalogue has");
     report_discovery(report, &given.targets(&set.records), &found);
     provenance(report, &set, 0, &command_line());
     found.model.save(&out.join("beyond-after.toml"))?;

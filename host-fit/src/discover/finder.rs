@@ -147,6 +147,7 @@ impl Finder<'_> {
         };
         // One coordinate may enter a place in two ways: for who reads it, that is the same finding.
         let same = |other: &Term| other.is_like(term) || told(other) == told(term);
+        all.sort_by(|a, b| a.size().total_cmp(&b.size()));
         let held_out: Vec<&HeldOut> = std::iter::once(&found)
             .chain(&all)
             .map(|one| &one.judged().held_out)
@@ -155,9 +156,11 @@ impl Finder<'_> {
         let rivals = all.iter().enumerate();
         let of_the_same = rivals.filter(|(_, rival)| same(&rival.term));
         let stability = shares[0] + of_the_same.map(|(i, _)| shares[i + 1]).sum::<f64>();
-        let (mut alike, mut rivals) = (Vec::new(), Vec::new());
+        let (mut alike, mut rivals): (Vec<Alike>, Vec<Candidate>) = (Vec::new(), Vec::new());
         for (index, rival) in all.iter().enumerate() {
-            let new = !same(&rival.term) && !alike.contains(&told(&rival.term));
+            // Of one kind with several times, the best is told.
+            let met = rivals.iter().any(|other| other.term.is_like(&rival.term));
+            let new = !met && !same(&rival.term) && !alike.contains(&told(&rival.term));
             let as_good = is_as_good(held_out[index + 1], held_out[0]);
             if new && (as_good || !is_out(&shares, index + 1)) {
                 alike.push(told(&rival.term));

@@ -388,6 +388,32 @@ mod tests {
     }
 
     #[test]
+    fn a_memory_s_fading_time_is_fitted_where_it_is_free() {
+        let fixed = Term {
+            coordinate: Coordinate::MemoryOfU(0.2),
+            ..curve(&[0.0, 0.5, 1.0], &[0.0, 0.1, 0.3], Some(0))
+        };
+        assert_eq!(fixed.values(), [0.1, 0.3]);
+        assert!(fixed.has_chosen_time());
+        let free = fixed.with_free_time(2.0);
+        assert_eq!(free.values(), [0.1, 0.3, 0.2]);
+        assert!(!free.has_chosen_time());
+        let other = free.with_values(&[0.2, 0.4, 0.35]);
+        assert_eq!(other.coordinate, Coordinate::MemoryOfU(0.35));
+        assert_eq!(other.values(), [0.2, 0.4, 0.35]);
+        // The range stays where it was looked for, and goes out with its unit.
+        assert_eq!(other.fading, Some([0.1, 0.4]));
+        let slow = Units {
+            time: 10.0,
+            ..Units::NONE
+        };
+        assert_eq!(other.out(&slow).fading, Some([1.0, 4.0]));
+        // What is the same for any time has none to fit.
+        let timeless = curve(&[0.0, 1.0], &[0.0, 1.0], None).with_free_time(2.0);
+        assert_eq!((timeless.fading, timeless.values().len()), (None, 2));
+    }
+
+    #[test]
     fn a_curve_gets_points_where_it_is_steepest_beyond_its_errors() {
         let x: Vec<f64> = (0..8).map(f64::from).collect();
         let g = [0.0, 0.01, 0.0, 0.0, 0.0, -0.2, -0.2, -0.5];

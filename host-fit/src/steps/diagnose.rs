@@ -165,11 +165,7 @@ pub fn diagnose(
     if let Some(beyond) = &beyond {
         meaning += &verdict::beyond(beyond);
     }
-    let open = matches!(
-        diagnosis.verdict,
-        Verdict::PartlyExplained | Verdict::Unexplained
-    );
-    if let Some(moving) = MovingZero::of(&records).filter(|_| open) {
+    if let Some(moving) = MovingZero::of(&records) {
         meaning += &format!(" {moving}");
     }
     Ok(Finding {

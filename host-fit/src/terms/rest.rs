@@ -96,13 +96,13 @@ pub(super) fn tared(records: &[Record]) -> Cow<'_, [Record]> {
     }
     let own = |record: &Record| level(&quiet_pieces(record)).map(|(level, _)| level);
     let levels: Vec<f64> = records.iter().filter_map(own).collect();
-    let mean = mean(&levels);
+    let common = mean(&levels);
     let tared = records.iter().map(|record| {
         let mut record = record.clone();
         if let Some(own) = own(&record) {
             let envelope = [&mut record.y_min, &mut record.y_max];
             let series = envelope.into_iter().flatten().chain([&mut record.y]);
-            series.flatten().for_each(|y| *y -= own - mean);
+            series.flatten().for_each(|y| *y -= own - common);
         }
         record
     });

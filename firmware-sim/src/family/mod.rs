@@ -362,15 +362,18 @@ mod tests {
         }
     }
 
-    /// An echo of the other sign drives the flow below rest.
+    /// An echo of the other sign drives the flow below rest, one of the same above full strength.
     #[test]
     fn no_flow_runs_away() {
-        let draw = |seed| {
-            let family = Family::RateOfY;
-            RigPlan::draw(family, &["echo-path"], NoiseKind::Coloured, &[], seed).unwrap()
+        let draw = |seed, echo, noise| {
+            RigPlan::draw(Family::RateOfY, &[echo], noise, &[], seed).unwrap()
         };
-        for seed in [900_000_103, 1, 2] {
-            let plan = draw(seed);
+        for (seed, echo, noise) in [
+            (900_000_103, "echo-path", NoiseKind::Coloured),
+            (1, "echo-path", NoiseKind::Coloured),
+            (777_001_100_161, "smeared-echo", NoiseKind::Scatter),
+        ] {
+            let plan = draw(seed, echo, noise);
             assert!(plan.weight >= 1.0);
             let readings = plan.build().unwrap().noise_free;
             let mut readings = readings.iter().flatten();

@@ -111,7 +111,14 @@ impl Flow {
                 }
             }
         }
-        let rate_off = self.rate_off * self.character.separation(follower);
+        // Above full strength nothing separates: the share that does is negative there, and a rate that grows with the
+        // friction would drive the flow on.
+        let separation = if j > 1.0 {
+            1.0
+        } else {
+            self.character.separation(follower)
+        };
+        let rate_off = self.rate_off * separation;
         let level = off + (on - off) * j;
         let share = j.clamp(0.0, 1.0);
         let between = rate_off + (self.rate_on - rate_off) * share;

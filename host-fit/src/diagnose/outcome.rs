@@ -62,10 +62,7 @@ impl Diagnosis {
             return self;
         }
         self.memory = memory(given);
-        self.ladder.push(Rung {
-            step: "the model as given, which does better".to_owned(),
-            ..as_given
-        });
+        self.ladder.push(as_given.once_more());
         self.model = given.clone();
         self.base = given.clone();
         self
@@ -73,6 +70,14 @@ impl Diagnosis {
 }
 
 impl Rung {
+    /// The rung of the model as given at the end of a ladder that led to nothing better.
+    pub(crate) fn once_more(self) -> Self {
+        Self {
+            step: "the model as given, which does better".to_owned(),
+            ..self
+        }
+    }
+
     /// What was held out, in the user's units.
     pub(crate) fn of(
         judge: &Judge,

@@ -1,6 +1,7 @@
 //! From screened curves to a term that counts, with what else it could be.
 
 use super::candidate::{Candidate, best};
+use super::coordinate::Coordinate;
 use super::outcome::{Alike, Found, Smallest, coordinate_words};
 use super::place::Entry;
 use super::screening::{Context, Screened, diverse, reference};
@@ -39,6 +40,7 @@ impl Finder<'_> {
         for (index, beside) in contexts.iter().enumerate() {
             let context = Context::new(self.search, beside.judged.model(), number);
             let mut curves = context.map_or_else(Vec::new, |context| context.all(&Entry::ALL));
+            curves.retain(|curve| self.may_be_told(&curve.term, base));
             looked_at += curves.len();
             let most = if index == 0 {
                 smallest = self.smallest(&curves);
@@ -85,6 +87,18 @@ impl Finder<'_> {
         last
     }
 
+    /// Whether `base` leaves next to nothing.
+    fn is_near_the_floor(&self, base: &Hypothesis) -> bool {
+        self.search.judge.over_noise(base.judged.rmse()) < RULES.near_the_floor
+    }
+
+    /// Whether a term beside `base` may be told: near the noise floor a sensitivity or a change with time is what
+    /// scatters or drifts from record to record.
+    fn may_be_told(&self, term: &Term, base: &Hypothesis) -> bool {
+        let varies = term.entry == Entry::Sensitivity || term.coordinate == Coordinate::Time;
+        !varies || !self.is_near_the_floor(base)
+    }
+
     /// How large a term would have to be at each place, in the user's units.
     fn smallest(&self, curves: &[Screened]) -> BTreeMap<String, Smallest> {
         let mut all = BTreeMap::new();
@@ -115,11 +129,14 @@ impl Finder<'_> {
     ) -> Option<Found> {
         let judge = self.search.judge;
         (self.search.progress)(&format!("term {number}: what else it could be"));
+        all.retain(|one| self.may_be_told(&one.term, base));
         let leader = best(&mut all)?;
         let without = self.without(&leader)?;
         let context = Context::new(self.search, without.judged.model(), number)?;
         let mut others = context.all(&Entry::ALL);
-        others.retain(|other| !other.term.is_like(&leader.term));
+        others.retain(|other| {
+            !other.term.is_like(&leader.term) && self.may_be_told(&other.term, base)
+        });
         let near = context.near(&leader.term).into_iter();
         all.extend(self.refitted(&without, diverse(others, RULES.tried)));
         all.extend(self.refitted(&without, near.take(RULES.of_a_kind).collect()));
@@ -131,13 +148,18 @@ impl Finder<'_> {
         let excess = |judged: &Judged| judge.excess(&judged.held_out);
         let of_excess =
             |judged: &Judged| 1.0 - excess(judged) / excess(&without.judged).max(f64::MIN_POSITIVE);
-        let little = judge.over_noise(1.0).is_finite() && of_excess(last) < RULES.least_share;
+        let least = if self.is_near_the_floor(base) {
+            RULES.most_of_it
+        } else {
+            RULES.least_share
+        };
+        let little = judge.over_noise(1.0).is_finite() && of_excess(last) < least;
         let drifts_more = judge.drifts_more(last, &base.judged);
         if gain < RULES.worthwhile || little || drifts_more {
             return None;
         }
         let p = self.by_chance(base, last, looked_at, number);
-        if p >= RULES.level {
+        if p >= RULES.level_of_search {
             return None;
         }
         let term = &found.term;
@@ -196,7 +218,7 @@ impl Finder<'_> {
     fn by_chance(&self, base: &Hypothesis, with: &Judged, looked_at: usize, number: usize) -> f64 {
         let one = p_value(&base.judged.held_out, &with.held_out);
         let at_most = one * looked_at as f64;
-        if at_most < RULES.level || one >= RULES.level {
+        if at_most < RULES.level_of_search || one >= RULES.level_of_search {
             return at_most.min(1.0);
         }
         // Most curves are much alike: that one of so many does it by chance is far less likely than all together.

@@ -133,7 +133,7 @@ pub fn discover(
     progress("the model as given");
     let as_given = judge.held_out(|_| &bench.given)?;
     let given_rung = Rung::of(judge, units, &as_given, &[], "the model as given", None);
-    let mut ladder = vec![given_rung];
+    let mut ladder = vec![given_rung.clone()];
     progress("the base");
     let root = search.root(&bench.given, bench.mid_run)?;
     if interrupt.load(Ordering::Relaxed) {
@@ -208,6 +208,9 @@ pub fn discover(
     }
     if own.is_empty() && as_given.rmse() <= end.judged.rmse() {
         model = handed_in.clone();
+        if as_given.rmse() < end.judged.rmse() {
+            ladder.push(given_rung.once_more());
+        }
     }
     let separation = finder.separation(&terms, &model);
     let terms = terms

@@ -46,7 +46,14 @@ rules! {
     worthwhile: f64 = 0.015, "share of the rms error", "as for effects of the catalogue";
     /// … and, where the noise floor is known, take this share of its excess at least.
     least_share: f64 = 0.25, "share of the excess", "as for the stand-ins of `diagnose`; a rig that drifted as a whole had 19 % taken by a delay";
-    /// Level of the test of the best of all curves, and of comparisons of two of them.
+    /// A base that leaves less than this is near the floor: a term has to take `most_of_it` there, and neither the sensor's sensitivity nor
+    /// time in the record is told, as levels that scatter and zeros that drift look like them.
+    near_the_floor: f64 = 1.10, "times the noise floor", "`floor_margin` of `diagnose`: nulls of nine families stay below it";
+    /// Share of the excess of a base near the floor that a term has to take.
+    most_of_it: f64 = 0.75, "share of the excess", "curves through zeros that drift or wander took 50 to 70 %, terms that were there 80 % and more in 16 of 17";
+    /// Level of the whole search, with all curves that were looked at.
+    level_of_search: f64 = 0.02, "p-value", "as for effects of the catalogue: three false terms in a hundred are too many";
+    /// Level of comparisons of two curves.
     level: f64 = 0.05, "p-value", "convention";
     /// Held-out errors that differ by less than this are the same for any purpose.
     alike: f64 = 0.01, "share of the rms error", "judgement: twice what is asked of effects; a curve has more freedom";

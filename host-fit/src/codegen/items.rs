@@ -308,9 +308,18 @@ fn prepared(model: &Model) -> TokenStream {
         let used = channels
             .iter()
             .position(|name| added.channel.as_ref() == Some(name));
-        let setting = match used.map(count) {
-            None => quote!(&SETTING),
-            Some(channel) => quote! {
+        let setting = match (used.map(count), added.reference) {
+            (None, None) => quote!(&SETTING),
+            (None, Some(reference)) => {
+                let reference = reference as f32;
+                quote! {
+                    &model_core::effect::Setting {
+                        reference: #reference,
+                        ..SETTING
+                    }
+                }
+            }
+            (Some(channel), _) => quote! {
                 &model_core::effect::Setting {
                     channel: #channel,
                     reference: REFERENCES[#channel],

@@ -355,6 +355,7 @@ impl File {
             b: self.coefficients.b,
             c,
             effects: Vec::new(),
+            calibrated_at: None,
             definitions: Vec::new(),
             training: self.training,
             law: self.law,
@@ -404,6 +405,12 @@ impl EffectTable {
         }
         if spec.channel.is_some() && (self.channel.is_none() || self.reference.is_none()) {
             let problem = "this effect needs `channel` and `reference`".to_owned();
+            return Err((key, problem));
+        }
+        if spec.calibrated && self.reference.is_some_and(|r| !(r.is_finite() && r > 0.0)) {
+            let problem =
+                "`reference` is the y at which the sensor was calibrated, a number above 0"
+                    .to_owned();
             return Err((key, problem));
         }
         let known = |name: &String| spec.parameters.iter().any(|p| p.name == name);

@@ -60,6 +60,8 @@ pub struct Model {
     pub delay: Delay,
     /// Effects in the order of the physics, delay laws not among them.
     pub effects: Vec<Added>,
+    /// At which reading the sensor counts as calibrated for effects that are added, y; none for 1. No part of a model file.
+    pub calibrated_at: Option<f64>,
     /// The user's own effects that the model knows, whether it has them or not.
     pub definitions: Vec<&'static Definition>,
     /// What the model was trained on.
@@ -102,16 +104,17 @@ pub struct Added {
     /// The measured channel it uses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channel: Option<String>,
-    /// The reference of that channel, in its unit; see [`reference`](Self::reference).
+    /// The reference of that channel, in its unit, or where the sensor was calibrated, y; see [`reference`](Self::reference).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference: Option<f64>,
 }
 
 impl Added {
-    /// What stands for a reference that is not known: effects divide by theirs.
+    /// What stands for a reference that nobody gave: effects divide by theirs.
     pub(crate) const NO_REFERENCE: f64 = 1.0;
 
-    /// The reference of the effect's channel, in its unit.
+    /// The reference of the effect's channel, in its unit, or where the sensor was
+    /// [calibrated](Spec::calibrated), y; 1 where nobody gave it.
     #[must_use]
     pub fn reference(&self) -> f64 {
         self.reference.unwrap_or(Self::NO_REFERENCE)
@@ -168,6 +171,7 @@ impl Default for Model {
             c: vec![0.0],
             delay: Delay::Fixed { delays: vec![0] },
             effects: Vec::new(),
+            calibrated_at: None,
             definitions: Vec::new(),
             training: Training::default(),
             law: None,
@@ -369,7 +373,7 @@ impl Model {
             name: spec.name.to_owned(),
             parameters: parameters.to_vec(),
             channel: spec.channel.map(str::to_owned),
-            reference,
+            reference: reference.or(self.calibrated_at.filter(|_| spec.calibrated)),
         });
         self.order_effects();
     }

@@ -336,6 +336,8 @@ pub struct Spec {
     pub amplitude: Option<Amplitude>,
     /// The measured channel it needs besides u and y.
     pub channel: Option<&'static str>,
+    /// Whether the reference of its setting is the reading at which the sensor was calibrated, y > 0; 1 where nobody says.
+    pub calibrated: bool,
     /// What else it needs to show.
     pub needs: Needs,
     /// Whether it belongs to base models, so that it is never what one lacks: a
@@ -363,6 +365,7 @@ impl Spec {
         starts: Starts::Grid,
         amplitude: None,
         channel: None,
+        calibrated: false,
         needs: Needs::Nothing,
         base: false,
         resists: false,

@@ -23,7 +23,8 @@ pub struct Setting<T> {
     pub period: T,
     /// Which of the [`Instant::channels`] belongs to the effect.
     pub channel: usize,
-    /// The reference of that channel, usually its mean, in its own unit.
+    /// The reference of that channel, usually its mean, in its own unit; or the reading at which a sensor was
+    /// [calibrated](Spec::calibrated).
     pub reference: T,
 }
 

@@ -284,6 +284,7 @@ fn guess(case: &Case, plan: &RigPlan) -> Option<Model> {
         c: vec![0.0],
         delay: law(35.0, 10.0, 6.0),
         effects: Vec::new(),
+        calibrated_at: None,
         definitions: Vec::new(),
         law: None,
         training: Training::default(),

@@ -76,6 +76,8 @@ rules! {
 
     /// y is of size 1 where this share of all samples is closer to the level of rest than that.
     full: f64 = 0.995, "share of the samples", "judgement: what is beyond is noise";
+    /// Commands whose largest is no less than this, up to 1, are shares of a full jet of 1.
+    share_of_full: f64 = 0.5, "u", "graded commands that draw levels seldom draw the full one; a supply in volts is seldom below 1";
     /// The level of rest is the mean of y before the first blowing, taken in pieces that are independent of each other …
     quiet_piece: usize = 50, "samples", "judgement";
     /// … if there are so many of them …

@@ -7,6 +7,7 @@
 use super::RULES;
 use super::rest::level_of_rest;
 use crate::data::Record;
+use crate::fit::RULES as FIT;
 use crate::model::{Delay, Model, Start};
 use model_core::effect::Spec;
 use model_core::effects::ZERO_OFFSET;
@@ -56,6 +57,12 @@ impl Units {
         let largest = |series: &[f64]| series.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         let u = records.iter().map(|r| largest(&r.u)).fold(0.0, f64::max);
         let or_one = |x: f64| if x > 0.0 && x.is_finite() { x } else { 1.0 };
+        // Graded commands need not reach a full jet to be shares of one.
+        let u = if (RULES.share_of_full..1.0).contains(&u) {
+            1.0
+        } else {
+            u
+        };
         Self {
             zero,
             y: or_one(full.unwrap_or(1.0)),
@@ -107,8 +114,13 @@ impl Units {
         }
         for i in 0..model.effects.len() {
             if let Some(spec) = model.spec(&model.effects[i].name) {
-                model.effects[i].parameters =
-                    self.scaled(spec, &model.effects[i].parameters, inward);
+                let added = &mut model.effects[i];
+                added.parameters = self.scaled(spec, &added.parameters, inward);
+                if spec.calibrated {
+                    // What the card says is not written.
+                    let reference = added.reference() * y;
+                    added.reference = Some(reference).filter(|r| (r - 1.0).abs() > 1e-9);
+                }
             }
         }
         model
@@ -118,6 +130,9 @@ impl Units {
     #[must_use]
     pub fn model_in(&self, model: &Model) -> Model {
         let mut model = self.scale(model, true);
+        // y of order one is friction and calibrated as cards say; in other units nobody knows, and the size of y will do.
+        let of_order_one = (FIT.order_one_low..FIT.order_one_high).contains(&self.y);
+        model.calibrated_at = of_order_one.then(|| 1.0 / self.y);
         self.move_zero(&mut model, -self.zero / self.y);
         model
     }
@@ -126,6 +141,7 @@ impl Units {
     #[must_use]
     pub fn model_out(&self, model: &Model) -> Model {
         let mut model = self.scale(model, false);
+        model.calibrated_at = None;
         self.move_zero(&mut model, self.zero);
         model
     }
@@ -243,6 +259,42 @@ mod tests {
         }
     }
 
+    /// Graded commands that stop short of a full jet are shares of one; volts are not.
+    #[test]
+    fn a_full_jet_is_one_where_commands_come_near_it() {
+        let full = |largest: f64| {
+            let mut record = record(1.0, 0.0, 1.0);
+            record.u.iter_mut().for_each(|u| *u *= largest);
+            Units::of(&Model::default(), &[record]).u
+        };
+        assert_eq!(
+            [0.97, 0.6, 1.0, 5.0, 0.2].map(full),
+            [1.0, 1.0, 1.0, 5.0, 0.2]
+        );
+    }
+
+    /// A film's calibration is that of its card where y is friction, and where y is full in other units.
+    #[test]
+    fn king_s_law_keeps_what_it_was_calibrated_at() {
+        let film = spec("hot-film-nonlinearity").unwrap();
+        let added = |full: f64| {
+            let record = record(full, 0.0, 1.0);
+            let units = Units::of(&Model::default(), std::slice::from_ref(&record));
+            let mut inner = units.model_in(&Model::default());
+            inner.b = vec![0.02];
+            inner.a = vec![0.98];
+            inner.add(film, &[3.0, 0.1], None);
+            let outer = units.model_out(&inner);
+            assert!(units.keep(&inner, &outer, &[record]));
+            let text = outer.to_toml();
+            assert_eq!(Model::from_toml(&text, "m").expect("own file"), outer);
+            outer.effects[0].reference
+        };
+        assert_eq!(added(1.3), None);
+        let volts = added(5.0).expect("not the card's");
+        assert!((volts - 5.0).abs() < 0.1, "{volts}");
+    }
+
     /// A model that is brought in and out again runs as it did.
     #[test]
     fn models_survive_the_way_in_and_out() {
@@ -257,6 +309,7 @@ mod tests {
         };
         model.add(spec("hot-film-lag").unwrap(), &[0.3], None);
         model.add(spec("amplitude-saturation").unwrap(), &[1e-5], None);
+        model.add(spec("hot-film-nonlinearity").unwrap(), &[3.0, 0.1], None);
         model.add(ZERO_OFFSET, &[12.0], None);
         let units = Units::of(&model, std::slice::from_ref(&record));
         let inner = units.model_in(&model);

@@ -533,11 +533,35 @@ fn covariance(
 /// are correlated over many samples, and standard errors that ignore it are several
 /// times too small. S is estimated by batch means: sums of J·r over blocks much longer
 /// than the memory of the noise are uncorrelated, and their outer products are cheap.
+/// How long that memory is nobody knows: of several lengths the one that says most counts for each coordinate.
 fn sandwich(parts: &[Part], inverse: &[f64], n: usize) -> Vec<f64> {
+    let each = RULES.batches.map(|batches| {
+        let middle = of_batches(parts, batches, n);
+        let half = product(n, |i, k| inverse[i * n + k], |k, j| middle[k * n + j]);
+        product(n, |i, k| half[i * n + k], |k, j| inverse[k * n + j])
+    });
+    let [mut widest, longer @ ..] = each;
+    let most = |i: usize| {
+        let variances = longer.iter().map(|other| other[i * n + i]);
+        variances.fold(widest[i * n + i], f64::max)
+    };
+    let wider = |i: usize| (most(i) / widest[i * n + i].max(f64::MIN_POSITIVE)).sqrt();
+    let wider: Vec<f64> = (0..n).map(wider).collect();
+    for i in 0..n {
+        for j in 0..n {
+            widest[i * n + j] *= wider[i] * wider[j];
+        }
+    }
+    widest
+}
+
+/// Σ (J·r)(J·r)ᵀ over blocks, so many of each record.
+fn of_batches(parts: &[Part], batches: usize, n: usize) -> Vec<f64> {
     let mut middle = vec![0.0; n * n];
+    let mut count = 0;
     for part in parts {
         let length = part.residual.len();
-        let block = (length / RULES.batches).clamp(1, RULES.longest_batch);
+        let block = (length / batches).max(1);
         let mut from = 0;
         while from < length {
             let to = (from + block).min(length);
@@ -550,10 +574,15 @@ fn sandwich(parts: &[Part], inverse: &[f64], n: usize) -> Vec<f64> {
                 }
             }
             from = to;
+            count += 1;
         }
     }
-    let half = product(n, |i, k| inverse[i * n + k], |k, j| middle[k * n + j]);
-    product(n, |i, k| half[i * n + k], |k, j| inverse[k * n + j])
+    // The gradient is 0 at a minimum: of so many sums one is known.
+    let count = f64::from(count);
+    middle
+        .iter_mut()
+        .for_each(|m| *m *= count / (count - 1.0).max(1.0));
+    middle
 }
 
 /// Covariance of the coordinates themselves from that of what is searched.
@@ -594,6 +623,19 @@ mod tests {
     use super::*;
     use crate::data::Use;
     use crate::model::Start;
+
+    /// Eight records that are each off by a level of their own: blocks of a fortieth of them know forty times too much.
+    #[test]
+    fn what_lasts_as_long_as_a_record_counts_as_one_draw() {
+        let part = |k: usize| Part {
+            residual: vec![if k % 2 == 0 { 0.1 } else { -0.1 }; 4000],
+            jacobian: vec![vec![1.0; 4000]],
+        };
+        let parts: Vec<Part> = (0..8).map(part).collect();
+        let variance = sandwich(&parts, &[1.0 / 32_000.0], 1)[0];
+        // Eight draws of 0.1, their mean known to 0.1/√7.
+        assert!((variance - 0.01 / 7.0).abs() < 1e-9, "{variance}");
+    }
 
     /// A motor's position at 1 kHz: a_1 + a_2 is 1 to many digits, and what the fit
     /// is after, the damping, lies in the rest.

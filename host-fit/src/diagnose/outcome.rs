@@ -142,7 +142,8 @@ pub struct Diagnosis {
     /// The missing effects in the order added; none where the verdict is
     /// "unexplained" or "partly explained", though the ladder shows what was tried.
     pub missing: Vec<String>,
-    /// Effects that describe part of the misfit without being proven.
+    /// Effects that describe part of the misfit without being proven; beside `missing` those that take the rest only,
+    /// without which the model fits as well as the noise floor is known.
     pub stand_ins: Vec<String>,
     /// For each of `missing` all that the records cannot tell from it, itself first.
     pub sets: Vec<Vec<String>>,

@@ -10,6 +10,7 @@ use crate::terms::{
     Chance, Found, HeldOut, Hypothesis, Judge, Judged, Search, Term, Units, p_value,
 };
 use model_core::effect::Spec;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// A diagnosis in the making.
@@ -17,6 +18,16 @@ pub(super) struct Session<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) units: Units,
     pub(super) options: &'a Options,
+}
+
+/// The steps from the first effect to the last.
+struct Way {
+    /// The effects, what is missed most first.
+    order: Vec<&'static Spec>,
+    /// A rung for each, with those before it.
+    rungs: Vec<Rung>,
+    /// How many of them are proven: without those that follow the model fits all the same.
+    proven: usize,
 }
 
 /// A model without effects, and what each of them does there.
@@ -111,17 +122,15 @@ impl Session<'_> {
             others,
             chance,
         } = compared;
-        let mut order = effects.clone();
-        // The best single effect leads: the ladder falls as the ranking does.
-        let place = |spec: &Spec| others.iter().position(|r| r.name == spec.name);
-        order.sort_by_key(|spec| place(spec).unwrap_or(usize::MAX));
+        let way = self.way(&last, effects, &found.root);
+        let order = way.order;
         let mut ladder = first.to_vec();
         if !context.terms.is_empty() {
             let step = format!("with {}", context.words());
             ladder.push(self.rung(&context.judged, &[], &step));
         }
-        ladder.extend(self.rungs(&last, &order, &found.root));
-        let sets = self.sets(&last, &order, &others, &found.root);
+        ladder.extend(way.rungs);
+        let mut sets = self.sets(&last, &order, &others, &found.root);
         let alternatives: Vec<Model> = sets
             .iter()
             .flat_map(|set| &set.models)
@@ -161,19 +170,16 @@ impl Session<'_> {
             names
         };
         let separation = self.separation(&model, alternatives, separated);
-        let names: Vec<String> = order.iter().map(|spec| spec.name.to_owned()).collect();
-        let (missing, stand_ins) = match verdict {
-            Verdict::EffectMissing => (names, Vec::new()),
-            Verdict::PartlyExplained => (Vec::new(), names),
-            Verdict::NothingMissing | Verdict::Unexplained => (Vec::new(), Vec::new()),
+        let mut missing: Vec<String> = order.iter().map(|spec| spec.name.to_owned()).collect();
+        let proven = match verdict {
+            Verdict::EffectMissing => way.proven,
+            Verdict::PartlyExplained | Verdict::NothingMissing | Verdict::Unexplained => 0,
         };
+        let stand_ins = missing.split_off(proven);
+        sets.truncate(proven);
         Diagnosis {
             verdict,
-            sets: if missing.is_empty() {
-                Vec::new()
-            } else {
-                sets.into_iter().map(|set| set.names).collect()
-            },
+            sets: sets.into_iter().map(|set| set.names).collect(),
             missing,
             stand_ins,
             memory: memory(&model),
@@ -217,24 +223,44 @@ impl Session<'_> {
         }
     }
 
-    /// The rungs from the first effect to the last, each with one effect more.
-    fn rungs(&self, last: &Hypothesis, order: &[&'static Spec], root: &Hypothesis) -> Vec<Rung> {
-        let mut rungs = Vec::new();
+    /// From no effect to `last`, with one of its `effects` more at each step: what is missed least comes last.
+    fn way(&self, last: &Hypothesis, effects: Vec<&'static Spec>, root: &Hypothesis) -> Way {
+        let mut left = effects;
         let mut current = last.clone();
-        for count in (1..=order.len()).rev() {
-            let names: Vec<String> = order[..count].iter().map(|s| s.name.to_owned()).collect();
-            let step = format!("with {}", order[count - 1].name);
-            rungs.push(self.rung(&current.judged, &names, &step));
-            if count > 1 {
-                let of = |t: &Term| t.effect().is_some_and(|s| s.name == order[count - 1].name);
-                let without = current.terms.iter().position(of);
-                match without.and_then(|index| self.search.without(&current, index, root)) {
-                    Some(lesser) => current = lesser,
-                    None => break,
-                }
+        let mut later: Vec<(&'static Spec, Hypothesis)> = Vec::new();
+        let mut unproven = 0;
+        while left.len() > 1 {
+            let without = |spec: &&'static Spec| {
+                let of = |term: &Term| term.effect().is_some_and(|s| s.name == spec.name);
+                let index = current.terms.iter().position(of)?;
+                Some((*spec, self.search.without(&current, index, root)?))
+            };
+            let lesser: Vec<_> = left.par_iter().filter_map(without).collect();
+            let size = |one: &(_, Hypothesis)| one.1.judged.rmse();
+            let least = lesser
+                .into_iter()
+                .min_by(|a, b| size(a).total_cmp(&size(b)));
+            let Some((spec, lesser)) = least else { break };
+            if unproven == later.len() && self.is_enough(&lesser) {
+                unproven += 1;
             }
+            left.retain(|other| other.name != spec.name);
+            later.push((spec, std::mem::replace(&mut current, lesser)));
         }
-        rungs.reverse();
-        rungs
+        let mut names: Vec<String> = left.iter().map(|spec| spec.name.to_owned()).collect();
+        let mut rungs = Vec::new();
+        if let Some(first) = names.last() {
+            rungs.push(self.rung(&current.judged, &names, &format!("with {first}")));
+        }
+        for (spec, with) in later.iter().rev() {
+            names.push(spec.name.to_owned());
+            rungs.push(self.rung(&with.judged, &names, &format!("with {}", spec.name)));
+        }
+        left.extend(later.iter().rev().map(|(spec, _)| *spec));
+        Way {
+            proven: left.len() - unproven,
+            order: left,
+            rungs,
+        }
     }
 }

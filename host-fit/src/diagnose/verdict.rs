@@ -8,7 +8,7 @@ use super::{Diagnosis, RULES, Rung, Verdict};
 use crate::model::Model;
 use crate::residual::{FailureCoordinate, NoiseSource, examine};
 use crate::terms::{
-    Found, HeldOut, Hypothesis, Judged, Noise, RULES as TERMS, Screen, Table, Term, p_value,
+    Found, HeldOut, Hypothesis, Judged, Noise, RULES as TERMS, Screen, Search, Table, Term, p_value,
 };
 use model_core::effect::Spec;
 use rayon::prelude::*;
@@ -114,6 +114,12 @@ impl Session<'_> {
                 judge.unexplained_share(&judged.held_out) <= RULES.too_much && !self.depends(judged)
             }
         }
+    }
+
+    /// Whether a model is within what a known noise floor is known to: what takes the rest beside it is not proven.
+    pub(super) fn is_enough(&self, hypothesis: &Hypothesis) -> bool {
+        let known = self.judge().noise_source != NoiseSource::Scatter;
+        known && self.fits(&hypothesis.judged)
     }
 
     /// Whether the held-out error depends on anything but its own frequency.
@@ -234,10 +240,43 @@ impl Session<'_> {
             if self.fits(&found.bare.judged) && !leaner && !self.one_leads(&pared, found) {
                 return found.bare.clone();
             }
-            pared
+            self.without_what_lags_do(pared, &found.root)
         } else {
             found.best.clone()
         }
+    }
+
+    /// `best` without the effects in whose place lags do as well, searched for anew beside the other effects: those that it has
+    /// were found beside all of them.
+    fn without_what_lags_do(&self, mut best: Hypothesis, root: &Hypothesis) -> Hypothesis {
+        let bases = Search {
+            effects: false,
+            known: self.search.known.clone(),
+            ..*self.search
+        };
+        while best.terms.iter().filter_map(Term::effect).count() > 1 {
+            let enough = (1.0 + RULES.worthwhile) * best.judged.rmse();
+            let named = (0..best.terms.len()).filter(|i| best.terms[*i].effect().is_some());
+            let lesser = named.filter_map(|index| {
+                let name = best.terms[index].name();
+                (self.search.progress)(&format!("lags in the place of {name}"));
+                let lesser = self.search.without(&best, index, root)?;
+                let is_effect = |term: &Term| term.effect().is_some();
+                let (kept, lags) = lesser.terms.into_iter().partition(is_effect);
+                let mut from = Hypothesis::new(lesser.judged);
+                from.terms = lags;
+                let mut found = bases.run(from, || None).best;
+                let mut terms: Vec<Term> = kept;
+                terms.append(&mut found.terms);
+                found.terms = terms;
+                (found.judged.rmse() <= enough).then_some(found)
+            });
+            match lesser.min_by(|a, b| a.score().total_cmp(&b.score())) {
+                Some(lesser) => best = lesser,
+                None => break,
+            }
+        }
+        best
     }
 
     /// Whether one of the effects of `best` does better than the best without effects when it is alone.

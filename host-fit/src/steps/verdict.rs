@@ -149,13 +149,14 @@ fn finding(diagnosis: &Diagnosis) -> (String, String) {
                 [one] => format!("{one} is missing"),
                 several => format!("{} are missing", several.join(" and ")),
             };
+            let with = match (diagnosis.missing.len(), diagnosis.stand_ins.as_slice()) {
+                (1, []) => "it".to_owned(),
+                (_, []) => "them".to_owned(),
+                (_, others) => [&diagnosis.missing, others].concat().join(" and "),
+            };
             let mut meaning = format!(
                 "With {} the held-out error falls from {} to {}; {floor}.",
-                if diagnosis.missing.len() == 1 {
-                    "it"
-                } else {
-                    "them"
-                },
+                with,
                 significant(first, 3),
                 significant(last, 3)
             );
@@ -180,6 +181,17 @@ fn finding(diagnosis: &Diagnosis) -> (String, String) {
                     " These records cannot tell {} from {}.",
                     entry.effect,
                     entry.confounded_with.join(", ")
+                ));
+            }
+            if !diagnosis.stand_ins.is_empty() {
+                let several = diagnosis.stand_ins.len() > 1;
+                meaning.push_str(&format!(
+                    " {} {} the rest only and may stand in for anything: without {} the held-out error is within what the noise floor is known to. \
+                     The model is handed over with {}, marked.",
+                    diagnosis.stand_ins.join(" and "),
+                    if several { "take" } else { "takes" },
+                    if several { "them" } else { "it" },
+                    if several { "them" } else { "it" },
                 ));
             }
             (headline, meaning)

@@ -365,9 +365,8 @@ mod tests {
     /// An echo of the other sign drives the flow below rest, one of the same above full strength.
     #[test]
     fn no_flow_runs_away() {
-        let draw = |seed, echo, noise| {
-            RigPlan::draw(Family::RateOfY, &[echo], noise, &[], seed).unwrap()
-        };
+        let draw =
+            |seed, echo, noise| RigPlan::draw(Family::RateOfY, &[echo], noise, &[], seed).unwrap();
         for (seed, echo, noise) in [
             (900_000_103, "echo-path", NoiseKind::Coloured),
             (1, "echo-path", NoiseKind::Coloured),

@@ -31,9 +31,21 @@ impl RigPlan {
             Character::RateOfFriction { .. } => Some(&["y"][..]),
         };
         let flow = flow.map(|coordinates| Truth::new(Port::Flow, coordinates));
+        // What of the past is lost where the jet arrives is a factor of the jet.
+        let jet = match &self.plant.character {
+            Character::Memory(terms) if terms.iter().any(|term| term.lost != 0.0) => {
+                Some(Truth::new(Port::Jet, &["past y"]))
+            }
+            _ => None,
+        };
         let drift = self.nuisances.drift != 0.0;
         let zero = drift.then(|| Truth::new(Port::Sensor, &["time in record"]));
-        delay.into_iter().chain(flow).chain(zero).collect()
+        delay
+            .into_iter()
+            .chain(flow)
+            .chain(jet)
+            .chain(zero)
+            .collect()
     }
 }
 

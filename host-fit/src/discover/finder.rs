@@ -55,7 +55,11 @@ impl Finder<'_> {
             let curves = diverse(curves, most);
             pool.extend(curves.into_iter().map(|curve| (beside, curve)));
         }
-        let found = self.judged(self.followed(pool, number), base, looked_at, number);
+        // What is at the floor has nothing to gain.
+        let open = self.search.judge.over_noise(base.judged.rmse()) > RULES.at_the_floor;
+        let found = open
+            .then(|| self.judged(self.followed(pool, number), base, looked_at, number))
+            .flatten();
         Round {
             found,
             looked_at,

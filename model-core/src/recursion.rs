@@ -55,9 +55,7 @@ impl Grading {
     #[inline]
     fn share<T: Real>(self, jet: T) -> T {
         match self {
-            Self::Proportional => jet,
-            // An echo drives the jets beyond full strength, and the flow no faster.
-            Self::Interpolated => jet.at_least(T::ZERO).at_most(T::ONE),
+            Self::Proportional | Self::Interpolated => jet,
             Self::Switched => {
                 let half = T::from_f64(0.5);
                 let share = half + (jet - half) * T::from_f64(SWITCHING_SLOPE);

@@ -7,6 +7,7 @@ use super::place::Entry;
 use super::screening::{Context, Screened, diverse, reference};
 use super::term::Term;
 use super::{Options, RULES};
+use crate::diagnose::RULES as DIAGNOSE;
 use crate::experiment::Separation;
 use crate::model::Model;
 use crate::terms::{
@@ -27,6 +28,8 @@ pub(super) struct Finder<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) units: &'a Units,
     pub(super) options: &'a Options,
+    /// Whether the sensor's zero is another one in each record.
+    pub(super) moving_zero: bool,
 }
 
 impl Finder<'_> {
@@ -56,7 +59,7 @@ impl Finder<'_> {
             pool.extend(curves.into_iter().map(|curve| (beside, curve)));
         }
         // What is at the floor has nothing to gain.
-        let open = self.search.judge.over_noise(base.judged.rmse()) > RULES.at_the_floor;
+        let open = self.search.judge.over_noise(base.judged.rmse()) > DIAGNOSE.at_once;
         let found = open
             .then(|| self.judged(self.followed(pool, number), base, looked_at, number))
             .flatten();
@@ -101,6 +104,16 @@ impl Finder<'_> {
     fn may_be_told(&self, term: &Term, base: &Hypothesis) -> bool {
         let varies = term.entry == Entry::Sensitivity || term.coordinate == Coordinate::Time;
         !varies || !self.is_near_the_floor(base)
+    }
+
+    /// Share of the excess that a term beside `base` has to take: most of it where what scatters or drifts from record
+    /// to record may be the rest.
+    fn least_share(&self, base: &Hypothesis) -> f64 {
+        if self.moving_zero || self.is_near_the_floor(base) {
+            RULES.most_of_it
+        } else {
+            RULES.least_share
+        }
     }
 
     /// How large a term would have to be at each place, in the user's units.
@@ -152,12 +165,7 @@ impl Finder<'_> {
         let excess = |judged: &Judged| judge.excess(&judged.held_out);
         let of_excess =
             |judged: &Judged| 1.0 - excess(judged) / excess(&without.judged).max(f64::MIN_POSITIVE);
-        let least = if self.is_near_the_floor(base) {
-            RULES.most_of_it
-        } else {
-            RULES.least_share
-        };
-        let little = judge.over_noise(1.0).is_finite() && of_excess(last) < least;
+        let little = judge.over_noise(1.0).is_finite() && of_excess(last) < self.least_share(base);
         let drifts_more = judge.drifts_more(last, &base.judged);
         if gain < RULES.worthwhile || little || drifts_more {
             return None;

@@ -121,10 +121,12 @@ pub fn discover(
         interrupt,
         progress,
     };
+    let moving_zero = MovingZero::of(records);
     let finder = Finder {
         search: &search,
         units,
         options,
+        moving_zero: moving_zero.is_some(),
     };
     let rung = |hypothesis: &Hypothesis, terms: &[String], step: &str| {
         let held_out = &hypothesis.judged.held_out;
@@ -228,7 +230,7 @@ pub fn discover(
         looked_at,
         trace,
         separation,
-        moving_zero: MovingZero::of(records),
+        moving_zero,
         model,
     })
 }

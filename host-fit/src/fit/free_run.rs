@@ -628,7 +628,7 @@ mod tests {
     #[test]
     fn what_lasts_as_long_as_a_record_counts_as_one_draw() {
         let part = |k: usize| Part {
-            residual: vec![if k % 2 == 0 { 0.1 } else { -0.1 }; 4000],
+            residual: vec![if k.is_multiple_of(2) { 0.1 } else { -0.1 }; 4000],
             jacobian: vec![vec![1.0; 4000]],
         };
         let parts: Vec<Part> = (0..8).map(part).collect();

@@ -247,8 +247,11 @@ impl Session<'_> {
     }
 
     /// `best` without the effects in whose place lags do as well, searched for anew beside the other effects: those that it has
-    /// were found beside all of them.
+    /// were found beside all of them. Where the noise floor is not known, errors say too little to ask that.
     fn without_what_lags_do(&self, mut best: Hypothesis, root: &Hypothesis) -> Hypothesis {
+        if self.judge().noise_source == NoiseSource::Scatter {
+            return best;
+        }
         let bases = Search {
             effects: false,
             known: self.search.known.clone(),

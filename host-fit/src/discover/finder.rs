@@ -11,7 +11,7 @@ use crate::diagnose::RULES as DIAGNOSE;
 use crate::experiment::Separation;
 use crate::model::Model;
 use crate::terms::{
-    HeldOut, Hypothesis, Judged, Screen, Search, Table, Units, is_out, p_value, shares_won,
+    HeldOut, Hypothesis, Judge, Judged, Screen, Search, Table, Units, is_out, p_value, shares_won,
 };
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
@@ -106,14 +106,15 @@ impl Finder<'_> {
         !varies || !self.is_near_the_floor(base)
     }
 
-    /// Share of the excess that a term beside `base` has to take: most of it where what scatters or drifts from record
-    /// to record may be the rest.
-    fn least_share(&self, base: &Hypothesis) -> f64 {
-        if self.moving_zero || self.is_near_the_floor(base) {
-            RULES.most_of_it
-        } else {
-            RULES.least_share
-        }
+    /// Whether a term takes too little of the excess: of the model without it, or most of what the best base leaves where
+    /// what scatters or drifts from record to record may be all of that.
+    fn takes_too_little(&self, with: &Judged, without: &Judged, base: &Hypothesis) -> bool {
+        let judge = self.search.judge;
+        let may_scatter = self.moving_zero || self.is_near_the_floor(base);
+        let too_little = |of: &Judged, least: f64| taken(judge, of, with) < least;
+        judge.over_noise(1.0).is_finite()
+            && (too_little(without, RULES.least_share)
+                || may_scatter && too_little(&base.judged, RULES.most_of_it))
     }
 
     /// How large a term would have to be at each place, in the user's units.
@@ -162,10 +163,7 @@ impl Finder<'_> {
         let found = self.finer(best(&mut all)?);
         let last = found.judged();
         let gain = 1.0 - last.rmse() / base.judged.rmse();
-        let excess = |judged: &Judged| judge.excess(&judged.held_out);
-        let of_excess =
-            |judged: &Judged| 1.0 - excess(judged) / excess(&without.judged).max(f64::MIN_POSITIVE);
-        let little = judge.over_noise(1.0).is_finite() && of_excess(last) < self.least_share(base);
+        let little = self.takes_too_little(last, &without.judged, base);
         let drifts_more = judge.drifts_more(last, &base.judged);
         if gain < RULES.worthwhile || little || drifts_more {
             return None;
@@ -208,7 +206,7 @@ impl Finder<'_> {
         let resembles = direction.map_or_else(Vec::new, |direction| {
             self.resembling(context.screen(), &direction)
         });
-        let taken = of_excess(&with.judged);
+        let taken = taken(judge, &without.judged, &with.judged);
         Some(Found {
             curve: term.clone(),
             errors,
@@ -292,6 +290,12 @@ impl Finder<'_> {
         }
         names
     }
+}
+
+/// Share of the excess of one model that is gone with another.
+fn taken(judge: &Judge, without: &Judged, with: &Judged) -> f64 {
+    let excess = |judged: &Judged| judge.excess(&judged.held_out);
+    1.0 - excess(with) / excess(without).max(f64::MIN_POSITIVE)
 }
 
 /// Whether a model is as good as a better one, for all that the records say.

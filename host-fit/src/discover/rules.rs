@@ -49,7 +49,7 @@ rules! {
     /// A base that leaves less than this is near the floor: a term has to take `most_of_it` there, and neither the sensor's sensitivity nor
     /// time in the record is told, as levels that scatter and zeros that drift look like them.
     near_the_floor: f64 = 1.10, "times the noise floor", "`floor_margin` of `diagnose`: nulls of nine families stay below it";
-    /// Share of the excess that a term has to take there, and wherever the sensor's zero moves from record to record.
+    /// Share of the best base's excess that a term has to take there, and wherever the sensor's zero moves from record to record.
     most_of_it: f64 = 0.75, "share of the excess", "curves through zeros that drift or wander took 50 to 70 %, terms that were there 80 % and more in 16 of 17";
     /// Level of the whole search, with all curves that were looked at.
     level_of_search: f64 = 0.02, "p-value", "as for effects of the catalogue: three false terms in a hundred are too many";

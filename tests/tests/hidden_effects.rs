@@ -84,6 +84,32 @@ fn what_scatters_between_repeats_gets_no_name() {
     assert_eq!(row.verdict, "nothing-missing", "{}", row.said());
 }
 
+/// No command reaches a full jet, and yet they are shares of one: the rate that depends on y is in the base then.
+#[test]
+fn graded_commands_below_a_full_jet_leave_nothing_to_name() {
+    let row = asked(&Case {
+        nuisances: vec![Nuisance::Graded],
+        ..Case::new(Group::Nothing, Family::RateOfY, &[], 717_171_200_018)
+    });
+    assert_eq!(row.verdict, "nothing-missing", "{}", row.said());
+    assert!(row.is_at_floor(), "{:?}", row.over_floor);
+}
+
+/// Beside its lag an echo of three per cent would take what the second order of the valve leaves; another lag of the flow does too.
+#[test]
+fn a_valve_of_second_order_is_a_valve_and_no_echo() {
+    let row = asked(&Case {
+        noise: NoiseKind::White,
+        ..Case::new(
+            Group::Altered,
+            Family::Memory1,
+            &["second-order-valve"],
+            777_001_100_146,
+        )
+    });
+    assert_eq!(row.missing, ["valve-lag"], "{}", row.said());
+}
+
 /// In the first round the edges' delay comes with a valve's lag at the end of its range, which hides it.
 #[test]
 fn what_was_added_with_a_stand_in_stays_without_it() {

@@ -7,6 +7,7 @@ mod lean;
 mod level_scatter;
 mod levenberg;
 mod rules;
+mod sandwich;
 mod starts;
 
 pub(crate) use candidate::channel_reference;

@@ -477,6 +477,20 @@ mod tests {
     }
 
     #[test]
+    fn what_a_sensor_was_calibrated_at_is_above_nothing() {
+        let mut model = Model::default();
+        let film = model.spec("hot-film-nonlinearity").expect("known");
+        model.add(film, &[3.0, 0.1], Some(5.0));
+        let text = model.to_toml();
+        assert!(Model::from_toml(&text, "m").is_ok());
+        for wrong in ["0.0", "-5.0", "nan"] {
+            let text = text.replace("reference = 5.0", &format!("reference = {wrong}"));
+            let error = Model::from_toml(&text, "m").expect_err("no calibration");
+            assert!(error.to_string().contains("`reference`"), "{error}");
+        }
+    }
+
+    #[test]
     fn effects_stand_in_the_order_of_the_physics() {
         let order = [
             "valve-lag",

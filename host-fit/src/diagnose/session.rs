@@ -26,7 +26,7 @@ struct Way {
     order: Vec<&'static Spec>,
     /// A rung for each, with those before it.
     rungs: Vec<Rung>,
-    /// How many of them are proven: without those that follow the model fits all the same.
+    /// How many of them are proven: without those that follow the model fits all the same, or fits as well with one of the others twice.
     proven: usize,
 }
 
@@ -241,10 +241,12 @@ impl Session<'_> {
                 .into_iter()
                 .min_by(|a, b| size(a).total_cmp(&size(b)));
             let Some((spec, lesser)) = least else { break };
-            if unproven == later.len() && self.is_enough(&lesser) {
+            left.retain(|other| other.name != spec.name);
+            let stands_in =
+                || self.is_enough(&lesser) || self.does_as_well_twice(&left, &lesser, &current);
+            if unproven == later.len() && stands_in() {
                 unproven += 1;
             }
-            left.retain(|other| other.name != spec.name);
             later.push((spec, std::mem::replace(&mut current, lesser)));
         }
         let mut names: Vec<String> = left.iter().map(|spec| spec.name.to_owned()).collect();

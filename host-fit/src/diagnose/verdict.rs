@@ -122,6 +122,25 @@ impl Session<'_> {
         known && self.fits(&hypothesis.judged)
     }
 
+    /// Whether `lesser` with one of its `effects` twice does as well as `best`, which has another one more: an effect in another law
+    /// than the catalogue's looks like two of it.
+    pub(super) fn does_as_well_twice(
+        &self,
+        effects: &[&'static Spec],
+        lesser: &Hypothesis,
+        best: &Hypothesis,
+    ) -> bool {
+        let enough = (1.0 + RULES.worthwhile) * best.judged.rmse();
+        effects.iter().any(|spec| {
+            (self.search.progress)(&format!(
+                "a second {} in the place of another effect",
+                spec.name
+            ));
+            let twice = self.search.again(lesser, spec);
+            twice.is_some_and(|twice| twice.rmse() <= enough)
+        })
+    }
+
     /// Whether the held-out error depends on anything but its own frequency.
     fn depends(&self, judged: &Judged) -> bool {
         let (mut records, mut runs) = (Vec::new(), Vec::new());

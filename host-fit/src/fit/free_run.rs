@@ -2,13 +2,12 @@
 //! by dual numbers, secants for what acts in steps, and standard errors that allow for
 //! correlated residuals.
 
+use super::covariance::{covariance, product};
 use super::level_scatter::LevelScatter;
 use super::levenberg::{FitStop, LeastSquares, Part, minimise};
 use super::rules::RULES;
-use super::sandwich::{product, sandwich};
 use crate::data::Record;
 use crate::dual::Dual;
-use crate::linalg::{self, dot};
 use crate::model::{Coordinate, Delay, Kind, Model, Rounding};
 use crate::simulate::{Signals, SimulateError, Simulator};
 use model_core::Output;
@@ -62,8 +61,8 @@ pub struct Fit {
     pub samples: usize,
     /// Indices of the coordinates that moved.
     pub free: Vec<usize>,
-    /// Covariance of the free coordinates that allows for correlated residuals,
-    /// row-major; NaN on the diagonal for those that the records leave unknown.
+    /// Covariance of the free coordinates that allows for correlated residuals and for few records, such that 1.96 standard
+    /// errors to either side are an interval of 95 %, row-major; NaN on the diagonal for those that the records leave unknown.
     pub covariance: Vec<f64>,
     /// Iterations made.
     pub iterations: usize,
@@ -498,9 +497,8 @@ fn descend(
     }
     let covariance = end
         .linearised
-        .and_then(|(parts, information)| {
-            covariance(&parts, &information, &problem.axes, &end.values)
-        })
+        .and_then(|(parts, information)| covariance(&parts, &information, problem.axes.len()))
+        .map(|searched| in_values(&searched, &problem.axes, &end.values))
         .unwrap_or_default();
     Ok(Fit {
         model: model.with_values(&end.values),
@@ -511,23 +509,6 @@ fn descend(
         iterations: end.iterations,
         stop: end.stop,
     })
-}
-
-/// Covariance of the coordinates, NaN on the diagonal where the records leave one unknown.
-fn covariance(
-    parts: &[Part],
-    information: &[f64],
-    axes: &[Searched],
-    values: &[f64],
-) -> Option<Vec<f64>> {
-    let n = axes.len();
-    let (inverse, unknown) = linalg::inverse_where_known(information, n)?;
-    let searched = sandwich(parts, &inverse, n);
-    let mut covariance = in_values(&searched, axes, values);
-    for (i, _) in unknown.iter().enumerate().filter(|(_, unknown)| **unknown) {
-        covariance[i * n + i] = f64::NAN;
-    }
-    Some(covariance)
 }
 
 /// Covariance of the coordinates themselves from that of what is searched.

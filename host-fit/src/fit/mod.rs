@@ -1,13 +1,13 @@
 //! Output-error fits: parameters that make the free run follow the records.
 
 mod candidate;
+mod covariance;
 mod drift;
 mod free_run;
 mod lean;
 mod level_scatter;
 mod levenberg;
 mod rules;
-mod sandwich;
 mod starts;
 
 pub(crate) use candidate::channel_reference;

@@ -7,6 +7,7 @@
 //! moves of the same search: both have to earn their place, and an effect has to beat
 //! what a base without it can do.
 
+mod again;
 mod automatic;
 mod bench;
 mod chance;

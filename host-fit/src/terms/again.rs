@@ -1,0 +1,84 @@
+//! A second one of the same effect. What a rig does in another law than the catalogue's often looks like two of it: two reservoirs, two
+//! time constants of a drift, two lags of a film.
+
+use super::RULES;
+use super::judge::Judged;
+use super::search::{Hypothesis, Search};
+use crate::fit::{Fit, FitOptions, fit, starts};
+use model_core::effect::Spec;
+use rayon::prelude::*;
+
+impl Search<'_> {
+    /// `hypothesis` with one of its effects twice, the second from the best of the starting points of its card; `None` where it has
+    /// no such effect outside its delay law, or none is stable.
+    pub(crate) fn again(&self, hypothesis: &Hypothesis, spec: &'static Spec) -> Option<Judged> {
+        let model = hypothesis.judged.model();
+        let own = model.effects.iter().find(|added| added.name == spec.name)?;
+        let learning = self.judge.learning(0);
+        let brief = starts(model, spec, &learning).into_par_iter().map(|start| {
+            let mut twice = model.clone();
+            twice.add(spec, &start, own.reference);
+            let options = FitOptions {
+                iterations: RULES.brief,
+                ..self.judge.options_for(&twice)
+            };
+            fit(&twice, &learning, &options).ok()
+        });
+        let mut brief: Vec<Fit> = brief.collect::<Vec<_>>().into_iter().flatten().collect();
+        brief.sort_by(|a, b| a.mean_square().total_cmp(&b.mean_square()));
+        brief.truncate(RULES.followed);
+        let judged = brief
+            .into_par_iter()
+            .map(|begun| self.judge.refitted(&begun.model).ok());
+        let judged: Vec<Option<Judged>> = judged.collect();
+        let both = judged.into_iter().flatten();
+        both.min_by(|a, b| a.rmse().total_cmp(&b.rmse()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::residual::plants::{base, records};
+    use crate::terms::{Bench, Known};
+    use model_core::effects::spec;
+    use std::sync::atomic::AtomicBool;
+
+    /// A drift that ends in two steps, one of 0.6 s and one of 5 s.
+    #[test]
+    fn a_drift_of_two_time_constants_is_two_drifts() {
+        let mut records = records(&[], &[], 3);
+        let given = base(&records);
+        for record in &mut records {
+            let period = record.sample_period_s;
+            for (k, y) in record.y.iter_mut().enumerate() {
+                let time = k as f64 * period;
+                let ended = |after: f64| 1.0 - (-time / after).exp();
+                *y += 0.10 * ended(0.6) + 0.12 * ended(5.0);
+            }
+        }
+        let bench = Bench::of(&given, &records).expect("records to learn from");
+        let search = Search {
+            judge: &bench.judge,
+            known: Known::of(&bench.judge.learning(0)),
+            effects: true,
+            most_effects: 4,
+            interrupt: &AtomicBool::new(false),
+            progress: &|_| {},
+        };
+        let drift = spec("thermal-drift").expect("in the catalogue");
+        let mut one = bench.given.clone();
+        one.add(drift, &[0.2, 2.0], None);
+        let one = Hypothesis::new(bench.judge.refitted(&one).expect("stable"));
+        let over = |rmse: f64| bench.judge.over_noise(rmse);
+        assert!(
+            over(one.judged.rmse()) > 1.15,
+            "{}",
+            over(one.judged.rmse())
+        );
+        let two = search.again(&one, drift).expect("stable");
+        assert!(over(two.rmse()) < 1.03, "{}", over(two.rmse()));
+        let echo = spec("echo-path").expect("in the catalogue");
+        assert!(search.again(&one, echo).is_none());
+    }
+}

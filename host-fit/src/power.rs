@@ -125,20 +125,24 @@ impl Asked {
         (scatter + wanted.sqrt()) / left.energy
     }
 
-    /// The multiple of what is shown that passes beside all terms that are worth it then.
+    /// The multiple of what is shown that is seen: `margin` times what passes beside as many terms as are worth it then. One of
+    /// them may be worth little without the next: two lags side by side are an echo.
     fn multiple(&self, shown: &Shown) -> f64 {
-        let mut x = 0.0_f64;
-        for (left, next) in shown.beside.iter().zip(shown.beside.iter().skip(1)) {
-            x = x.max(self.passes(left, shown.error));
-            let before = shown.error + x * x * left.energy;
-            let after = shown.error + x * x * next.energy;
-            let worth = 0.5 * (before / after).ln() > TERMS.price * RULES.term_cost;
-            if !worth {
-                return x;
+        let (mut x, mut beside) = (0.0_f64, 0);
+        while let Some(left) = shown.beside.get(beside) {
+            x = x.max(RULES.margin * self.passes(left, shown.error));
+            let score = |(terms, left): (usize, &Left)| {
+                let size = 0.5 * (shown.error + x * x * left.energy).ln();
+                size + TERMS.price * RULES.term_cost * terms as f64
+            };
+            let more = shown.beside.iter().enumerate().skip(beside);
+            let best = more.min_by(|a, b| score(*a).total_cmp(&score(*b)));
+            match best {
+                Some((terms, _)) if terms > beside => beside = terms,
+                _ => return x,
             }
         }
-        let last = shown.beside.last();
-        last.map_or(f64::INFINITY, |left| x.max(self.passes(left, shown.error)))
+        f64::INFINITY
     }
 }
 
@@ -212,7 +216,7 @@ impl Detector<'_> {
         let shown = self
             .screen
             .shown(&self.unnamed, &model, self.block, RULES.terms)?;
-        let x = RULES.margin * size * self.asked.multiple(&shown);
+        let x = size * self.asked.multiple(&shown);
         x.is_finite().then_some(x)
     }
 }

@@ -45,7 +45,7 @@ pub use rules::{RULES, Rules};
 pub use screen::Screen;
 pub(crate) use screen::Tangent;
 pub use search::{Found, Hypothesis, Search};
-pub(crate) use shown::{Left, Shown};
+pub(crate) use shown::{Left, Shown, Unnamed};
 pub use table::{Candidate, Table};
 pub use term::Term;
 pub(crate) use term::second_lag_s;

@@ -2,9 +2,14 @@
 
 use super::screen::Screen;
 use super::table::Table;
+use crate::fit::Known;
 use crate::linalg::dot;
 use crate::model::Model;
+use rayon::prelude::*;
 use std::ops::Range;
+
+/// Two columns are one where less than this share of them is apart.
+const SAME: f64 = 1e-6;
 
 /// What a change of the model shows in the free run, on what is held out.
 #[derive(Clone, Debug)]
@@ -24,13 +29,38 @@ pub(crate) struct Left {
     pub(crate) deviation: f64,
 }
 
+/// What a model may have without a name, and how alike that is.
+pub(crate) struct Unnamed {
+    columns: Vec<Vec<f64>>,
+    /// Products of the columns with each other where they are learned.
+    products: Vec<Vec<f64>>,
+}
+
+impl Unnamed {
+    /// All that could be added to the screen's model without a name.
+    pub(crate) fn of(screen: &Screen, known: &Known) -> Self {
+        let columns = Table::of(screen, known, false).columns;
+        let product =
+            |i: usize, j: usize| dot(&columns[i][..screen.learned], &columns[j][..screen.learned]);
+        let all = 0..columns.len();
+        let products = all
+            .clone()
+            .into_par_iter()
+            .map(|i| all.clone().map(|j| product(i, j)).collect());
+        Self {
+            products: products.collect(),
+            columns,
+        }
+    }
+}
+
 impl Screen<'_> {
     /// What `other` changes that this model's own parameters cannot do in its place, nor up to `most`
     /// columns of `unnamed`, the best first; `block` samples of the error are independent of the next.
     /// `None` if it diverges or changes nothing.
     pub(crate) fn shown(
         &self,
-        unnamed: &Table,
+        unnamed: &Unnamed,
         other: &Model,
         block: usize,
         most: usize,
@@ -52,25 +82,130 @@ impl Screen<'_> {
             error: dot(held_out, held_out),
             beside: vec![left(&change)],
         };
-        let mut rest = change.clone();
-        let mut chosen: Vec<&[f64]> = Vec::new();
-        while chosen.len() < most {
-            let takes = |column: &&Vec<f64>| {
-                let (own, rest) = (&column[..self.learned], &rest[..self.learned]);
-                dot(own, rest).powi(2) / dot(own, own).max(f64::MIN_POSITIVE)
-            };
-            let best = unnamed
-                .columns
+        for chosen in self.ever_more(unnamed, &change, most) {
+            let chosen: Vec<&[f64]> = chosen
                 .iter()
-                .max_by(|a, b| takes(a).total_cmp(&takes(b)));
-            let Some(best) = best else { break };
-            chosen.push(best);
-            let Some(less) = self.rest_of(&change, &chosen) else {
+                .map(|i| unnamed.columns[*i].as_slice())
+                .collect();
+            let Some(rest) = self.rest_of(&change, &chosen) else {
                 break;
             };
-            rest = less;
             shown.beside.push(left(&rest));
         }
         (shown.beside.last()?.energy > 0.0).then_some(shown)
+    }
+
+    /// The best column in the place of a change where it is learned, the best two, and those with ever more, each the best beside
+    /// the others. Two that are worth little alone may be worth all: lags side by side are the rate of the past.
+    fn ever_more(&self, unnamed: &Unnamed, change: &[f64], most: usize) -> Vec<Vec<usize>> {
+        let columns: Vec<&[f64]> = (unnamed.columns.iter())
+            .map(|column| &column[..self.learned])
+            .collect();
+        let along: Vec<f64> = columns
+            .iter()
+            .map(|c| dot(c, &change[..self.learned]))
+            .collect();
+        let square = |i: usize| unnamed.products[i][i].max(f64::MIN_POSITIVE);
+        let alone = |i: &usize| along[*i].powi(2) / square(*i);
+        let pair = |(i, j): &(usize, usize)| {
+            let (a, b, both) = (square(*i), square(*j), unnamed.products[*i][*j]);
+            let apart = a * b - both * both;
+            if apart <= SAME * a * b {
+                return 0.0;
+            }
+            let (x, y) = (along[*i], along[*j]);
+            (x * x * b - 2.0 * x * y * both + y * y * a) / apart
+        };
+        let all = 0..columns.len();
+        let Some(first) = all.clone().max_by(|a, b| alone(a).total_cmp(&alone(b))) else {
+            return Vec::new();
+        };
+        let mut chosen = vec![vec![first]];
+        let pairs = all.flat_map(|j| (0..j).map(move |i| (i, j)));
+        let best = pairs.max_by(|a, b| pair(a).total_cmp(&pair(b)));
+        chosen.extend(best.map(|(i, j)| vec![i, j]));
+        while let Some(last) = chosen.last().filter(|last| last.len() < most) {
+            let of: Vec<&[f64]> = last
+                .iter()
+                .map(|i| unnamed.columns[*i].as_slice())
+                .collect();
+            let Some(rest) = self.rest_of(change, &of) else {
+                break;
+            };
+            let takes = |i: &usize| dot(columns[*i], &rest[..self.learned]).powi(2) / square(*i);
+            let others = (0..columns.len()).filter(|i| !last.contains(i));
+            let Some(next) = others.max_by(|a, b| takes(a).total_cmp(&takes(b))) else {
+                break;
+            };
+            let longer = [last.as_slice(), &[next]].concat();
+            chosen.push(longer);
+        }
+        chosen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::{Record, Use};
+    use crate::model::Delay;
+    use crate::terms::Bench;
+    use model_core::effects::spec;
+
+    /// Telegraphs on a flow that attaches as fast as it separates: its jet is its rate and its level, so that an echo is two lags.
+    fn linear() -> (Model, Vec<Record>) {
+        let model = Model {
+            a: vec![0.97],
+            b: vec![0.03],
+            c: vec![0.0],
+            delay: Delay::Fixed { delays: vec![30] },
+            ..Model::default()
+        };
+        let mut random = 5_u32;
+        let mut next = move || {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            random >> 16
+        };
+        let mut record = |index: usize| {
+            let mut u: Vec<f64> = vec![0.0; 600];
+            while u.len() < 5000 {
+                let (blow, rest) = (30 + next() % 200, 30 + next() % 200);
+                u.extend((0..blow).map(|_| 1.0));
+                u.extend((0..rest).map(|_| 0.0));
+            }
+            u.truncate(5000);
+            let mut y = vec![0.0];
+            for k in 0..u.len() - 1 {
+                let jet = if k >= 30 { u[k - 30] } else { 0.0 };
+                y.push(0.97 * y[k] + 0.03 * jet);
+            }
+            y.iter_mut()
+                .for_each(|y| *y += 1e-3 * (f64::from(next() % 1000) / 1e3 - 0.5));
+            let role = [Use::Identify, Use::Validate][index % 2];
+            Record::new(&format!("r{index}"), role, 0.001, u, y)
+        };
+        let records = (0..4).map(&mut record).collect();
+        (model, records)
+    }
+
+    #[test]
+    fn an_echo_hides_behind_two_lags_and_not_behind_one() {
+        let (model, records) = linear();
+        let bench = Bench::of(&model, &records).expect("records to learn from");
+        let fitted = bench.judge.refitted(&bench.given).expect("a stable model");
+        let screen = Screen::new(&bench.judge, fitted.model()).expect("a stable model");
+        let unnamed = Unnamed::of(&screen, &Known::of(&bench.judge.learning(0)));
+        let left = |name: &str, parameters: &[f64]| -> Vec<f64> {
+            let mut other = fitted.model().clone();
+            other.add(spec(name).expect("in the catalogue"), parameters, None);
+            let shown = screen.shown(&unnamed, &other, 50, 4).expect("it shows");
+            let energy = |left: &Left| left.energy / shown.beside[0].energy;
+            shown.beside.iter().map(energy).collect()
+        };
+        let echo = left("echo-path", &[0.1, 0.142]);
+        assert!(echo[1] > 0.02 && echo[2] < 1e-3, "{echo:?}");
+        // No lag of y is there before y moves.
+        let pickup = left("electrical-pickup", &[0.1]);
+        assert!(pickup.len() == 5 && pickup[4] > 0.3, "{pickup:?}");
     }
 }

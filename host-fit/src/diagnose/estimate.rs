@@ -1,11 +1,15 @@
 //! Fitted parameters as they are reported.
 
+use super::RULES;
 use crate::fit::Fit;
 use crate::model::Model;
 use crate::terms::Units;
-use model_core::effect::Spec;
+use model_core::effect::{Parameter, Spec};
 use serde::Serialize;
 use std::collections::BTreeMap;
+
+/// Standard errors to either side of an interval of 95 %.
+const DEVIATES: f64 = 1.96;
 
 /// A fitted physical parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -39,14 +43,7 @@ pub(crate) fn estimates_among(
 ) -> BTreeMap<String, ParameterEstimate> {
     let values = fit.model.values();
     let coordinates = fit.model.coordinates();
-    let own = coordinates
-        .iter()
-        .enumerate()
-        .filter_map(|(index, coordinate)| {
-            let parameter = coordinate.parameter()?;
-            let of_spec = coordinate.name == format!("{}.{}", spec.name, parameter.name);
-            of_spec.then_some((index, parameter))
-        });
+    let own = own(&fit.model, spec).into_iter();
     own.map(|(index, parameter)| {
         let value = values[index];
         let own = fit.standard_error(index).unwrap_or(f64::INFINITY);
@@ -59,7 +56,7 @@ pub(crate) fn estimates_among(
         };
         let apart: Vec<f64> = alike.iter().filter_map(of).collect();
         let between = apart.iter().sum::<f64>() / (apart.len() + 1) as f64;
-        let half = 1.96 * (own * own + between).sqrt();
+        let half = DEVIATES * (own * own + between).sqrt();
         let (low, high) = if parameter.is_logarithmic() {
             let factor = (half / value).exp();
             (value / factor, value * factor)
@@ -76,4 +73,70 @@ pub(crate) fn estimates_among(
         (parameter.name.to_owned(), estimate)
     })
     .collect()
+}
+
+/// Whether the parameters of an effect in a fit are known: its amplitude from 0, and each that is positive to within a factor.
+pub(super) fn is_identified(fit: &Fit, spec: &Spec) -> bool {
+    let values = fit.model.values();
+    let amplitude = spec.amplitude.filter(|amplitude| amplitude.linear);
+    own(&fit.model, spec).into_iter().all(|(index, card)| {
+        let half = DEVIATES * fit.standard_error(index).unwrap_or(f64::INFINITY);
+        if amplitude.is_some_and(|amplitude| amplitude.parameter == card.name) {
+            values[index].abs() > half
+        } else if card.is_logarithmic() && card.low < card.high {
+            2.0 * half / values[index] <= RULES.identified.ln()
+        } else {
+            true
+        }
+    })
+}
+
+/// An effect's parameters and where they stand among the coordinates of a model.
+fn own(model: &Model, spec: &Spec) -> Vec<(usize, &'static Parameter)> {
+    let coordinates = model.coordinates();
+    let place = |parameter: &'static Parameter| {
+        let name = format!("{}.{}", spec.name, parameter.name);
+        let index = coordinates.iter().position(|own| own.name == name)?;
+        Some((index, parameter))
+    };
+    spec.parameters.iter().filter_map(place).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::FitStop;
+    use model_core::effects::spec;
+
+    /// A vortex of gain 0.3 that decays in 30 ms, its parameters known to these standard errors.
+    fn known_to(gain: f64, decay: f64) -> bool {
+        let vortex = spec("starting-vortex").expect("in the catalogue");
+        let mut model = Model::default();
+        model.add(vortex, &[0.3, 0.03], None);
+        let at = |name: &str| {
+            let coordinates = model.coordinates();
+            coordinates
+                .iter()
+                .position(|c| c.name == name)
+                .expect("a parameter")
+        };
+        let free = vec![at("starting-vortex.gain"), at("starting-vortex.decay_time")];
+        let fit = Fit {
+            model,
+            sum_of_squares: 1.0,
+            samples: 100,
+            free,
+            covariance: vec![gain * gain, 0.0, 0.0, decay * decay],
+            iterations: 1,
+            stop: FitStop::Converged,
+        };
+        is_identified(&fit, vortex)
+    }
+
+    #[test]
+    fn an_amplitude_that_may_be_none_and_a_time_that_may_be_any_are_not_known() {
+        assert!(known_to(0.1, 0.01));
+        assert!(!known_to(0.2, 0.01));
+        assert!(!known_to(0.1, 0.05));
+    }
 }

@@ -34,6 +34,9 @@ rules! {
     most: f64 = 0.5, "share of the excess", "judgement: half";
     /// … and where they leave the model above the noise, they stand in for something else if they take this share.
     stands_in: f64 = 0.25, "share of the excess", "judgement: nothing is claimed, and the model that is handed over errs less";
+    /// An effect beside others whose positive parameters have intervals that span more than this stands in for something else; so does one whose
+    /// amplitude may be 0.
+    identified: f64 = 100.0, "times", "judgement; a hysteresis beside the delays of the edges, on a memory that saturates, spanned 180";
     /// Where slow noise is not known, a misfit counts if this share of it depends on something …
     depends: f64 = 0.1, "share of the excess", "the public sets";
     /// … or if it is more than noise can be in a recording worth fitting.

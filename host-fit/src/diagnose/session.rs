@@ -1,6 +1,6 @@
 //! A diagnosis in the making: from what the search found to what is handed over.
 
-use super::estimate::estimates_among;
+use super::estimate::{estimates_among, is_identified};
 use super::memory::memory;
 use super::outcome::Conclusion;
 use super::ranking::{Rival, not_tried, ranked, rivals_and_chance};
@@ -26,7 +26,8 @@ struct Way {
     order: Vec<&'static Spec>,
     /// A rung for each, with those before it.
     rungs: Vec<Rung>,
-    /// How many of them are proven: without those that follow the model fits all the same, or fits as well with one of the others twice.
+    /// How many of them are proven: without those that follow the model fits all the same, or as well with one of the others twice, or their parameters
+    /// are not known.
     proven: usize,
 }
 
@@ -104,7 +105,8 @@ impl Session<'_> {
         // One effect may do better than all that were found together.
         let alone = compared.best_alone();
         let alone = alone.filter(|alone| alone.score() < named.score());
-        let concluded = |best: &Hypothesis| self.concluded(best, &found.bare, as_given);
+        let concluded =
+            |best: &Hypothesis| self.concluded(best, &found.bare, &found.root, as_given);
         let Conclusion {
             verdict,
             model: last,
@@ -242,8 +244,11 @@ impl Session<'_> {
                 .min_by(|a, b| size(a).total_cmp(&size(b)));
             let Some((spec, lesser)) = least else { break };
             left.retain(|other| other.name != spec.name);
-            let stands_in =
-                || self.is_enough(&lesser) || self.does_as_well_twice(&left, &lesser, &current);
+            let stands_in = || {
+                self.is_enough(&lesser)
+                    || !is_identified(&current.judged.fits[0], spec)
+                    || self.does_as_well_twice(&left, &lesser, &current)
+            };
             if unproven == later.len() && stands_in() {
                 unproven += 1;
             }

@@ -164,7 +164,7 @@ impl Session<'_> {
 
     /// How effects have earned to be named or to stand in: they beat what lags can
     /// do, or do as well with fewer parameters. `None` if they have not.
-    fn earned(&self, best: &Hypothesis, bare: &Hypothesis) -> Option<Earned> {
+    fn earned(&self, best: &Hypothesis, bare: &Hypothesis, root: &Hypothesis) -> Option<Earned> {
         let (with, without) = (best.judged.rmse(), bare.judged.rmse());
         let worthwhile = if self.in_the_dark(bare) {
             RULES.worthwhile_in_the_dark
@@ -182,8 +182,13 @@ impl Session<'_> {
         {
             return Some(Earned { p_value: Some(p) });
         }
+        // Who makes do with less than a base that fits has to be needed: without it, what is left does not.
+        let needed = || {
+            let without = self.search.without_effects(best, root, |_| true);
+            !(without.is_bare() && self.is_enough(&without))
+        };
         let scatter = self.judge().noise_source == NoiseSource::Scatter;
-        (is_leaner(best, bare) && !scatter).then_some(Earned { p_value: None })
+        (is_leaner(best, bare) && !scatter && needed()).then_some(Earned { p_value: None })
     }
 
     /// Whether neither the noise is known nor anything shows that a base errs.
@@ -336,6 +341,7 @@ impl Session<'_> {
         &self,
         best: &Hypothesis,
         bare: &Hypothesis,
+        root: &Hypothesis,
         as_given: &HeldOut,
     ) -> Conclusion {
         let effects: Vec<&'static Spec> = best.terms.iter().filter_map(Term::effect).collect();
@@ -355,7 +361,7 @@ impl Session<'_> {
         if effects.is_empty() || no_better {
             return of_bare();
         }
-        let Some(earned) = self.earned(best, bare) else {
+        let Some(earned) = self.earned(best, bare, root) else {
             return of_bare();
         };
         let left = judge.excess(&best.judged.held_out)

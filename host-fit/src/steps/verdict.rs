@@ -187,7 +187,7 @@ fn finding(diagnosis: &Diagnosis) -> (String, String) {
                 let several = diagnosis.stand_ins.len() > 1;
                 meaning.push_str(&format!(
                     " {} {} the rest only and may stand in for anything: without {} the held-out error is within what the noise floor is known to, or a second \
-                     one of what is named does as well. The model is handed over with {}, marked.",
+                     one of what is named does as well, or these records do not tell its parameters. The model is handed over with {}, marked.",
                     diagnosis.stand_ins.join(" and "),
                     if several { "take" } else { "takes" },
                     if several { "them" } else { "it" },

@@ -206,6 +206,6 @@ mod tests {
         assert!(echo[1] > 0.02 && echo[2] < 1e-3, "{echo:?}");
         // No lag of y is there before y moves.
         let pickup = left("electrical-pickup", &[0.1]);
-        assert!(pickup.len() == 5 && pickup[4] > 0.3, "{pickup:?}");
+        assert!(pickup.len() == 5 && pickup[4] > 0.2, "{pickup:?}");
     }
 }

@@ -16,16 +16,18 @@ pub(super) struct Set {
 }
 
 impl Session<'_> {
-    /// For each effect all that the records cannot tell from it.
+    /// For each of the first `told` effects all that the records cannot tell from it.
     pub(super) fn sets(
         &self,
         last: &Hypothesis,
         order: &[&'static Spec],
+        told: usize,
         first: &[Rival],
         root: &Hypothesis,
     ) -> Vec<Set> {
         order
             .iter()
+            .take(told)
             .map(|spec| {
                 let mut set = Set {
                     names: vec![spec.name.to_owned()],

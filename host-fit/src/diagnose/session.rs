@@ -132,7 +132,14 @@ impl Session<'_> {
             ladder.push(self.rung(&context.judged, &[], &step));
         }
         ladder.extend(way.rungs);
-        let mut sets = self.sets(&last, &order, &others, &found.root);
+        // What takes the rest only is no name, and nobody has to be told from it.
+        let told = match verdict {
+            Verdict::EffectMissing => way.proven,
+            Verdict::PartlyExplained | Verdict::NothingMissing | Verdict::Unexplained => {
+                order.len()
+            }
+        };
+        let mut sets = self.sets(&last, &order, told, &others, &found.root);
         let alternatives: Vec<Model> = sets
             .iter()
             .flat_map(|set| &set.models)

@@ -145,10 +145,7 @@ fn finding(diagnosis: &Diagnosis) -> (String, String) {
             ),
         ),
         Verdict::EffectMissing => {
-            let headline = match diagnosis.missing.as_slice() {
-                [one] => format!("{one} is missing"),
-                several => format!("{} are missing", several.join(" and ")),
-            };
+            let headline = claim(&diagnosis.missing, &diagnosis.sets);
             let with = match (diagnosis.missing.len(), diagnosis.stand_ins.as_slice()) {
                 (1, []) => "it".to_owned(),
                 (_, []) => "them".to_owned(),
@@ -225,5 +222,44 @@ fn finding(diagnosis: &Diagnosis) -> (String, String) {
                 ),
             },
         ),
+    }
+}
+
+/// What is missing, each with what the records cannot tell from it: a name is a claim.
+fn claim(missing: &[String], sets: &[Vec<String>]) -> String {
+    let each = missing.iter().map(|name| {
+        let set = sets.iter().find(|set| set.first() == Some(name));
+        set.map_or_else(|| name.clone(), |set| set.join(" or "))
+    });
+    let each: Vec<String> = each.collect();
+    match each.as_slice() {
+        [one] => format!("{one} is missing"),
+        several if sets.iter().all(|set| set.len() < 2) => {
+            format!("{} are missing", several.join(" and "))
+        }
+        several => format!("{} are missing", several.join(", and ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_told_from_a_name_stands_beside_it() {
+        let said = |sets: &[&[&str]]| {
+            let sets: Vec<Vec<String>> = (sets.iter())
+                .map(|set| set.iter().map(|name| (*name).to_owned()).collect())
+                .collect();
+            let missing: Vec<String> = sets.iter().map(|set| set[0].clone()).collect();
+            claim(&missing, &sets)
+        };
+        assert_eq!(said(&[&["valve-lag"]]), "valve-lag is missing");
+        let alike = ["hot-film-lag", FLOW_LAG];
+        assert_eq!(said(&[&alike]), "hot-film-lag or flow-lag is missing");
+        let both = said(&[&["valve-lag"], &["echo-path"]]);
+        assert_eq!(both, "valve-lag and echo-path are missing");
+        let both = said(&[&alike, &["echo-path"]]);
+        assert_eq!(both, "hot-film-lag or flow-lag, and echo-path are missing");
     }
 }

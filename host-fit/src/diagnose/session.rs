@@ -124,7 +124,8 @@ impl Session<'_> {
             others,
             chance,
         } = compared;
-        let way = self.way(&last, effects, &found.root);
+        let claims = verdict == Verdict::EffectMissing;
+        let way = self.way(&last, effects, &found.root, claims);
         let order = way.order;
         let mut ladder = first.to_vec();
         if !context.terms.is_empty() {
@@ -133,12 +134,7 @@ impl Session<'_> {
         }
         ladder.extend(way.rungs);
         // What takes the rest only is no name, and nobody has to be told from it.
-        let told = match verdict {
-            Verdict::EffectMissing => way.proven,
-            Verdict::PartlyExplained | Verdict::NothingMissing | Verdict::Unexplained => {
-                order.len()
-            }
-        };
+        let told = if claims { way.proven } else { order.len() };
         let mut sets = self.sets(&last, &order, told, &others, &found.root);
         let alternatives: Vec<Model> = sets
             .iter()
@@ -180,10 +176,7 @@ impl Session<'_> {
         };
         let separation = self.separation(&model, alternatives, separated);
         let mut missing: Vec<String> = order.iter().map(|spec| spec.name.to_owned()).collect();
-        let proven = match verdict {
-            Verdict::EffectMissing => way.proven,
-            Verdict::PartlyExplained | Verdict::NothingMissing | Verdict::Unexplained => 0,
-        };
+        let proven = if claims { way.proven } else { 0 };
         let stand_ins = missing.split_off(proven);
         sets.truncate(proven);
         Diagnosis {
@@ -232,8 +225,15 @@ impl Session<'_> {
         }
     }
 
-    /// From no effect to `last`, with one of its `effects` more at each step: what is missed least comes last.
-    fn way(&self, last: &Hypothesis, effects: Vec<&'static Spec>, root: &Hypothesis) -> Way {
+    /// From no effect to `last`, with one of its `effects` more at each step: what is missed least comes last. Only where something is
+    /// claimed is it asked which of them are proven.
+    fn way(
+        &self,
+        last: &Hypothesis,
+        effects: Vec<&'static Spec>,
+        root: &Hypothesis,
+        claims: bool,
+    ) -> Way {
         let mut left = effects;
         let mut current = last.clone();
         let mut later: Vec<(&'static Spec, Hypothesis)> = Vec::new();
@@ -256,7 +256,7 @@ impl Session<'_> {
                     || !is_identified(&current.judged.fits[0], spec)
                     || self.does_as_well_twice(&left, &lesser, &current)
             };
-            if unproven == later.len() && stands_in() {
+            if claims && unproven == later.len() && stands_in() {
                 unproven += 1;
             }
             later.push((spec, std::mem::replace(&mut current, lesser)));

@@ -1,5 +1,6 @@
 //! Whether anything is missing, and whether it has earned to be named.
 
+use super::estimate::is_identified;
 use super::memory::memory;
 use super::outcome::Conclusion;
 use super::ranking::{Rival, not_tried, ranked, screened};
@@ -182,13 +183,21 @@ impl Session<'_> {
         {
             return Some(Earned { p_value: Some(p) });
         }
-        // Who makes do with less than a base that fits has to be needed: without it, what is left does not.
+        // Who makes do with less than a base that fits has to be known, and needed: without it, what is left does not.
         let needed = || {
             let without = self.search.without_effects(best, root, |_| true);
             !(without.is_bare() && self.is_enough(&without))
         };
         let scatter = self.judge().noise_source == NoiseSource::Scatter;
-        (is_leaner(best, bare) && !scatter && needed()).then_some(Earned { p_value: None })
+        let leaner = is_leaner(best, bare) && !scatter;
+        (leaner && self.is_known(best) && needed()).then_some(Earned { p_value: None })
+    }
+
+    /// Whether the records tell the parameters of the effects of a model as it would be handed over.
+    fn is_known(&self, best: &Hypothesis) -> bool {
+        let end = self.judge().final_fit(&best.judged);
+        let mut effects = best.terms.iter().filter_map(Term::effect);
+        effects.all(|spec| is_identified(&end, spec))
     }
 
     /// Whether neither the noise is known nor anything shows that a base errs.

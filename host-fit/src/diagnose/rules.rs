@@ -35,7 +35,7 @@ rules! {
     /// … and where they leave the model above the noise, they stand in for something else if they take this share.
     stands_in: f64 = 0.25, "share of the excess", "judgement: nothing is claimed, and the model that is handed over errs less";
     /// An effect beside others whose positive parameters have intervals that span more than this stands in for something else; so does one whose
-    /// amplitude may be 0.
+    /// amplitude may be 0. Alone beside a base that fits, such an effect is not named.
     identified: f64 = 100.0, "times", "judgement; a hysteresis beside the delays of the edges, on a memory that saturates, spanned 180";
     /// Where slow noise is not known, a misfit counts if this share of it depends on something …
     depends: f64 = 0.1, "share of the excess", "the public sets";

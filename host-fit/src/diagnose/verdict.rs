@@ -181,7 +181,9 @@ impl Session<'_> {
             && with < (1.0 - worthwhile) * without
             && let Some(p) = self.more_than_chance(best, bare)
         {
-            return Some(Earned { p_value: Some(p) });
+            // Beside a base that fits, what the records do not tell the size of is a curve through its errors.
+            let told = !self.is_enough(bare) || self.is_known(best);
+            return told.then_some(Earned { p_value: Some(p) });
         }
         // Who makes do with less than a base that fits has to be known, and needed: without it, what is left does not.
         let needed = || {

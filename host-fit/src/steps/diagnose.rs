@@ -16,7 +16,7 @@ use crate::model::{Model, Training};
 use crate::power::{Detectable, detectable};
 use crate::residual::{Failures, NoiseSource, Where, where_it_fails};
 use crate::simulate::SimulateError;
-use crate::terms::MovingZero;
+use crate::terms::{MovingZero, tared};
 
 /// A diagnosis with all that is said of it. Serialises to the keys of `diagnose --json`.
 #[derive(Clone, Debug)]
@@ -128,7 +128,7 @@ pub fn diagnose(
     let (diagnosis, failures, detectable, beyond) = watched(onlooker, "diagnosis", || {
         let progress = |what: &str| onlooker.now(what);
         let diagnosis = search(model, &records, options, onlooker.interrupt(), &progress)?;
-        let failures = where_it_fails(&diagnosis.model, &records);
+        let failures = where_it_fails(&diagnosis.model, &tared(&records));
         let detectable = match diagnosis.verdict {
             Verdict::NothingMissing => {
                 detectable(&diagnosis.model, &records, diagnosis.usual_by_chance)

@@ -151,12 +151,7 @@ fn finding(diagnosis: &Diagnosis) -> (String, String) {
                 (_, []) => "them".to_owned(),
                 (_, others) => [&diagnosis.missing, others].concat().join(" and "),
             };
-            let mut meaning = format!(
-                "With {} the held-out error falls from {} to {}; {floor}.",
-                with,
-                significant(first, 3),
-                significant(last, 3)
-            );
+            let mut meaning = fall(diagnosis, &with, &floor);
             if let Some(p) = diagnosis.p_value {
                 meaning.push_str(&format!(
                     " Noise alone would make one of {} alternatives do as much with p {} {}.",
@@ -221,6 +216,26 @@ fn finding(diagnosis: &Diagnosis) -> (String, String) {
                     significant(last, 3)
                 ),
             },
+        ),
+    }
+}
+
+/// How the error falls with what is named. Who is named for making do with less than the flow's lags need does not
+/// lower the error of the model as given; what it is named for shows beside the fewest lags.
+fn fall(diagnosis: &Diagnosis, with: &str, floor: &str) -> String {
+    let error =
+        |rung: Option<&Rung>| significant(rung.map_or(f64::NAN, |rung| rung.validate_rmse), 3);
+    let last = error(diagnosis.ladder.last());
+    let fewest = diagnosis.ladder.get(1);
+    match fewest.filter(|rung| diagnosis.p_value.is_none() && rung.effects.is_empty()) {
+        Some(fewest) => format!(
+            "With {with} fewer lags of the flow are enough: the held-out error of the fewest falls from {} to {last}; {floor}. Without \
+             {with}, more lags do as well.",
+            error(Some(fewest))
+        ),
+        None => format!(
+            "With {with} the held-out error falls from {} to {last}; {floor}.",
+            error(diagnosis.ladder.first())
         ),
     }
 }

@@ -41,6 +41,7 @@ pub use judge::{Judge, Judged};
 pub use proposal::Proposal;
 pub(crate) use resampling::{is_out, shares_won};
 pub use rest::MovingZero;
+pub(crate) use rest::tared;
 pub use rules::{RULES, Rules};
 pub use screen::Screen;
 pub(crate) use screen::Tangent;

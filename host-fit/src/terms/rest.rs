@@ -90,7 +90,7 @@ impl MovingZero {
 
 /// The records, each from its own zero where that moves between them: all rest where they do in the mean. Records
 /// that do not rest before their first command stay as they are.
-pub(super) fn tared(records: &[Record]) -> Cow<'_, [Record]> {
+pub(crate) fn tared(records: &[Record]) -> Cow<'_, [Record]> {
     if MovingZero::of(records).is_none() {
         return Cow::Borrowed(records);
     }

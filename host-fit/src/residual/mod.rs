@@ -18,6 +18,7 @@ pub use explained::Dependence;
 pub use noise::NoiseSource;
 pub use rules::{RULES, Rules};
 pub use trend::Trend;
+pub(crate) use trend::correlation;
 
 use crate::data::{Record, Use};
 use crate::model::Model;

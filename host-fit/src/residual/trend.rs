@@ -46,6 +46,9 @@ pub(super) fn from_edge_to_edge(
             }
         }
     }
+    if dwells.len() < RULES.trend_edges {
+        return None;
+    }
     let (correlation, p) = correlation(&dwells, &sizes)?;
     (p < RULES.trend_level && correlation.abs() > RULES.trend_weakest).then_some(Trend {
         rest: rising,
@@ -62,10 +65,10 @@ fn edges(u: &[f64]) -> Vec<(usize, bool)> {
         .collect()
 }
 
-/// Pearson's correlation and its two-sided p-value.
-fn correlation(x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
+/// Pearson's correlation and its two-sided p-value; none of fewer than three points, or where one of the two does not vary.
+pub(crate) fn correlation(x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
     let n = x.len() as f64;
-    if x.len() < RULES.trend_edges {
+    if x.len() < 3 {
         return None;
     }
     let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);

@@ -2,6 +2,7 @@
 
 use super::RULES;
 use crate::data::Record;
+use crate::residual::correlation;
 use std::borrow::Cow;
 use std::fmt;
 
@@ -58,7 +59,8 @@ pub struct MovingZero {
 
 impl MovingZero {
     /// Whether records rest at different levels before their first command: by more than chance, and by more than slow
-    /// noise makes of a rest: some standard errors of y where they are known, otherwise a small share of all that y does.
+    /// noise makes of a rest: some standard errors of y where they are known, otherwise a small share of all that y does;
+    /// or by half as much, if they creep from each record to the next as chance seldom does.
     #[must_use]
     pub fn of(records: &[Record]) -> Option<Self> {
         let levels = records
@@ -78,6 +80,7 @@ impl MovingZero {
             },
             |noise| RULES.moving_zero_noise * noise,
         );
+        let least = if creeps(&levels) { 0.5 * least } else { least };
         let error = lowest.1.1.hypot(highest.1.1);
         let moves = apart > RULES.off_zero * error && apart > least;
         let named = |of: &(&Record, (f64, f64))| (of.0.name.clone(), of.1.0);
@@ -86,6 +89,13 @@ impl MovingZero {
             highest: named(highest),
         })
     }
+}
+
+/// Whether levels follow the order of the records, which is that of the recording as a rule.
+fn creeps(levels: &[(&Record, (f64, f64))]) -> bool {
+    let order: Vec<f64> = (0..levels.len()).map(|index| index as f64).collect();
+    let levels: Vec<f64> = levels.iter().map(|(_, (level, _))| *level).collect();
+    correlation(&order, &levels).is_some_and(|(_, p)| p < RULES.creeping_zero)
 }
 
 /// The records, each from its own zero where that moves between them: all rest where they do in the mean. Records
@@ -164,6 +174,22 @@ mod tests {
             MovingZero::of(&records).is_some()
         };
         assert!(moves(0.012) && !moves(0.02));
+    }
+
+    #[test]
+    fn a_zero_that_creeps_is_told_by_its_order() {
+        let moves = |zeros: &[f64]| {
+            let noisy = |(index, zero): (usize, &f64)| Record {
+                y_sd: Some(vec![0.02; 2000]),
+                ..resting(&format!("{index}"), *zero)
+            };
+            let records: Vec<Record> = zeros.iter().enumerate().map(noisy).collect();
+            MovingZero::of(&records).is_some()
+        };
+        assert!(moves(&[0.0, 0.011, 0.019, 0.032, 0.04, 0.05, 0.06]));
+        assert!(!moves(&[0.032, 0.0, 0.05, 0.019, 0.06, 0.04, 0.011]));
+        // Less than slow noise makes of two rests.
+        assert!(!moves(&[0.0, 0.005, 0.01, 0.016, 0.02, 0.026, 0.03]));
     }
 
     #[test]

@@ -80,9 +80,13 @@ impl MovingZero {
             },
             |noise| RULES.moving_zero_noise * noise,
         );
-        let least = if creeps(&levels) { 0.5 * least } else { least };
+        let share = if creeps(&levels) {
+            RULES.creeping_share
+        } else {
+            1.0
+        };
         let error = lowest.1.1.hypot(highest.1.1);
-        let moves = apart > RULES.off_zero * error && apart > least;
+        let moves = apart > RULES.off_zero * error && apart > share * least;
         let named = |of: &(&Record, (f64, f64))| (of.0.name.clone(), of.1.0);
         moves.then(|| Self {
             lowest: named(lowest),

@@ -87,8 +87,10 @@ rules! {
     /// The zero moves if records rest further apart than this, and than chance.
     moving_zero: f64 = 0.03, "share of the range of y", "judgement: what slow noise makes of the mean of half a second stays below it";
     /// … or, where its standard errors are known, more than so many of them.
-    moving_zero_noise: f64 = 4.0, "standard errors of y", "in 30 sets slow noise reached 2.9, and zeros that drifted began at 4.7";
-    /// Half as much is enough where the rests follow the order of the records with this p-value.
+    moving_zero_noise: f64 = 4.0, "standard errors of y", "in 30 sets slow noise reached 2.9";
+    /// This share of either is enough where the rests follow the order of the records …
+    creeping_share: f64 = 0.5, "", "judgement: zeros that drifted began at 2.6 standard errors in 30 sets";
+    /// … with this p-value.
     creeping_zero: f64 = 0.005, "p-value", "all of 30 zeros that drifted in a straight line lay below 0.0013, eight of them less than four standard errors apart; all of 45 that did not lay above 0.0066";
     /// Where records do not begin at rest, 0 is the level of rest unless it is further from all of y than this.
     far: f64 = 1.0, "times the range of y", "judgement";

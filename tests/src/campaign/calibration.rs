@@ -34,9 +34,7 @@ pub fn calibration(seed: u64, rows: &[Row]) -> String {
     line(
         "said to be unexplained, or in part, although nothing is missing",
         share(&nothing, |row| {
-            row.named().is_empty()
-                && row.verdict != "nothing-missing"
-                && row.verdict != "effect-missing"
+            matches!(row.verdict.as_str(), "unexplained" | "partly-explained")
         }),
         "–",
     );

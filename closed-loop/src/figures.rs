@@ -1,6 +1,6 @@
 //! What a closed-loop run amounts to.
 
-use crate::run::{SAMPLE_PERIOD_S, Trace};
+use crate::run::{Trace, span};
 use serde::Serialize;
 
 /// Figures of a run against its reference, in y and SI units.
@@ -18,8 +18,8 @@ pub struct Figures {
     pub switches_per_s: f64,
     /// Share of time with the valve open: the air used, relative to steady blowing.
     pub air: f64,
-    /// From the start until the 250 ms mean of the friction is within 5 % of the
-    /// last reference for a second; `None` if it never is.
+    /// From the start until the mean of 250 samples of the friction is within 5 % of the last reference for 1000 samples
+    /// (each at least as many milliseconds, [`span`]); `None` if it never is.
     pub settling_s: Option<f64>,
 }
 
@@ -51,7 +51,7 @@ impl Figures {
             rms: (square / count).sqrt(),
             offset,
             peak_to_peak: (high - low).max(0.0),
-            switches_per_s: switches as f64 / (count * SAMPLE_PERIOD_S),
+            switches_per_s: switches as f64 / (count * trace.sample_period_s),
             air: open as f64 / count,
             settling_s: settling(trace),
         }
@@ -60,21 +60,23 @@ impl Figures {
 
 fn settling(trace: &Trace) -> Option<f64> {
     let reference = trace.samples.last()?.reference;
+    let period_s = trace.sample_period_s;
+    let [mean, stays] = [SETTLED_MEAN, SETTLED_FOR].map(|samples| span(samples, period_s));
     let mut sum = 0.0;
     let mut inside = 0;
     for (k, sample) in trace.samples.iter().enumerate() {
         sum += sample.friction;
-        if let Some(leaving) = k.checked_sub(SETTLED_MEAN) {
+        if let Some(leaving) = k.checked_sub(mean) {
             sum -= trace.samples[leaving].friction;
         }
-        let off = sum / SETTLED_MEAN as f64 - reference;
-        inside = if off.abs() <= 0.05 * reference.abs() && k + 1 >= SETTLED_MEAN {
+        let off = sum / mean as f64 - reference;
+        inside = if off.abs() <= 0.05 * reference.abs() && k + 1 >= mean {
             inside + 1
         } else {
             0
         };
-        if inside == SETTLED_FOR {
-            return Some((k + 1 - SETTLED_FOR) as f64 * SAMPLE_PERIOD_S);
+        if inside == stays {
+            return Some((k + 1 - stays) as f64 * period_s);
         }
     }
     None
@@ -97,6 +99,7 @@ mod tests {
             on: k % 20 < 5,
         };
         let trace = Trace {
+            sample_period_s: 0.001,
             samples: (0..5000).map(sample).collect(),
         };
         let figures = Figures::of(&trace, 1000);
@@ -117,8 +120,38 @@ mod tests {
             on: true,
         };
         let trace = Trace {
+            sample_period_s: 0.001,
             samples: vec![sample; 5000],
         };
         assert_eq!(Figures::of(&trace, 0).settling_s, None);
+    }
+
+    /// The same samples a hundred times as far apart: times are a hundred times as long, rates a hundredth.
+    #[test]
+    fn times_and_rates_go_with_the_period() {
+        let sample = |k: usize| Sample {
+            reference: 0.5,
+            friction: if k < 1000 { 0.0 } else { 0.5 },
+            reading: None,
+            on: k % 20 < 5,
+        };
+        let of = |sample_period_s: f64| {
+            let samples = (0..5000).map(sample).collect();
+            let trace = Trace {
+                sample_period_s,
+                samples,
+            };
+            Figures::of(&trace, 1000)
+        };
+        let (fast, slow) = (of(0.001), of(0.1));
+        assert!((slow.settling_s.unwrap() / fast.settling_s.unwrap() - 100.0).abs() < 1e-9);
+        assert!((slow.switches_per_s * 100.0 - fast.switches_per_s).abs() < 1e-9);
+        assert_eq!((slow.air, slow.rms), (fast.air, fast.rms));
+        // 2000 samples of 0.2 ms are only 0.4 s.
+        let short = Trace {
+            sample_period_s: 2e-4,
+            samples: (0..4000).map(sample).collect(),
+        };
+        assert_eq!(Figures::of(&short, 0).settling_s, None);
     }
 }

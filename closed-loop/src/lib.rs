@@ -1,4 +1,4 @@
-//! The loop at 1 kHz: controllers, what they control, and what came of it.
+//! The loop at any sample period: controllers, what they control, and what came of it.
 //!
 //! The law of `model-core` runs here beside what people use instead, on anything that is [`Controlled`]: a model, a
 //! simulated plant, a flow of the caller's own.
@@ -16,5 +16,5 @@ pub use model_flow::ModelFlow;
 pub use open_loop::OpenLoop;
 pub use proportional_integral::{FirstOrder, Gains, PulseWidth};
 pub use relay::Relay;
-pub use run::{Controlled, Controller, SAMPLE_PERIOD_S, Sample, Trace, run};
+pub use run::{Controlled, Controller, Sample, Trace, run, span};
 pub use tracking::{AHEAD, TrackingController};

@@ -10,6 +10,7 @@ pub struct ModelFlow<'a, T: Real, M: Parts<T>, Y, J> {
     model: &'a M,
     state: StateOf<T, M, Y, J>,
     channels: Vec<T>,
+    sample_period_s: f64,
 }
 
 impl<T: Real, M: Parts<T>, Y, J> Clone for ModelFlow<'_, T, M, Y, J>
@@ -21,22 +22,32 @@ where
             model: self.model,
             state: self.state.clone(),
             channels: self.channels.clone(),
+            sample_period_s: self.sample_period_s,
         }
     }
 }
 
 impl<'a, T: Real, M: Parts<T>, Y: Memory<T>, J: Memory<T>> ModelFlow<'a, T, M, Y, J> {
-    /// The model at rest, its channels held at `channels`.
-    pub fn new(model: &'a M, at_rest: StateOf<T, M, Y, J>, channels: Vec<T>) -> Self {
+    /// The model at rest, its channels held at `channels`, one sample every `sample_period_s`.
+    pub fn new(
+        model: &'a M,
+        at_rest: StateOf<T, M, Y, J>,
+        channels: Vec<T>,
+        sample_period_s: f64,
+    ) -> Self {
         Self {
             model,
             state: at_rest,
             channels,
+            sample_period_s,
         }
     }
 }
 
 impl<T: Real, M: Parts<T>, Y: Memory<T>, J: Memory<T>> Controlled for ModelFlow<'_, T, M, Y, J> {
+    fn sample_period_s(&self) -> f64 {
+        self.sample_period_s
+    }
     /// The reading belongs to the sample in which the command acts: sensor
     /// effects of the model are one sample old.
     fn step(&mut self, command: bool) -> Option<f64> {

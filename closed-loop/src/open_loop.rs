@@ -24,10 +24,10 @@ impl OpenLoop {
         Self::train(train, times)
     }
 
-    /// A square wave of `frequency` (Hz) and `duty` (0–1), on a 1 kHz clock.
+    /// A square wave of `frequency` (Hz) and `duty` (0–1), at a sample every `period_s`.
     #[must_use]
-    pub fn square(frequency: f64, duty: f64, times: HoldTimes) -> Self {
-        let period = (1000.0 / frequency).round().clamp(1.0, 1e6) as u32;
+    pub fn square(frequency: f64, duty: f64, times: HoldTimes, period_s: f64) -> Self {
+        let period = (1.0 / (period_s * frequency)).round().clamp(1.0, 1e6) as u32;
         let on = (f64::from(period) * duty).round() as u32;
         let train = PulseTrain {
             period,

@@ -1,7 +1,7 @@
 //! PI control of the duty with pulse-width modulation, alone or with a Smith
 //! predictor: what most rigs run.
 
-use crate::run::{Controller, SAMPLE_PERIOD_S};
+use crate::run::Controller;
 use model_core::control::{Hold, HoldTimes};
 use std::collections::VecDeque;
 
@@ -31,6 +31,8 @@ pub struct FirstOrder {
 pub struct PulseWidth {
     gains: Gains,
     smith: Option<Smith>,
+    /// Time between two commands, s.
+    period_s: f64,
     /// Samples in a modulation period.
     carrier: u32,
     at: u32,
@@ -51,13 +53,15 @@ struct Smith {
 }
 
 impl PulseWidth {
-    /// PI at the modulation `frequency` (Hz): the duty is renewed once a period.
+    /// PI at the modulation `frequency` (Hz), with a sample every `period_s`: the duty is renewed once a modulation
+    /// period.
     #[must_use]
-    pub fn new(gains: Gains, frequency: f64, times: HoldTimes) -> Self {
+    pub fn new(gains: Gains, frequency: f64, times: HoldTimes, period_s: f64) -> Self {
         Self {
             gains,
             smith: None,
-            carrier: (1000.0 / frequency).round().max(2.0) as u32,
+            period_s,
+            carrier: (1.0 / (period_s * frequency)).round().max(2.0) as u32,
             at: 0,
             width: 0,
             times,
@@ -71,9 +75,9 @@ impl PulseWidth {
     /// The same with a Smith predictor on the model `flow`.
     #[must_use]
     pub fn with_smith(mut self, flow: FirstOrder) -> Self {
-        let delay = (flow.delay_s / SAMPLE_PERIOD_S).round().max(1.0) as usize;
+        let delay = (flow.delay_s / self.period_s).round().max(1.0) as usize;
         self.smith = Some(Smith {
-            kept: (-SAMPLE_PERIOD_S / flow.time_s).exp(),
+            kept: (-self.period_s / flow.time_s).exp(),
             gain: flow.gain,
             ahead: 0.0,
             past: VecDeque::from(vec![0.0; delay]),
@@ -125,7 +129,7 @@ impl Controller for PulseWidth {
             self.reading += (y - self.reading) * 2.0 / f64::from(self.carrier + 1);
         }
         if self.at == 0 {
-            let duty = self.duty(f64::from(self.carrier) * SAMPLE_PERIOD_S);
+            let duty = self.duty(f64::from(self.carrier) * self.period_s);
             self.width = self.pulse(duty);
         }
         let wanted = self.at < self.width;

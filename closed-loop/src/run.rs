@@ -3,11 +3,26 @@
 
 use std::fmt::Write as _;
 
-/// Seconds between two commands.
-pub const SAMPLE_PERIOD_S: f64 = 0.001;
+/// Length of a run whose samples are `period_s` apart: `samples`, or as many milliseconds if that is longer.
+///
+/// Models remember a number of samples, so a run of a fixed number of them shows the same of a model at any period from
+/// 1 ms on. At shorter periods a sample is a smaller part of the flow's own time, and the time counts.
+///
+/// ```
+/// assert_eq!(closed_loop::span(12_000, 0.1), 12_000);
+/// assert_eq!(closed_loop::span(12_000, 0.001), 12_000);
+/// assert_eq!(closed_loop::span(12_000, 0.0002), 60_000);
+/// ```
+#[must_use]
+pub fn span(samples: usize, period_s: f64) -> usize {
+    // A period that is no number leaves the samples.
+    samples.max((samples as f64 * 1e-3 / period_s).round() as usize)
+}
 
 /// What can be controlled: a flow whose true friction is known besides the reading.
 pub trait Controlled {
+    /// Time that a command is held for, s.
+    fn sample_period_s(&self) -> f64;
     /// Holds the command for one sample, then reads the sensor (y); `None` when
     /// the reading is lost.
     fn step(&mut self, command: bool) -> Option<f64>;
@@ -37,9 +52,11 @@ pub struct Sample {
     pub on: bool,
 }
 
-/// A closed-loop run, 1 ms a sample.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// A closed-loop run.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Trace {
+    /// Time from one sample to the next, s.
+    pub sample_period_s: f64,
     /// The samples.
     pub samples: Vec<Sample>,
 }
@@ -70,7 +87,10 @@ pub fn run(
         });
         reading = flow.step(on);
     }
-    Trace { samples }
+    Trace {
+        sample_period_s: flow.sample_period_s(),
+        samples,
+    }
 }
 
 impl Trace {
@@ -79,14 +99,46 @@ impl Trace {
     #[must_use]
     pub fn to_csv(&self) -> String {
         let mut text = String::from("t,reference,friction,y,u\n");
+        // Below 1 ms, three digits would print equal times.
+        let digits = if self.sample_period_s < 1e-3 { 6 } else { 3 };
         for (k, sample) in self.samples.iter().enumerate() {
-            let t = k as f64 * SAMPLE_PERIOD_S;
-            let _ = write!(text, "{t:.3},{},{:.6},", sample.reference, sample.friction);
+            let t = k as f64 * self.sample_period_s;
+            let _ = write!(
+                text,
+                "{t:.digits$},{},{:.6},",
+                sample.reference, sample.friction
+            );
             if let Some(y) = sample.reading {
                 let _ = write!(text, "{y:.6}");
             }
             let _ = writeln!(text, ",{}", u8::from(sample.on));
         }
         text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_the_periods() {
+        let sample = Sample {
+            reference: 0.5,
+            friction: 0.25,
+            reading: None,
+            on: true,
+        };
+        for (sample_period_s, last) in [
+            (0.1, "\n0.100,"),
+            (0.001, "\n0.001,"),
+            (0.00025, "\n0.000250,"),
+        ] {
+            let trace = Trace {
+                sample_period_s,
+                samples: vec![sample; 2],
+            };
+            assert!(trace.to_csv().contains(last), "{}", trace.to_csv());
+        }
     }
 }

@@ -1,12 +1,15 @@
 //! A plant in the loop: seen through noise and a converter, over a line that loses readings.
 
 use crate::instrument::{Converter, Noise, NoiseSignal};
-use crate::plant::{Plant, Rig};
+use crate::plant::{Plant, Rig, SAMPLE_PERIOD_S};
 use closed_loop::Controlled;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 impl Controlled for Rig {
+    fn sample_period_s(&self) -> f64 {
+        SAMPLE_PERIOD_S
+    }
     fn step(&mut self, command: bool) -> Option<f64> {
         Some(Plant::step(self, command))
     }
@@ -58,6 +61,9 @@ impl<F: Controlled> Disturbed<F> {
 }
 
 impl<F: Controlled> Controlled for Disturbed<F> {
+    fn sample_period_s(&self) -> f64 {
+        self.flow.sample_period_s()
+    }
     fn step(&mut self, command: bool) -> Option<f64> {
         let clean = self.flow.step(command);
         let noise = self.noise.as_mut().map_or(0.0, NoiseSignal::sample);

@@ -11,6 +11,7 @@ pub mod command;
 pub mod family;
 pub mod hidden_set;
 pub mod instrument;
+pub mod literature;
 pub mod paper_like;
 pub mod plant;
 pub mod recording;

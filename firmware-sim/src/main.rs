@@ -8,6 +8,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 
 use firmware_sim::family::{Family, NoiseKind, Nuisance, RigPlan, Units};
 use firmware_sim::hidden_set::HiddenSetPlan;
+use firmware_sim::literature::{Hidden, LiteraturePlan, PUBLISHED};
 use firmware_sim::paper_like::{Disturbances, LagReading, paper_like_set};
 use firmware_sim::plant::RateLaw;
 use recordings::DataSet;
@@ -71,6 +72,24 @@ enum Command {
         #[arg(long, default_value_t = 1.0)]
         y_factor: f64,
         /// Seed of the rig, the commands and the noise.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// Folder for dataset.toml, the records and answer.toml.
+        #[arg(long)]
+        out: PathBuf,
+    },
+    /// Writes a data set of a flow that others published, with its answer beside it.
+    Literature {
+        /// The published model: goman-khrabrov, wrong-way …
+        #[arg(long, value_parser = named(PUBLISHED.map(|model| model.name)))]
+        model: String,
+        /// Effect to hide; may be given several times.
+        #[arg(long, value_parser = named(Hidden::names()))]
+        effect: Vec<String>,
+        /// White noise alone: no converter, no dead time of the valve, the same zero every day.
+        #[arg(long)]
+        ideal_instruments: bool,
+        /// Seed of the coefficients, the commands and the noise.
         #[arg(long, default_value_t = 1)]
         seed: u64,
         /// Folder for dataset.toml, the records and answer.toml.
@@ -189,6 +208,21 @@ fn run(command: Command) -> Result<()> {
                 y: y_factor,
             };
             let plan = RigPlan::draw(family, &effects, noise, &nuisances, seed)?.in_units(units);
+            save(&plan.build()?.data, &out)?;
+            let answer = plan.answer();
+            write_atomic(&out.join("answer.toml"), |file| {
+                file.write_all(answer.as_bytes())
+            })?;
+        }
+        Command::Literature {
+            model,
+            effect,
+            ideal_instruments,
+            seed,
+            out,
+        } => {
+            let effects: Vec<&str> = effect.iter().map(String::as_str).collect();
+            let plan = LiteraturePlan::draw(&model, &effects, !ideal_instruments, seed)?;
             save(&plan.build()?.data, &out)?;
             let answer = plan.answer();
             write_atomic(&out.join("answer.toml"), |file| {

@@ -9,12 +9,8 @@ use crate::sensor::Channel;
 use model_core::average::MovingAverage;
 use model_core::control::{HoldTimes, Pulses, Tracking};
 
-/// The lockstep rig, without a measured channel.
-pub const SETTINGS: Settings = Settings {
-    // The plant is not what the models are of.
-    residual_envelope: f32::INFINITY,
-    ..Settings::RIG
-};
+/// The lockstep rig at 1 kHz, without a measured channel.
+pub const SETTINGS: Settings = settings(&[], 0.001);
 
 /// The law of models without one.
 pub const RELAY: Relay = Relay {
@@ -23,16 +19,18 @@ pub const RELAY: Relay = Relay {
     hold: HoldTimes { on: 20, off: 20 },
 };
 
-/// The settings for a model whose channels are usually at `references`.
+/// The lockstep rig for a model whose channels are usually at `references`, with a sample every `period_s`.
 #[must_use]
-pub const fn settings(references: &[f32]) -> Settings {
+pub const fn settings(references: &[f32], period_s: f32) -> Settings {
     let channel = match references {
         [] => None,
         [reference, ..] => Some(Channel::around(*reference)),
     };
     Settings {
         channel,
-        ..SETTINGS
+        // The plant is not what the models are of.
+        residual_envelope: f32::INFINITY,
+        ..Settings::of_rig(period_s)
     }
 }
 
@@ -128,11 +126,11 @@ macro_rules! rigs {
             fn $model() -> Controller<
                 driven!(<identified::$model::Law as OrRelay>::Law, identified::$model)
             > {
-                use identified::$model::{LAW, REFERENCES, model, state};
+                use identified::$model::{LAW, REFERENCES, SAMPLE_PERIOD_S, model, state};
                 let model = model();
                 let state = state(&model);
                 let law = Driven::new(LAW.or(RELAY), model, state, MovingAverage::new());
-                armed(settings(&REFERENCES), law)
+                armed(settings(&REFERENCES, SAMPLE_PERIOD_S), law)
             }
         )+
     };

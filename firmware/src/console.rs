@@ -4,24 +4,28 @@ use crate::controller::{Controller, Mode};
 use crate::law::Law;
 use heapless::Vec;
 
-/// Samples between two lines of telemetry.
-const TELEMETRY: u32 = 100;
+/// Time between two lines of telemetry, µs.
+const TELEMETRY_US: u32 = 100_000;
 
 /// The operator's end of the loop: commands in, answers and telemetry out.
 #[derive(Clone, Debug)]
 pub struct Operator {
     console: Console,
+    /// Samples between two lines of telemetry.
+    every: u32,
     /// Samples since the last telemetry.
     since: u32,
     told: Mode,
 }
 
 impl Operator {
-    /// Nothing typed, nothing told.
+    /// Nothing typed, nothing told; a sample every `period_us`.
     #[must_use]
-    pub const fn new() -> Self {
+    pub const fn new(period_us: u32) -> Self {
+        let period_us = if period_us == 0 { 1 } else { period_us };
         Self {
             console: Console::new(),
+            every: TELEMETRY_US / period_us,
             since: 0,
             told: Mode::Disarmed,
         }
@@ -50,18 +54,12 @@ impl Operator {
     pub fn report<L: Law>(&mut self, controller: &Controller<L>) -> Option<Line> {
         self.since += 1;
         let mode = controller.mode();
-        if self.since < TELEMETRY && mode == self.told {
+        if self.since < self.every && mode == self.told {
             return None;
         }
         self.since = 0;
         self.told = mode;
         Some(Line::status("t ", controller))
-    }
-}
-
-impl Default for Operator {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -258,7 +256,7 @@ mod tests {
         let relay: driven!(Relay, full) =
             Driven::new(RELAY, model, full::state(&model), MovingAverage::new());
         let mut controller = Controller::new(SETTINGS, relay);
-        let mut operator = Operator::new();
+        let mut operator = Operator::new(1000);
         let mut typed = |text: &str, controller: &mut Controller<_>| {
             let answers = text.bytes().filter_map(|b| operator.receive(b, controller));
             let texts =
@@ -267,19 +265,25 @@ mod tests {
         };
         assert!(typed("launch\n", &mut controller).starts_with("? disarmed y=0.000 valve=0"));
         assert!(typed("arm\r\n", &mut controller).starts_with("armed"));
-        let mut lines = 0;
-        let mut operator = Operator::new();
-        for k in 0..250_u16 {
-            let counts = f32::from(800 + k % 2);
-            controller.tick(Reading {
-                counts,
-                channel: 0.0,
-                periods: 1,
-            });
-            lines += u32::from(operator.report(&controller).is_some());
-        }
-        // One for the change of mode, two for the time.
-        assert_eq!(lines, 3);
+        let mut lines = |period_us: u32| {
+            let (mut lines, mut operator) = (0, Operator::new(period_us));
+            for k in 0..250_u16 {
+                let counts = f32::from(800 + k % 2);
+                controller.tick(Reading {
+                    counts,
+                    channel: 0.0,
+                    periods: 1,
+                });
+                lines += u32::from(operator.report(&controller).is_some());
+            }
+            lines
+        };
+        // One for the change of mode, the others for the time: ten a second at any period.
+        assert_eq!(
+            [200, 1000, 10_000, 100_000].map(&mut lines),
+            [1, 3, 25, 250]
+        );
+        let mut operator = Operator::new(1000);
         controller.latch(Fault::Stuck);
         let line = operator
             .report(&controller)

@@ -5,6 +5,7 @@ use crate::law::Law;
 use crate::sensor::{Calibration, Channel, Range, Watch};
 use identified::rig;
 use model_core::control::HoldTimes;
+use model_core::control::period::samples_at_least;
 
 /// What the operator set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,29 +33,42 @@ pub struct Settings {
     /// The valve's shortest times, samples: a command that is shorter is not played.
     pub hold: HoldTimes,
     /// Largest residual, averaged over about 64 samples, that the model's
-    /// envelope allows, y.
+    /// envelope allows, y. Samples and not a time: so many readings average the noise out.
     pub residual_envelope: f32,
 }
 
+/// Fewest equal readings that mean a stuck sensor: at long periods some are equal by chance.
+const FEWEST_EQUAL: u32 = 20;
+
 impl Settings {
-    /// Those of the rig file, without a channel.
-    pub const RIG: Self = Self {
-        calibration: Calibration {
-            zero: rig::ZERO,
-            per_count: rig::PER_COUNT,
-        },
-        range: Range {
-            lower_rail: rig::RAILS[0],
-            upper_rail: rig::RAILS[1],
-            stuck_after: rig::STUCK_AFTER,
-        },
-        channel: None,
-        hold: HoldTimes {
-            on: rig::SHORTEST[0],
-            off: rig::SHORTEST[1],
-        },
-        residual_envelope: rig::RESIDUAL_ENVELOPE,
-    };
+    /// Those of the rig file, without a channel, for a sample every `period_s`. What the file has in seconds becomes
+    /// samples here, rounded up.
+    #[must_use]
+    pub const fn of_rig(period_s: f32) -> Self {
+        let period_s = period_s as f64;
+        let stuck_after = samples_at_least(rig::STUCK_AFTER_S as f64, period_s);
+        Self {
+            calibration: Calibration {
+                zero: rig::ZERO,
+                per_count: rig::PER_COUNT,
+            },
+            range: Range {
+                lower_rail: rig::RAILS[0],
+                upper_rail: rig::RAILS[1],
+                stuck_after: if stuck_after > FEWEST_EQUAL {
+                    stuck_after
+                } else {
+                    FEWEST_EQUAL
+                },
+            },
+            channel: None,
+            hold: HoldTimes {
+                on: samples_at_least(rig::SHORTEST_S[0] as f64, period_s),
+                off: samples_at_least(rig::SHORTEST_S[1] as f64, period_s),
+            },
+            residual_envelope: rig::RESIDUAL_ENVELOPE,
+        }
+    }
 }
 
 /// What the sensor gave at a sample.
@@ -371,6 +385,29 @@ mod tests {
             controller.disarm();
             controller.arm();
             assert_eq!(controller.mode(), Mode::Armed);
+        }
+    }
+
+    /// The bundled rig: 4 ms of the valve, half a second of equal readings.
+    #[test]
+    fn the_rigs_times_are_kept_at_any_period() {
+        for (period_s, hold, stuck_after) in [
+            (0.0002, 20, 2500),
+            (0.001, 4, 500),
+            (0.003, 2, 167),
+            (0.01, 1, 50),
+            (0.1, 1, 20),
+        ] {
+            let settings = Settings::of_rig(period_s);
+            assert_eq!(
+                settings.hold,
+                HoldTimes {
+                    on: hold,
+                    off: hold
+                },
+                "{period_s}"
+            );
+            assert_eq!(settings.range.stuck_after, stuck_after, "{period_s}");
         }
     }
 

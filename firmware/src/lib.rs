@@ -1,4 +1,4 @@
-//! The 1 kHz loop of the rig, without a board: read the sensor, check it, run
+//! The loop of the rig at the model's sample period, without a board: read the sensor, check it, run
 //! the model and the law, drive the valve; with faults that latch.
 //!
 //! [`controller::Controller::tick`] is the whole loop as a function of a

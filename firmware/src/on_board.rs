@@ -7,6 +7,7 @@ use crate::sensor::Channel;
 use crate::start::{self, Failure};
 use identified::on_board as model;
 use model_core::average::MovingAverage;
+use model_core::control::period::loop_period_us;
 
 /// The rig's constants, of the rig file that this was built with.
 pub const SETTINGS: Settings = Settings {
@@ -14,7 +15,7 @@ pub const SETTINGS: Settings = Settings {
         [] => None,
         [reference, ..] => Some(Channel::of(*reference)),
     },
-    ..Settings::RIG
+    ..Settings::of_rig(model::SAMPLE_PERIOD_S)
 };
 
 /// What the board says of itself.
@@ -26,8 +27,19 @@ pub const BOARD: Board = Board {
 /// The law with its model.
 pub type OnBoard = driven!(model::Law, model);
 
-/// The model's sample period, µs: what the boards' timers are set to.
-pub const PERIOD_US: u32 = (model::SAMPLE_PERIOD_S * 1e6 + 0.5) as u32;
+/// The model's sample period in whole µs: what the boards' timers are set to, and what the host is told.
+pub const PERIOD_US: u32 = match loop_period_us(model::SAMPLE_PERIOD_S as f64) {
+    Some(period) => period,
+    // `host-fit design` and `codegen --board` say the same with the key of the model file.
+    None => panic!("the boards' timers and watchdogs are good for 0.2 to 100 ms"),
+};
+
+/// How long a watchdog waits for a sample, µs: 20 ms, or four periods where that is longer.
+pub const PATIENCE_US: u32 = if PERIOD_US > 5000 {
+    4 * PERIOD_US
+} else {
+    20_000
+};
 
 /// What the loop may take of the boards' 128 KiB of RAM, bytes: there may be a copy of
 /// it while it is built, and as much again for the self-test, and 8 KiB are for log,
@@ -36,10 +48,6 @@ pub const MOST: usize = (128 - 8) * 1024 / 4;
 
 // `host-fit codegen --board` says the same with the key of the model file.
 const _: () = {
-    assert!(
-        PERIOD_US >= 200 && PERIOD_US <= 100_000,
-        "the boards' timers and watchdogs are good for 0.2 to 100 ms"
-    );
     assert!(
         model::CHANNELS.len() <= 1,
         "the model's effects need more measured channels than the one spare input of the board"

@@ -45,7 +45,7 @@ pub enum ExcitationError {
     NoIdentifyRecord,
     /// u never changes.
     #[error(
-        "{place}: the command is constant ({level}) in every identify record, so its effect cannot be told from the flow's own motion; record at least one switching of the command"
+        "{place}: the command is constant ({level}) in every identify record, so its effect is not identifiable; record at least one switching of the command"
     )]
     ConstantInput {
         /// The first identify record.
@@ -178,12 +178,12 @@ impl Excitation {
             .sum();
         if edges < RULES.fewest_edges {
             remarks.push(format!(
-                "The command switches only {edges} time(s): a delay and time constants can be estimated, but nothing about how they depend on the flow."
+                "The command switches only {edges} time(s): a delay and time constants are identifiable, but not how they depend on y."
             ));
         }
         if let Some((first, last)) = self.alike.first() {
             remarks.push(format!(
-                "Input delays that differ by {first}–{last} samples ({:.3}–{:.3} s) predict nearly the same, because the command repeats: such a pair cannot be told apart. Random on and off times would separate them.",
+                "Input delays that differ by {first} to {last} samples ({:.3} to {:.3} s) predict nearly the same, because the command repeats: their weights are not identifiable. Add a record with random on and off times.",
                 *first as f64 * sample_period_s,
                 *last as f64 * sample_period_s
             ));
@@ -193,12 +193,12 @@ impl Excitation {
             && self.distinct_off_times <= 1
         {
             remarks.push(
-                "All on-times are equal and all off-times are equal: a slow effect (droop, drift, hysteresis) cannot be told from the response itself. Add a record with other times.".into(),
+                "All on-times are equal and all off-times are equal: a slow effect (droop, drift, hysteresis) is not identifiable beside the response itself. Add a record with other times.".into(),
             );
         }
         if (self.lags_separated as f64) < RULES.separated * self.lags_tried as f64 {
             remarks.push(format!(
-                "Of {} input delays spread over the lags asked for, the commands separate about {}: least squares over many input delays will be decided by noise.",
+                "Of {} input delays spread over the given lags, the commands distinguish about {}: more input delays than that over-fit.",
                 self.lags_tried, self.lags_separated
             ));
         }
@@ -402,12 +402,7 @@ mod tests {
             "{:?}",
             found.alike
         );
-        assert!(
-            found
-                .remarks
-                .iter()
-                .any(|r| r.contains("cannot be told apart"))
-        );
+        assert!(found.remarks.iter().any(|r| r.contains("not identifiable")));
         assert!(
             found
                 .remarks

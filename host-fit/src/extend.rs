@@ -6,6 +6,7 @@
 //! parameters.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::data::{Record, Use};
 use crate::diagnose::ParameterEstimate;
@@ -43,6 +44,9 @@ pub enum ExtendError {
          Set `use = \"identify\"` for at least one record in dataset.toml."
     )]
     NothingToLearnFrom,
+    /// Somebody asked for an end.
+    #[error("the refit was interrupted before it had a result; nothing was written.")]
+    Interrupted,
     /// No structure could be fitted with the effects.
     #[error(transparent)]
     Candidate(#[from] CandidateError),
@@ -121,11 +125,12 @@ pub fn effects_for(model: &Model, names: &[String]) -> Result<Vec<&'static Spec>
 /// [`Model::targets`]).
 ///
 /// # Errors
-/// [`ExtendError`]; a missing channel is named, not guessed.
+/// [`ExtendError`]; a missing channel is named, not guessed. `interrupt` is asked between fits.
 pub fn extend(
     model: &Model,
     records: &[Record],
     names: &[String],
+    interrupt: &AtomicBool,
 ) -> Result<Extended, ExtendError> {
     let specs = effects_for(model, names)?;
     let learning: Vec<&Record> = records.iter().filter(|r| r.role == Use::Identify).collect();
@@ -156,6 +161,9 @@ pub fn extend(
         let mut current = base.clone();
         let mut last = None;
         for spec in specs {
+            if interrupt.load(Ordering::Relaxed) {
+                return Err(ExtendError::Interrupted);
+            }
             let fitted = fit_with_effect(&current, spec, &learning, &options)?;
             current = fitted.model.clone();
             last = Some(fitted);
@@ -163,6 +171,7 @@ pub fn extend(
         match last {
             // Effects added one after the other are settled together.
             Some(fitted) if names.len() == 1 => Ok(fitted),
+            _ if interrupt.load(Ordering::Relaxed) => Err(ExtendError::Interrupted),
             _ => Ok::<Fit, ExtendError>(fit(&current, &learning, &options)?),
         }
     };
@@ -180,11 +189,15 @@ pub fn extend(
         }
     };
     let given = with_all(model.clone());
-    let lean = if model.start == Start::Rest {
+    let lean = if model.start == Start::Rest && !interrupt.load(Ordering::Relaxed) {
         lean_structure(model, &learning, &options).and_then(with_all)
     } else {
         Err(ExtendError::NothingToLearnFrom)
     };
+    // What is done by then is not the best of all.
+    if interrupt.load(Ordering::Relaxed) {
+        return Err(ExtendError::Interrupted);
+    }
     let (fitted, structure) = match (given, lean) {
         (Ok(given), Ok(lean)) => {
             let as_good = given.mean_square() * RULES.as_good * RULES.as_good;

@@ -1,5 +1,5 @@
 //! How well a free run matches a measurement: the paper's indicators
-//! (9)–(11), the error's size and the noise floor.
+//! (9)–(11), the error's size and the noise level.
 
 use crate::data::{Record, Use};
 use crate::model::{Model, Rounding};
@@ -46,9 +46,9 @@ struct Sums {
 }
 
 impl Sums {
-    fn of(record: &Record, simulated: &[f64], warm_up: usize) -> Self {
-        let mut sums = Self::default();
-        for (y, sim) in record.y.iter().zip(simulated).skip(warm_up) {
+    fn of(record: &Record, simulated: &[f64]) -> Self {
+        let (lead, mut sums) = (record.lead, Self::default());
+        for (y, sim) in record.y.iter().zip(simulated).skip(lead) {
             sums.samples += 1.0;
             sums.y += y;
             sums.sim += sim;
@@ -57,10 +57,10 @@ impl Sums {
             sums.y_sim += y * sim;
             sums.error += (y - sim) * (y - sim);
         }
-        let judged = |series: &Vec<f64>| series.iter().skip(warm_up).map(|sd| sd * sd).sum();
+        let judged = |series: &Vec<f64>| series.iter().skip(lead).map(|sd| sd * sd).sum();
         sums.noise = record.y_sd.as_ref().map(judged);
         if let (Some(low), Some(high)) = (&record.y_min, &record.y_max) {
-            let bounds = low.iter().zip(high).zip(simulated).skip(warm_up);
+            let bounds = low.iter().zip(high).zip(simulated).skip(lead);
             let inside = bounds.filter(|((low, high), sim)| *low <= *sim && *sim <= *high);
             sums.inside = Some(inside.count() as f64);
         }
@@ -88,6 +88,7 @@ impl Sums {
 
     fn indicators(&self, name: &str, role: Use) -> Indicators {
         let n = self.samples.max(1.0);
+        let nothing = self.samples == 0.0;
         let spread = (self.y_y - self.y * self.y / n).max(0.0);
         let sim_spread = (self.sim_sim - self.sim * self.sim / n).max(0.0);
         let covariance = self.y_sim - self.y * self.sim / n;
@@ -99,11 +100,17 @@ impl Sums {
             epsilon: self.error.sqrt(),
             fit_percent: if spread > 0.0 {
                 100.0 * (1.0 - (self.error / spread).sqrt())
+            } else if nothing {
+                f64::NAN
             } else {
                 0.0
             },
             correlation: if both > 0.0 { covariance / both } else { 0.0 },
-            rmse: (self.error / n).sqrt(),
+            rmse: if nothing {
+                f64::NAN
+            } else {
+                (self.error / n).sqrt()
+            },
             noise_rmse: self.noise.map(|noise| (noise / n).sqrt()),
             inside_envelope: self.inside.map(|inside| inside / n),
         }
@@ -122,7 +129,7 @@ pub struct Scores {
 }
 
 impl Scores {
-    /// The held-out indicators, or those of the identify records where nothing
+    /// The validation indicators, or those of the identify records where nothing
     /// was held out.
     #[must_use]
     pub fn held_out(&self) -> Option<&Indicators> {
@@ -141,7 +148,7 @@ pub fn one_step_norm(model: &Model, records: &[Record]) -> Result<f64, SimulateE
     for record in records.iter().filter(|r| r.role == Use::Identify) {
         let signals = Signals::of(model, record)?;
         simulator.predict(&signals, |k, predicted: f64| {
-            if k >= model.warm_up() {
+            if k >= record.lead {
                 sum += record.y.get(k).map_or(0.0, |y| (y - predicted).powi(2));
             }
         });
@@ -194,7 +201,7 @@ fn score_with(
             Ok(run) => run,
             Err(error) => instead(record, error)?,
         };
-        let sums = Sums::of(record, &run, model.warm_up());
+        let sums = Sums::of(record, &run);
         scores
             .records
             .push(sums.indicators(&record.name, record.role));

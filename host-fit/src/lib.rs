@@ -15,7 +15,7 @@
 //! let compared = steps::compare(&model, &set)?;
 //! println!("{}", serde_json::to_string_pretty(&compared)?);
 //! let finding = steps::diagnose(&model, &set, &Default::default(), &())?;
-//! println!("{}. {}", finding.headline, finding.meaning);
+//! println!("{}", finding.answer.words());
 //! let extension = steps::extend(&model, &set, &finding.diagnosis.missing, &())?;
 //! let goal = DesignRequest::Track(TrackRequest::holding(0.7));
 //! let design = steps::design(&extension.model, &goal)?;
@@ -34,14 +34,20 @@
 //! | [`discover`] | the term that is missing where no catalogue has it |
 //! | [`terms`] | one search over lags, the sensor's zero and effects |
 //! | [`experiment`], [`residual`] | what would tell models apart, where a model fails |
+//! | [`analysis`] | residual correlations and spectrum, step responses, poles |
+//! | [`preparation`] | how records begin, where they rest, which samples are scored |
 //! | [`identify`], [`delay`], [`excitation`] | what is done with recordings |
 //! | [`fit`], [`search`] | parameters by Levenberg–Marquardt on the free run, delays by mesh-adaptive direct search |
 //! | [`indicators`], [`simulate`], [`target`] | a model run over records, and judged |
+//! | [`baseline`] | usual linear models of the same records: first and second order with dead time, ARX(2,2) |
+//! | [`noise`] | the noise model: what errors are white in |
 //! | [`model`], [`user_effect`] | a model and its file; effects that users define |
 //! | [`picture`] | drawings and pages of plain numbers |
 //! | [`averages`], [`dual`], [`data`], [`output`], [`mod@rules`] | moving averages, derivatives, recordings, files that appear whole or not at all, what a threshold is |
 
+pub mod analysis;
 pub mod averages;
+pub mod baseline;
 pub mod codegen;
 pub mod delay;
 pub mod design;
@@ -55,8 +61,10 @@ pub mod fit;
 pub mod identify;
 pub mod indicators;
 pub mod model;
+pub mod noise;
 pub mod picture;
 pub mod power;
+pub mod preparation;
 pub mod residual;
 pub mod ring;
 pub mod search;

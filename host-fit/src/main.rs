@@ -11,7 +11,8 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use clap::Parser;
-use commands::Console;
+use commands::{Console, threads};
+use host_fit::data::{memory, visible};
 
 #[derive(Debug, Parser)]
 #[command(version, about, max_term_width = 100)]
@@ -19,6 +20,9 @@ struct Cli {
     /// Print one JSON document on standard output and nothing else.
     #[arg(long, global = true)]
     json: bool,
+    /// Memory that may be used for what a file or an option sizes, in GB.
+    #[arg(long, global = true, value_name = "GB", default_value = "2", value_parser = gigabytes)]
+    memory: u64,
     #[command(subcommand)]
     command: Command,
 }
@@ -44,8 +48,18 @@ enum Command {
     Workbench(commands::workbench::Args),
 }
 
+/// Bytes of so many GB.
+fn gigabytes(text: &str) -> Result<u64, String> {
+    match text.parse::<f64>() {
+        Ok(gb) if (0.1..=1000.0).contains(&gb) => Ok((gb * 1e9) as u64),
+        _ => Err("a number of GB from 0.1 to 1000 is needed".into()),
+    }
+}
+
 fn main() -> ExitCode {
     let cli = Cli::parse();
+    memory::set_limit(cli.memory);
+    threads::or_one();
     let console = Console { json: cli.json };
     let result = match &cli.command {
         Command::Demo(args) => commands::demo::run(args, console),
@@ -69,10 +83,11 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // One paragraph, whatever the causes wrote.
-            let text = format!("{error:#}");
-            let paragraph = text.split_whitespace().collect::<Vec<_>>().join(" ");
-            let _ = writeln!(std::io::stderr(), "error: {paragraph}");
+            let _ = writeln!(
+                std::io::stderr(),
+                "error: {}",
+                visible(&commands::paragraph(&error))
+            );
             ExitCode::FAILURE
         }
     }

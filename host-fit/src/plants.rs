@@ -1,28 +1,56 @@
-//! The simulated flows that the program tries a law on: the physical plant that a model resembles most, that plant with
-//! every effect that the law does not know of, and under worse conditions than designed for.
+//! The simulated flows that stress a law: the physical plant that a model resembles most, that plant with every effect
+//! that the law does not know of, drawn from its usual range whatever the records say, and under worse conditions than
+//! designed for.
 //!
 //! Plants are no part of the library: a fit must not be judged by a simulator that it depends on.
+//!
+//! The simulator's clock is 1 ms a sample. A model of another period is brought to that clock, all its times with it, and
+//! the plant that resembles it there is run with the model's own period for a sample: a plant a hundred times as slow is
+//! the plant of a model at 100 ms. Its friction is of order one; the trial shows it in the units of the model, the
+//! sensor's zero included.
 
 use anyhow::{Context, bail};
+use closed_loop::{Controlled, span};
 use firmware_sim::bench::{Disturbed, Lost};
 use firmware_sim::instrument::{Converter, Noise};
-use firmware_sim::plant::{BasePlant, Effect, FlowDelay, FreeStream, PlantSpec, RateLaw, Rig};
+use firmware_sim::plant::{
+    BasePlant, Effect, FlowDelay, FreeStream, PlantSpec, RateLaw, Rig, SAMPLE_PERIOD_S,
+};
 use host_fit::design::{CaseGroup, DesignError, RULES, Trial, steady, time_constants};
 use host_fit::model::{Added, Delay, Model, TransportLaw};
-use model_core::effects::NUISANCES;
+use host_fit::steps::units_of_order_one;
+use host_fit::terms::Units;
+use model_core::effect::Unit;
+use model_core::effects::{NUISANCES, ZERO_OFFSET};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 const NO_PLANT: &str = "no physical plant could be made from the model";
 
-/// The flows of a proof.
+/// A plant on the model's clock and in its units.
+#[derive(Clone, Debug)]
+pub(crate) struct Clocked {
+    flow: Disturbed<Rig>,
+    units: Units,
+}
+
+impl Controlled for Clocked {
+    fn sample_period_s(&self) -> f64 {
+        SAMPLE_PERIOD_S * self.units.time
+    }
+    fn step(&mut self, command: bool) -> Option<f64> {
+        let reading = self.flow.step(command)?;
+        Some(self.units.zero + self.units.y * reading)
+    }
+    fn friction(&self) -> f64 {
+        self.units.y * self.flow.friction()
+    }
+}
+
+/// The flows that stress a law.
 pub(crate) struct Plants {
-    /// The plant that the model resembles most, seen through a noisy sensor.
-    pub(crate) nearest: Trial<Disturbed<Rig>>,
-    /// Friction of that plant under steady blowing (y).
-    pub(crate) blown: f64,
-    /// The plant with something else about it.
-    pub(crate) others: Vec<Trial<Disturbed<Rig>>>,
+    /// The plant that the model resembles most, seen through a noisy sensor; then that plant with something else about it.
+    pub(crate) stress: Vec<Trial<Clocked>>,
     /// What of the model no simulated plant has, one sentence each; the plants are without it.
     pub(crate) left_out: Vec<String>,
 }
@@ -33,18 +61,19 @@ impl Plants {
     /// # Errors
     /// When the model does not settle or its constants are no plant's.
     pub(crate) fn of(model: &Model, seed: u64) -> anyhow::Result<Self> {
-        let (plant, left_out) = nearest_plant(model)?;
-        Ok(Self {
-            blown: plant.base.gain,
-            left_out,
-            nearest: trial(
-                CaseGroup::Plant,
-                "continuous-time plant, noisy sensor",
-                &plant,
-                Circumstances::usual(seed),
-            )?,
-            others: others(&plant, seed)?,
-        })
+        let units = Units {
+            time: model.sample_period_s / SAMPLE_PERIOD_S,
+            ..units_of_order_one(model)
+        };
+        let (plant, left_out) = nearest_plant(&units.model_in(model))?;
+        let mut stress = vec![trial(
+            CaseGroup::Plant,
+            "continuous-time plant, noisy sensor",
+            &plant,
+            Circumstances::usual(seed, units),
+        )?];
+        stress.extend(others(&plant, seed, units)?);
+        Ok(Self { stress, left_out })
     }
 }
 
@@ -82,12 +111,15 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
         rate_law: RateLaw::default(),
     };
     let (mut effects, mut left_out) = (Vec::new(), Vec::new());
+    // The trial shows the sensor's zero.
+    let shown = |added: &&Added| added.name != ZERO_OFFSET.name;
     let is_nuisance = |added: &&Added| NUISANCES.iter().any(|spec| spec.name == added.name);
-    let (nuisances, physical): (Vec<_>, Vec<_>) = model.effects.iter().partition(is_nuisance);
+    let (nuisances, physical): (Vec<_>, Vec<_>) =
+        model.effects.iter().filter(shown).partition(is_nuisance);
     if !nuisances.is_empty() {
         let names: Vec<&str> = nuisances.iter().map(|added| added.name.as_str()).collect();
         left_out.push(format!(
-            "tried on plants without {}: their flow is of first order, and their sensor's zero is at 0",
+            "stressed on plants without {}: their flow is of first order",
             names.join(", ")
         ));
     }
@@ -95,7 +127,7 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
         match physical_effect(&added.name, &added.parameters) {
             Ok(effect) => effects.push(effect),
             Err(error) => left_out.push(format!(
-                "tried on plants without {}, which the simulator does not have so: {error:#}",
+                "stressed on plants without {}, which the simulator does not have so: {error:#}",
                 added.name
             )),
         }
@@ -135,15 +167,28 @@ struct Circumstances {
     noise: f64,
     lost: Lost,
     seed: u64,
+    /// The model's units, its clock among them, in units of the simulator's.
+    units: Units,
 }
 
 impl Circumstances {
-    fn usual(seed: u64) -> Self {
+    fn usual(seed: u64, units: Units) -> Self {
         Self {
             noise: 1.0,
             lost: Lost::default(),
             seed,
+            units,
         }
+    }
+
+    /// The model's sample period, s.
+    fn sample_period_s(&self) -> f64 {
+        SAMPLE_PERIOD_S * self.units.time
+    }
+
+    /// How long a run of so many samples is at the model's period.
+    fn span(&self, samples: usize) -> usize {
+        span(samples, self.sample_period_s())
     }
 }
 
@@ -152,9 +197,9 @@ fn trial(
     name: &str,
     plant: &PlantSpec,
     under: Circumstances,
-) -> anyhow::Result<Trial<Disturbed<Rig>>> {
+) -> anyhow::Result<Trial<Clocked>> {
     let mut rng = ChaCha8Rng::seed_from_u64(under.seed);
-    let stream = FreeStream::draw(&mut rng, RULES.trial);
+    let stream = FreeStream::draw(&mut rng, under.span(RULES.trial));
     let rig = Rig::new(plant, Some(stream)).context(NO_PLANT)?;
     let noise = Noise {
         white: under.noise * Noise::HOT_FILM.white,
@@ -165,13 +210,16 @@ fn trial(
     Ok(Trial {
         group,
         name: name.to_owned(),
-        flow: Disturbed::new(rig, Some(noise), converter, under.lost, under.seed),
+        flow: Clocked {
+            flow: Disturbed::new(rig, Some(noise), converter, under.lost, under.seed),
+            units: under.units,
+        },
     })
 }
 
 /// The plant with every effect of the catalogue in turn, then otherwise than designed for.
-fn others(plant: &PlantSpec, seed: u64) -> anyhow::Result<Vec<Trial<Disturbed<Rig>>>> {
-    let usual = Circumstances::usual(seed);
+fn others(plant: &PlantSpec, seed: u64, units: Units) -> anyhow::Result<Vec<Trial<Clocked>>> {
+    let usual = Circumstances::usual(seed, units);
     let mut others = Vec::new();
     for (index, name) in Effect::NAMES.iter().enumerate() {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -183,7 +231,11 @@ fn others(plant: &PlantSpec, seed: u64) -> anyhow::Result<Vec<Trial<Disturbed<Ri
         let values: Vec<String> = effect
             .parameters()
             .iter()
-            .map(|p| format!("{} {:.3}", p.name, p.value))
+            // In the model's units.
+            .map(|p| {
+                let value = units.value_out(Unit::of(p.unit), p.value);
+                format!("{} {value:.3}", p.name)
+            })
             .collect();
         let name = format!("{name} ({})", values.join(", "));
         others.push(trial(CaseGroup::Effect, &name, &with, usual)?);
@@ -204,6 +256,14 @@ fn others(plant: &PlantSpec, seed: u64) -> anyhow::Result<Vec<Trial<Disturbed<Ri
         lost: Lost { share, stretch },
         ..usual
     };
+    // A second of the simulator's clock, in its samples.
+    let [from, length] = [6000, 1000].map(|samples| usual.span(samples));
+    let gap_s = length as f64 * usual.sample_period_s();
+    let gap = if (gap_s - 1.0).abs() < 1e-6 {
+        "no reading for a second".to_owned()
+    } else {
+        format!("no reading for {gap_s:.4} s")
+    };
     for (name, base, under) in [
         ("delay +20 %", delayed(1.2), usual),
         ("delay -20 %", delayed(0.8), usual),
@@ -211,11 +271,7 @@ fn others(plant: &PlantSpec, seed: u64) -> anyhow::Result<Vec<Trial<Disturbed<Ri
         ("gain -10 %", stronger(0.9), usual),
         ("noise x 3", plant.base, noisier),
         ("every fifth reading lost", plant.base, losing(0.2, None)),
-        (
-            "no reading for a second",
-            plant.base,
-            losing(0.0, Some((6000, 1000))),
-        ),
+        (gap.as_str(), plant.base, losing(0.0, Some((from, length)))),
     ] {
         let plant = PlantSpec {
             base,
@@ -229,8 +285,7 @@ fn others(plant: &PlantSpec, seed: u64) -> anyhow::Result<Vec<Trial<Disturbed<Ri
 #[cfg(test)]
 mod tests {
     use super::*;
-    use closed_loop::Figures;
-    use host_fit::design::{Case, Proof, TrackRequest, prove, track};
+    use host_fit::design::{Case, Proof, TrackRequest, Trials, judged, prove, track};
     use model_core::recursion::LagConvention;
     use std::path::Path;
 
@@ -261,11 +316,26 @@ mod tests {
     }
 
     fn proof(target: f64, seed: u64) -> Proof {
-        let request = TrackRequest::holding(target);
-        let model = paper();
-        let law = track(&model, &request).unwrap().law;
-        let plants = Plants::of(&model, seed).unwrap();
-        prove(&model, &law, &plants.nearest, &plants.others)
+        proof_of(&paper(), target, seed)
+    }
+
+    fn proof_of(model: &Model, target: f64, seed: u64) -> Proof {
+        // Ten samples, whatever they last.
+        let shortest = 10.0 * model.sample_period_s;
+        let request = TrackRequest {
+            min_on_s: shortest,
+            min_off_s: shortest,
+            ..TrackRequest::holding(target)
+        };
+        let law = track(model, &request).unwrap().law;
+        let plants = Plants::of(model, seed).unwrap();
+        let trials = Trials {
+            possible: &[],
+            stress: &plants.stress,
+            noise: 1.0,
+            seed,
+        };
+        prove(model, &law, &trials)
     }
 
     #[test]
@@ -278,8 +348,8 @@ mod tests {
             on_model.rms < 0.02 && on_model.offset.abs() < 0.005,
             "{on_model:?}"
         );
-        let on_plant = proof.cases[1].figures;
-        let relay = Figures::of(&proof.compared, RULES.trial_from);
+        let on_plant = proof.cases[2].figures;
+        let relay = judged(&proof.compared);
         assert!(on_plant.rms < 0.5 * relay.rms, "{on_plant:?} {relay:?}");
         assert!(on_plant.offset.abs() < 0.01);
         for case in &proof.cases {
@@ -293,5 +363,43 @@ mod tests {
     #[test]
     fn a_proof_repeats_bit_for_bit() {
         assert_eq!(proof(0.6, 7), proof(0.6, 7));
+    }
+
+    /// The paper's flow, every time of it `slower` times as long and its samples with it.
+    fn slowed(slower: f64) -> Model {
+        let mut model = paper();
+        let spec = model_core::effects::spec("plenum-droop").unwrap();
+        model.add(spec, &[1.0, 0.05], None);
+        let clock = Units {
+            time: slower,
+            ..Units::NONE
+        };
+        clock.model_out(&model)
+    }
+
+    /// t → c·t: the law is the same one, and so is what comes of it, with its times c times as long.
+    #[test]
+    fn a_slower_clock_changes_times_and_nothing_else() {
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-6 * a.abs().max(1e-3);
+        let at_1_khz = proof_of(&slowed(1.0), 0.6, 3);
+        for slower in [10.0, 100.0] {
+            let model = slowed(slower);
+            assert!(near(model.sample_period_s, 0.001 * slower));
+            let proof = proof_of(&model, 0.6, 3);
+            assert_eq!(proof.cases.len(), at_1_khz.cases.len());
+            for (case, fast) in proof.cases.iter().zip(&at_1_khz.cases) {
+                assert_eq!(
+                    (case.group, case.kept),
+                    (fast.group, fast.kept),
+                    "{case:?} {fast:?}"
+                );
+                let (f, g) = (case.figures, fast.figures);
+                assert!((f.mean - g.mean).abs() < 0.01, "{case:?} {fast:?}");
+                assert!((f.rms - g.rms).abs() < 0.01, "{case:?} {fast:?}");
+                let switches = f.switches_per_s * slower / g.switches_per_s;
+                assert!((switches - 1.0).abs() < 0.05, "{case:?} {fast:?}");
+            }
+            assert!(near(proof.trace.sample_period_s, 0.001 * slower));
+        }
     }
 }

@@ -94,7 +94,7 @@ pub fn detectable(
 
 /// What has to be left of an effect.
 struct Asked {
-    /// Energy, as a share of that of the held-out error.
+    /// Energy, as a share of that of the validation error.
     share: f64,
     /// Standard deviations by which it is passed in so many cases.
     often: f64,

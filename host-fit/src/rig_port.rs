@@ -3,6 +3,7 @@
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::path::{Path, PathBuf};
 
+use crate::commands::threads;
 use anyhow::Context;
 use firmware_sim::hidden_set::HiddenSetPlan;
 use firmware_sim::instrument::{Converter, Noise, NoiseSignal};
@@ -15,7 +16,8 @@ use rig_line::{Host, LineError, Port};
 /// Which board.
 #[derive(Debug, Clone, clap::Args)]
 pub(crate) struct PortArgs {
-    /// Serial port of the board, or `qemu`: a board under QEMU with a simulated rig behind it.
+    /// Serial port of the board, or `qemu`: a board under QEMU with a simulated rig behind it, which is as much slower as
+    /// the board's period is longer than 1 ms.
     #[arg(long, value_name = "PATH|qemu")]
     port: PathBuf,
     /// With `--port qemu`: the board's program, as `cargo xtask firmware --board qemu-rig` builds it.
@@ -43,6 +45,7 @@ pub(crate) struct Connected {
 impl PortArgs {
     /// Opens the port, or starts the board.
     pub(crate) fn connect(&self) -> anyhow::Result<Connected> {
+        threads::needed("the line to a board")?;
         if self.port != Path::new("qemu") {
             return Ok(Connected {
                 host: open(&self.port, None)?,
@@ -87,6 +90,8 @@ fn session() -> u32 {
 
 /// A simulated rig as the board's converter sees it: y from −1 to 3 over the
 /// range of the sensor's input, the free stream from 0 to 20 m/s over the channel's.
+///
+/// The simulator's millisecond is a sample of the board: to a board at 10 ms the rig is ten times as slow.
 struct Simulated {
     rig: Rig,
     noise: NoiseSignal,

@@ -4,10 +4,12 @@ use crate::data::Record;
 use crate::model::{Delay, Footprint, Model, Prepared, Rounding, Start};
 use crate::ring::Ring;
 use crate::rules;
-use model_core::effects::SLOW_WAKE;
+use model_core::effect::Spec;
+use model_core::effects::{LAGGING_DRIVE, SLOW_WAKE};
 use model_core::history::Memory as _;
 use model_core::model::{StateOf, observe};
 use model_core::{Input, Output, Parts, Real, State};
+use std::borrow::Cow;
 use std::ops::ControlFlow;
 use thiserror::Error;
 
@@ -52,16 +54,22 @@ pub enum SimulateError {
     },
 }
 
-/// The signals a model runs on.
+/// The signals a model runs on, from their beginning on.
 #[derive(Clone, Debug)]
 pub struct Signals<'a> {
-    /// The command.
-    pub u: &'a [f64],
-    /// The measured output, where there is one: needed by [`Start::Measured`]
-    /// and for the divergence guard's scale.
+    /// The command, in shares of a full jet.
+    pub u: Cow<'a, [f64]>,
+    /// The measured output, where there is one.
     pub y: Option<&'a [f64]>,
     /// The channels in the order of [`Model::channels`].
     pub channels: Vec<&'a [f64]>,
+    /// The command before the first sample, in shares of a full jet; none where nobody knows: none of a model that
+    /// starts from rest, the first one otherwise.
+    pub u_before: Option<f64>,
+    /// y before the first sample; none for the first one.
+    pub y_before: Option<f64>,
+    /// First samples at which the run takes the measured y over.
+    pub follow: usize,
 }
 
 impl<'a> Signals<'a> {
@@ -78,16 +86,39 @@ impl<'a> Signals<'a> {
             })
         });
         Ok(Self {
-            u: &record.u,
             y: Some(&record.y),
             channels: channels.collect::<Result<_, _>>()?,
+            u_before: record.u_before.map(|u| model.command.share(u)),
+            y_before: record.y_before,
+            follow: record.follow,
+            ..Self::commanded(model, &record.u)
         })
     }
 
-    /// How far the measured output strays from 0; 1 where nothing was measured.
-    fn scale(&self) -> f64 {
+    /// A command `u` in the unit of the model's records, without channels or measurements.
+    #[must_use]
+    pub fn commanded(model: &Model, u: &'a [f64]) -> Self {
+        let u = if model.command.is_unit() {
+            Cow::Borrowed(u)
+        } else {
+            u.iter().map(|u| model.command.share(*u)).collect()
+        };
+        Self {
+            u,
+            y: None,
+            channels: Vec::new(),
+            u_before: None,
+            y_before: None,
+            follow: 0,
+        }
+    }
+
+    /// How far a flow may stray: by the range of the measured output and its distance from 0; where nothing was
+    /// measured, or 0 throughout, by `usual`.
+    fn scale(&self, usual: f64) -> f64 {
         let largest = |y: &[f64]| y.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
-        self.y.map_or(1.0, largest).max(1e-9)
+        let measured = self.y.map(largest).filter(|most| *most > 0.0);
+        measured.unwrap_or(usual)
     }
 }
 
@@ -109,7 +140,10 @@ pub struct Simulator<T: Real> {
     prepared: Prepared<T>,
     start: Start,
     memory: Footprint,
-    followed: usize,
+    /// The largest |y| of the records that the model comes from; 1 where that is not known.
+    usual: f64,
+    /// Samples after which a slow wake and a lagging drive have come to rest.
+    fades: usize,
     /// What the sensor shows at rest: what was measured is the flow and this.
     zero: T,
 }
@@ -119,16 +153,16 @@ impl<T: Real> Simulator<T> {
     /// [`Model::coordinates`]).
     #[must_use]
     pub fn with_values(model: &Model, values: &[T], rounding: Rounding) -> Self {
-        let memory = match model.delay {
-            Delay::Fixed { .. } => model.memory(),
-            // Room for a search to move the law.
-            Delay::Law(_) => model.memory_for(model.longest_delay().max(ROOM)),
-        };
         Self {
             prepared: model.prepare_with(values, rounding),
             start: model.start,
-            memory,
-            followed: model.warm_up(),
+            memory: memory(model),
+            usual: (model.training.y_range.iter())
+                .map(|y| y.abs())
+                .reduce(f64::max)
+                .filter(|most| *most > 0.0)
+                .unwrap_or(1.0),
+            fades: wake_fades(model),
             zero: model.zero_among(values),
         }
     }
@@ -155,10 +189,10 @@ impl<T: Real> Simulator<T> {
         mut sink: impl FnMut(usize, &Output<T>) -> ControlFlow<()>,
     ) -> Option<usize> {
         let mut state = self.state();
-        let bound = RULES.diverged * signals.scale();
+        let bound = RULES.diverged * signals.scale(self.usual);
         let window = self.prepared.averaging().window;
         let mut channels = vec![T::ZERO; signals.channels.len()];
-        if self.start == Start::Measured {
+        if self.begins_held(signals) {
             self.hold_first(signals, &mut state, &mut channels, self.zero);
         }
         for (k, u) in signals.u.iter().enumerate() {
@@ -166,7 +200,7 @@ impl<T: Real> Simulator<T> {
             if sink(k, &output).is_break() {
                 return None;
             }
-            let follows = self.start == Start::Measured && k + 1 < self.followed;
+            let follows = k + 1 < signals.follow;
             let measured = signals.y.and_then(|y| y.get(k + 1)).filter(|_| follows);
             let next = measured.map_or(output.next, |y| T::from_f64(*y) - self.zero);
             let size = next.value().abs();
@@ -235,7 +269,15 @@ impl<T: Real> Simulator<T> {
         observe(&self.prepared, state, &input)
     }
 
-    /// Lives through the first sample until the memories are full of it.
+    /// Whether something else than rest under no command was before the first sample.
+    fn begins_held(&self, signals: &Signals<'_>) -> bool {
+        self.start == Start::Measured
+            || signals.follow > 0
+            || signals.u_before.is_some_and(|u| u != 0.0)
+    }
+
+    /// Lives through what was before the first sample until the memories are full of it; where y was not measured, until
+    /// the model has come to rest under the command.
     fn hold_first(
         &self,
         signals: &Signals<'_>,
@@ -243,38 +285,74 @@ impl<T: Real> Simulator<T> {
         channels: &mut [T],
         zero: T,
     ) {
-        let (Some(u), Some(y)) = (signals.u.first(), signals.y.and_then(<[f64]>::first)) else {
+        let Some(u) = signals.u_before.or(signals.u.first().copied()) else {
             return;
         };
         let window = self.prepared.averaging().window;
         let full = self.memory.outputs.max(self.memory.jets);
-        for _ in 0..full.max(self.followed) {
-            self.advance(state, T::from_f64(*y) - zero, window);
-            self.observe(signals, state, channels, 0, *u);
+        let held = signals
+            .y_before
+            .or_else(|| signals.y.and_then(<[f64]>::first).copied());
+        if let Some(y) = held {
+            for _ in 0..full.max(self.fades) {
+                self.advance(state, T::from_f64(y) - zero, window);
+                self.observe(signals, state, channels, 0, u);
+            }
+            return;
+        }
+        let (mut last, mut still) = (f64::INFINITY, 0);
+        for _ in 0..SETTLED {
+            let next = self.observe(signals, state, channels, 0, u).next;
+            let value = next.value();
+            if !value.is_finite() {
+                return;
+            }
+            still = if (value - last).abs() <= 1e-12 * value.abs() {
+                still + 1
+            } else {
+                0
+            };
+            last = value;
+            self.advance(state, next, window);
+            if still > full {
+                return;
+            }
         }
     }
 }
 
-/// After so many time constants a wake that nobody saw begin is forgotten: a twentieth of what was not known is left.
+fn memory(model: &Model) -> Footprint {
+    match model.delay {
+        Delay::Fixed { .. } => model.memory(),
+        // Room for a search to move the law.
+        Delay::Law(_) => model.memory_for(model.longest_delay().max(ROOM)),
+    }
+}
+
+/// Samples that a run which does not begin at rest lives through before its first one.
+pub(crate) fn held_samples(model: &Model) -> usize {
+    let memory = memory(model);
+    memory.outputs.max(memory.jets).max(wake_fades(model))
+}
+
+/// After so many time constants a wake or a lagging drive is at rest: a twentieth is left.
 const WAKE_FADES: f64 = 3.0;
 
-impl Model {
-    /// How many samples at a record's start follow the measurement and are not
-    /// judged: none unless the model starts from measurements.
-    #[must_use]
-    pub fn warm_up(&self) -> usize {
-        match self.start {
-            Start::Rest => 0,
-            Start::Measured => {
-                // Nobody knows the wake of a flow that was blown before: it has to fade.
-                let wake = self.effects.iter().find(|e| e.name == SLOW_WAKE.name);
-                let fades_s = wake.and_then(|e| e.parameters.first()).unwrap_or(&0.0);
-                let fades = (WAKE_FADES * fades_s / self.sample_period_s).ceil() as usize;
-                self.longest_lag().max(self.longest_delay()).max(fades) + 1
-            }
-        }
-    }
+fn wake_fades(model: &Model) -> usize {
+    let time_of = |spec: &Spec, parameter: usize| {
+        let added = model.effects.iter().find(|e| e.name == spec.name);
+        let time = added.and_then(|e| e.parameters.get(parameter));
+        time.copied().unwrap_or(0.0)
+    };
+    let time_s = time_of(SLOW_WAKE, 0).max(time_of(LAGGING_DRIVE, 1));
+    let samples = (WAKE_FADES * time_s / model.sample_period_s).ceil() as usize;
+    samples.min(SETTLED)
+}
 
+/// Samples after which a model that starts without measurements counts as settled, and a slow wake as faded.
+const SETTLED: usize = 200_000;
+
+impl Model {
     /// The free run over signals, measured or not: what the sensor would show.
     ///
     /// # Errors

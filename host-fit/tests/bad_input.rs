@@ -217,6 +217,59 @@ fn the_program_exits_1_on_bad_data_2_on_bad_usage_and_leaves_nothing() {
     }
 }
 
+/// A data set is not replaced unasked, files of other programs name the import, and no cause is said twice.
+#[test]
+fn imports_replace_nothing_unasked_and_are_named_where_they_are_needed() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (log, set, model) = (at("log.csv"), at("set"), at("m.toml"));
+    fs::write(
+        &log,
+        "time,heater,temp\n10:00:00,ON,21\n10:00:01,OFF,22\n10:00:02,ON,23\n",
+    )
+    .unwrap();
+    let import = ["import", &log, "-o", &set];
+    let (code, stdout, _) = host_fit(&import);
+    assert_eq!(code, Some(0));
+    for part in [
+        "sampling period 1 s",
+        "ON is 1, OFF is 0",
+        "Nothing is held out",
+    ] {
+        assert!(stdout.contains(part), "no `{part}` in {stdout}");
+    }
+    let (code, _, stderr) = host_fit(&import);
+    assert_eq!(code, Some(1));
+    assert!(
+        stderr.contains("set: holds a data set already") && stderr.contains("--force"),
+        "{stderr}"
+    );
+    let (code, stdout, _) = host_fit(&[&import[..], &["--force", "--json"]].concat());
+    let document: serde_json::Value = serde_json::from_str(&stdout).unwrap();
+    assert_eq!(
+        (code, document["sample_period_s"].as_f64()),
+        (Some(0), Some(1.0))
+    );
+    assert_eq!(document["remarks"].as_array().unwrap().len(), 1);
+
+    let matlab = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../recordings/tests/import/v7.mat"
+    );
+    for arguments in [
+        vec!["identify", matlab, "-o", &model],
+        vec!["delay", matlab],
+        vec!["average", matlab, "--period", "1", "--out", &model],
+        vec!["delay", folder.path().to_str().unwrap()],
+    ] {
+        let (code, _, stderr) = host_fit(&arguments);
+        assert_eq!(code, Some(1), "{arguments:?}");
+        assert!(stderr.contains("host-fit import"), "{stderr}");
+    }
+    let (_, _, stderr) = host_fit(&["compare", "none.toml", &set]);
+    assert_eq!(stderr.matches("os error 2").count(), 1, "{stderr}");
+}
+
 /// Records that say too little are refused with the file they are in, and a slip of an on/off command with its line.
 #[test]
 fn what_a_fit_cannot_use_is_refused_with_its_file() {
@@ -236,7 +289,7 @@ fn what_a_fit_cannot_use_is_refused_with_its_file() {
         (
             of(2, &|k| k as f64, &wave),
             &[][..],
-            ["poor.csv: ", "1 equations for 3"],
+            ["poor.csv: ", "1 equations for 4"],
         ),
         (
             of(60, &square, &wave),

@@ -100,11 +100,11 @@ pub struct Bilinear<'a, T> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pace<T> {
     /// Lags below this, in samples, are those of the flow's order.
-    order: usize,
+    pub order: usize,
     /// The separated flow's rate, per sample: 1 − Σ a_i of those lags.
-    off: T,
+    pub off: T,
     /// The attached flow's under the first input's jet: that − Σ c_j1 of those lags.
-    on: T,
+    pub on: T,
 }
 
 impl<T: Real> Pace<T> {

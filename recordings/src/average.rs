@@ -12,12 +12,15 @@
 
 use std::path::Path;
 
-use crate::averaging::{AverageError, AverageSummary, Averaging, Defect};
+use crate::averaging::{AverageError, AverageSummary, Averaging, Defect, Dropped};
 use crate::error::FilePlace;
 use crate::folding::Folding;
 use crate::raw::{RawReader, Step};
 use crate::record::{Record, Use};
-use crate::set::DataSet;
+use crate::repetition::Edges;
+use crate::sampling::tidy;
+use crate::set::{DataSet, unite_periods};
+use crate::thresholds::RULES;
 
 /// Progress is reported about every so many bytes.
 const PROGRESS_BYTES: u64 = 1 << 22;
@@ -67,6 +70,7 @@ pub fn average_files(
         records.push(record);
         summaries.push(summary);
     }
+    unite_periods(&mut records);
     Ok((DataSet::from_records(None, records)?, summaries))
 }
 
@@ -89,6 +93,7 @@ fn average<R: std::io::BufRead>(
     let width = raw.names().len();
     let mut folding = Folding::new(samples, width, averaging);
     let mut values = vec![0.0; width];
+    let mut edges = Edges::default();
     let mut reported = 0;
     let mut skip = (averaging.start_s / sample_period_s).round().max(0.0) as u64;
     while let Some(row) = raw.next_row(&mut values)? {
@@ -116,6 +121,11 @@ fn average<R: std::io::BufRead>(
             _ => None,
         };
         match step {
+            Step::Forward(n) => edges.push(n, row.on),
+            Step::OffGrid => edges.push(1, row.on),
+            Step::Restart => edges.end(),
+        }
+        match step {
             Step::Forward(n) if n > 1 => folding.gap(n - 1, row.line),
             Step::Restart => folding.restart(row.line),
             _ => {}
@@ -127,7 +137,44 @@ fn average<R: std::io::BufRead>(
         }
     }
     progress(raw.bytes());
-    folding.finish(raw, name, role, place)
+    let found = folding.finish(raw, name, role, place.clone());
+    if averaging_drops_commands(&found)
+        && let Some(repeat) = edges.repeat(averaging.edge_jitter)
+        && !is_multiple(samples, repeat as f64)
+    {
+        return Err(AverageError::RepeatsEvery {
+            place: Box::new(place),
+            stated: averaging.period_s,
+            found: tidy(repeat as f64 * sample_period_s, 0.5 / repeat as f64),
+        });
+    }
+    found
+}
+
+/// Whether many periods were dropped because of their command, or none was left.
+fn averaging_drops_commands(found: &Result<(Record, AverageSummary), AverageError>) -> bool {
+    match found {
+        Ok((_, summary)) => {
+            let is_other =
+                |d: &&Dropped| matches!(d.defect, Defect::OtherCommand | Defect::NoAnchorEdge);
+            let dropped: u64 = summary
+                .dropped
+                .iter()
+                .filter(is_other)
+                .map(|d| d.periods)
+                .sum();
+            let all = (dropped + summary.periods_used) as f64;
+            dropped as f64 >= RULES.other_commands * all
+        }
+        Err(AverageError::NothingLeft { .. }) => true,
+        Err(_) => false,
+    }
+}
+
+/// Whether `samples` is a whole number of times `repeat`, as well as the anchor of a period is looked for.
+fn is_multiple(samples: f64, repeat: f64) -> bool {
+    let times = (samples / repeat).round();
+    times >= 1.0 && (samples - times * repeat).abs() <= 0.02 * samples
 }
 
 #[cfg(test)]
@@ -263,6 +310,46 @@ mod tests {
                 .iter()
                 .zip(0..)
                 .all(|(y, p)| (y - response(p)).abs() < 0.15)
+        );
+    }
+
+    #[test]
+    fn a_period_that_is_not_that_of_the_command_is_refused_with_its_own() {
+        let rows = recording(20, 0.1, 7);
+        for align in [Align::Edges, Align::Grid] {
+            for (period, is_right) in [
+                (0.1, true),
+                (0.2, true),
+                (0.05, false),
+                (0.07, false),
+                (0.15, false),
+            ] {
+                let averaging = Averaging {
+                    align,
+                    ..Averaging::over(period)
+                };
+                match run(&text(&rows), &averaging) {
+                    Ok(_) => assert!(is_right, "{period}"),
+                    Err(error) => {
+                        let error = error.to_string();
+                        let said =
+                            error.contains("repeats every 0.1 s") && error.contains("--period 0.1");
+                        assert!(!is_right && said, "{period}: {error}");
+                    }
+                }
+            }
+        }
+        // Half of the sequence is at rest.
+        let mut rows = recording(20, 0.1, 8);
+        for (k, row) in rows.iter_mut().enumerate() {
+            row.on &= k % 200 < 100;
+        }
+        let error = run(&text(&rows), &Averaging::over(0.1))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("raw.csv") && error.contains("every 0.2 s, not every 0.1 s"),
+            "{error}"
         );
     }
 

@@ -138,6 +138,18 @@ pub enum AverageError {
         /// What was found instead.
         found: String,
     },
+    /// The command repeats after another time than the stated period.
+    #[error(
+        "{place}: the command repeats every {found} s, not every {stated} s, so most periods of {stated} s would be dropped for their command; give --period {found}"
+    )]
+    RepeatsEvery {
+        /// The recording.
+        place: Box<FilePlace>,
+        /// The period as stated, s.
+        stated: f64,
+        /// After which time the command repeats, s.
+        found: f64,
+    },
     /// Two recordings would make records of one name.
     #[error(
         "two recordings are named `{0}`; every recording becomes a record named by its file, so rename one"

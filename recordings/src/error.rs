@@ -155,9 +155,10 @@ pub enum DataProblem {
     Unreadable(std::io::Error),
     /// A folder without `dataset.toml`.
     #[error(
-        "the folder holds no dataset.toml; write one with `sample_period_s` and one [[record]] (name, file, use) per CSV, or name a CSV file"
+        "the folder holds no dataset.toml; make a data set of its files with `host-fit import {folder} -o DIR` and give the folder DIR here",
+        folder = .0
     )]
-    NoManifest,
+    NoManifest(String),
     /// Nothing in the file at all.
     #[error("the file is empty; it needs a header line `t,u,y` and one row per sample")]
     Empty,
@@ -183,7 +184,10 @@ pub enum DataProblem {
     )]
     WrongSeparator(&'static str),
     /// A column that has to be there is not.
-    #[error("no column `{name}` in the header ({found}); name the columns t (s), u and y", name = .name, found = .found)]
+    #[error(
+        "no column `{name}` in the header ({found}); name the columns t (s), u and y, or say which is which with `host-fit import FILE -o DIR`",
+        name = .name, found = .found
+    )]
     MissingColumn {
         /// The name that was looked for.
         name: &'static str,
@@ -208,11 +212,13 @@ pub enum DataProblem {
     },
     /// An empty cell.
     #[error(
-        "the value is missing; fill it in, or split the record there (records are independent)"
+        "the value is missing; fill it in, or split the record there (`host-fit import` holds a u that is written only when it changes)"
     )]
     MissingValue,
     /// Text where a number belongs.
-    #[error("`{0}` is not a number; write decimals with a point, without units or thousands marks")]
+    #[error(
+        "`{0}` is not a number; write decimals with a point, without units or thousands marks, or let `host-fit import` read the file"
+    )]
     NotANumber(String),
     /// NaN or infinity.
     #[error("the value is {0}, not a finite number; repair it, or split the record there")]
@@ -232,7 +238,7 @@ pub enum DataProblem {
     },
     /// Samples are missing.
     #[error(
-        "time jumps by {step} s where the sampling period is {period} s: about {missing} sample(s) missing; split the record there or fill the gap"
+        "time jumps by {step} s where the sampling period is {period} s: about {missing} sample(s) missing; split the record there or fill the gap (if only the times are at fault: `host-fit import` with --period SECONDS --ignore-time)"
     )]
     TimeGap {
         /// The step found.
@@ -244,7 +250,7 @@ pub enum DataProblem {
     },
     /// Steps that vary.
     #[error(
-        "the time step is {step} s where the sampling period is {period} s (10 % and the rounding of the printed t are allowed); resample the record to a uniform period"
+        "the time step is {step} s where the sampling period is {period} s (10 % and the rounding of the printed times are allowed); resample the record to a uniform period, or, if only the times are at fault, `host-fit import` it with --period SECONDS --ignore-time"
     )]
     TimeUneven {
         /// The step found.
@@ -254,17 +260,84 @@ pub enum DataProblem {
     },
     /// The file's time and the stated sampling period differ.
     #[error(
-        "the rows are {found} s apart but the sampling period is stated as {stated} s; correct sample_period_s or the column t"
+        "the rows are {found} s apart by their times, but {by} {stated} s; correct the one that is wrong"
     )]
     PeriodMismatch {
         /// From the time column.
         found: f64,
-        /// From `dataset.toml` or the other records.
+        /// As stated.
         stated: f64,
+        /// What states it: subject and verb of a sentence.
+        by: &'static str,
+    },
+    /// Records of different sampling periods.
+    #[error(
+        "the sampling period of this record is {found} s, that of record `{first}` is {other} s; a data set has one: import the records into a data set each, or resample one of them"
+    )]
+    PeriodsDiffer {
+        /// Of this record.
+        found: f64,
+        /// Of the first record.
+        other: f64,
+        /// Name of the first record.
+        first: String,
+    },
+    /// A time that cannot be in seconds.
+    #[error(
+        "t = {0} is no time in seconds; if it is a Unix time in ms, µs or ns, make a data set of the file with `host-fit import FILE -o DIR`"
+    )]
+    NotSeconds(f64),
+    /// A file of another program where a data set is asked for.
+    #[error(
+        "is a {kind}, not a data set; make one of it with `host-fit import {name} -o DIR` and give the folder DIR here"
+    )]
+    ToImport {
+        /// What it is.
+        kind: &'static str,
+        /// The file's name.
+        name: String,
     },
     /// A sampling period that is none.
-    #[error("the sampling period is {0}; it must be a finite number of seconds above 0")]
+    #[error(
+        "the sampling period is {0:?}; it must be a number of seconds above 0, from 1e-9 to 1e9; look for the unit of the times"
+    )]
     BadPeriod(f64),
+    /// Times so late that double precision cannot tell samples apart.
+    #[error(
+        "at t = {time} s numbers cannot tell samples apart that are {period} s apart; write the times from the beginning of the record"
+    )]
+    LateTimes {
+        /// The latest time, s.
+        time: f64,
+        /// The sampling period, s.
+        period: f64,
+    },
+    /// More columns than a file of a data set can have.
+    #[error(
+        "has {found} measured channels and {most} are the most; keep those that are needed (`host-fit import` with --channel NAME, or --no-channels)"
+    )]
+    TooManyChannels {
+        /// How many there are.
+        found: usize,
+        /// How many there may be.
+        most: usize,
+    },
+    /// A name of a column above the longest line of a header.
+    #[error("the name is longer than {0} bytes; shorten it")]
+    LongName(usize),
+    /// A command before the record that is no number.
+    #[error("the command before the record is {0}; give a finite number in the unit of u")]
+    BadCommandBefore(f64),
+    /// A lead that leaves no sample to judge.
+    #[error(
+        "the first {lead} samples only lead up to what is judged, but the record has {samples}; lower lead_samples below that"
+    )]
+    OnlyLead {
+        /// Samples of the lead.
+        lead: usize,
+        /// Samples of the record.
+        samples: usize,
+    },
     /// A negative standard error.
     #[error("the standard error is {0}; it must be 0 or above")]
     NegativeDeviation(f64),
@@ -312,7 +385,7 @@ pub enum DataProblem {
     NoRecords,
     /// `dataset.toml` does not parse, lacks a key or has one that does not exist.
     #[error(
-        "{0}; a dataset.toml has title and input (optional), sample_period_s, and per [[record]] name, file and use (\"identify\" or \"validate\")"
+        "{0}; a dataset.toml has title and input (optional), sample_period_s, and per [[record]] name, file, use (\"identify\" or \"validate\") and, optional, u_before and lead_samples"
     )]
     Manifest(String),
     /// A record's file outside the data set's folder.

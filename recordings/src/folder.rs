@@ -7,11 +7,10 @@ use std::path::{Component, Path, PathBuf};
 use crate::error::{DataError, DataProblem, FilePlace, printable};
 use crate::import::{From, ImportProblem, Mapping};
 use crate::output::{OutputError, Staging};
-use crate::record::{Origin, Record, Use};
-use crate::set::DataSet;
+use crate::record::{Origin, Record, Use, check_period};
+use crate::sampling::Stated;
+use crate::set::{DataSet, MANIFEST, Plant};
 use crate::table::Table;
-
-const MANIFEST: &str = "dataset.toml";
 
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -19,6 +18,8 @@ struct Manifest {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     title: Option<String>,
     sample_period_s: f64,
+    #[serde(default, skip_serializing_if = "Plant::is_flow")]
+    plant: Plant,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     input: Option<Input>,
     #[serde(default)]
@@ -41,9 +42,19 @@ struct Entry {
     file: String,
     #[serde(rename = "use")]
     role: Use,
+    /// Command before the first sample; its first value where nothing is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    u_before: Option<f64>,
+    /// First samples that only lead up to the judged ones.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    lead_samples: usize,
     /// For people and for `host-fit import --like`; loading does not need it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     from: Option<From>,
+}
+
+fn is_zero(samples: &usize) -> bool {
+    *samples == 0
 }
 
 impl DataSet {
@@ -85,30 +96,41 @@ impl DataSet {
         self.save_from(dir, &[])
     }
 
-    /// As [`DataSet::save`], with where each record came from.
-    pub(crate) fn save_from(&self, dir: &Path, from: &[From]) -> Result<(), OutputError> {
-        let mut staging = Staging::new(dir)?;
-        let mut entries: Vec<Entry> = Vec::with_capacity(self.records.len());
-        for (index, record) in self.records.iter().enumerate() {
+    /// The files in which the records are saved, in their order.
+    pub(crate) fn file_names(&self) -> Vec<String> {
+        let mut names: Vec<String> = Vec::with_capacity(self.records.len());
+        for record in &self.records {
             let stem = file_stem(&record.name);
             let file = (1..)
                 .map(|i| match i {
                     1 => format!("{stem}.csv"),
                     _ => format!("{stem}-{i}.csv"),
                 })
-                .find(|name| entries.iter().all(|e| !e.file.eq_ignore_ascii_case(name)))
-                .unwrap_or_default();
+                .find(|name| names.iter().all(|taken| !taken.eq_ignore_ascii_case(name)));
+            names.push(file.unwrap_or_default());
+        }
+        names
+    }
+
+    /// As [`DataSet::save`], with where each record came from.
+    pub(crate) fn save_from(&self, dir: &Path, from: &[From]) -> Result<(), OutputError> {
+        let mut staging = Staging::new(dir)?;
+        let mut entries: Vec<Entry> = Vec::with_capacity(self.records.len());
+        for ((index, record), file) in self.records.iter().enumerate().zip(self.file_names()) {
             staging.write(&file, |w| write_record(record, w))?;
             entries.push(Entry {
                 name: record.name.clone(),
                 file,
                 role: record.role,
+                u_before: record.u_before,
+                lead_samples: record.lead,
                 from: from.get(index).cloned(),
             });
         }
         let manifest = Manifest {
             title: self.title.clone(),
             sample_period_s: self.sample_period_s,
+            plant: self.plant,
             // What looks like slips was said to be none, or was put together in memory.
             input: self.refuse_strays().is_err().then_some(Input::Graded),
             record: entries,
@@ -150,7 +172,8 @@ fn read_manifest(folder: &Path) -> Result<(PathBuf, Manifest), DataError> {
     let bytes = match fs::read(&path) {
         Ok(bytes) => bytes,
         Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            return Err(FilePlace::file(folder).error(DataProblem::NoManifest));
+            return Err(FilePlace::file(folder)
+                .error(DataProblem::NoManifest(folder.display().to_string())));
         }
         Err(e) => return Err(DataError::unreadable(&path, e)),
     };
@@ -164,12 +187,9 @@ fn read_manifest(folder: &Path) -> Result<(PathBuf, Manifest), DataError> {
 fn load_folder(folder: &Path) -> Result<DataSet, DataError> {
     let (path, manifest) = read_manifest(folder)?;
     let place = FilePlace::file(&path);
-    if !(manifest.sample_period_s.is_finite() && manifest.sample_period_s > 0.0) {
-        return Err(place
-            .at_key("sample_period_s")
-            .error(DataProblem::BadPeriod(manifest.sample_period_s)));
-    }
-    let mut records = Vec::with_capacity(manifest.record.len());
+    check_period(manifest.sample_period_s)
+        .map_err(|problem| place.clone().at_key("sample_period_s").error(problem))?;
+    let mut records: Vec<Record> = Vec::with_capacity(manifest.record.len());
     let mut origins = Vec::with_capacity(manifest.record.len());
     for entry in &manifest.record {
         let bad_name = entry.name.trim().is_empty() || entry.name.chars().any(char::is_control);
@@ -177,12 +197,20 @@ fn load_folder(folder: &Path) -> Result<DataSet, DataError> {
             return Err(place.at_key("name").error(DataProblem::BadName));
         }
         let file = resolve(folder, &entry.file, &place)?;
-        let table = Table::load(&file, Some(manifest.sample_period_s))?;
-        let (record, origin): (Record, Origin) = table.into_record(&entry.name, entry.role)?;
+        let taken = records.iter().map(Record::bytes).sum();
+        let stated = Stated {
+            period_s: manifest.sample_period_s,
+            by: "`sample_period_s` in dataset.toml is",
+        };
+        let table = Table::load_beside(&file, Some(stated), taken)?;
+        let (mut record, origin): (Record, Origin) = table.into_record(&entry.name, entry.role)?;
+        (record.u_before, record.lead) = (entry.u_before, entry.lead_samples);
+        record.check_start(&place)?;
         records.push(record);
         origins.push(origin);
     }
-    let set = DataSet::assemble(manifest.title, records, origins, &place)?;
+    let mut set = DataSet::assemble(manifest.title, records, origins, &place)?;
+    set.plant = manifest.plant;
     match manifest.input {
         Some(Input::OnOff) => set.require_on_off()?,
         Some(Input::Graded) => {}
@@ -267,11 +295,20 @@ fn write_record(record: &Record, w: &mut dyn Write) -> io::Result<()> {
         csv.write_field(format!("{:.decimals$}", record.time(k)))?;
         for (_, values) in &columns {
             let value = values.get(k).copied().unwrap_or(f64::NAN);
-            csv.write_field(value.to_string())?;
+            csv.write_field(shortest(value))?;
         }
         csv.write_record(None::<&[u8]>)?;
     }
     csv.flush()
+}
+
+/// The number in the fewest digits that read back to the same bits, never longer than 24 characters.
+fn shortest(value: f64) -> String {
+    let plain = value.to_string();
+    match plain.len() <= 24 {
+        true => plain,
+        false => format!("{value:e}"),
+    }
 }
 
 /// Decimals with which the times are written: enough that the sampling period and t0 read back exactly where that is
@@ -364,6 +401,14 @@ mod tests {
             ),
             ("= 3".to_owned(), "line 1"),
             (entry("a.csv").replace("\"a\"", "\"\""), "key `name`"),
+            (
+                format!("{}lead_samples = 3\n", entry("a.csv")),
+                "dataset.toml, key `lead_samples`: the first 3 samples",
+            ),
+            (
+                format!("{}u_before = inf\n", entry("a.csv")),
+                "dataset.toml, key `u_before`",
+            ),
         ] {
             let text = message(&manifest);
             assert!(text.contains(part), "{manifest}\n-> {text}");
@@ -436,6 +481,7 @@ mod tests {
         b.name = "8 Hz : 50 %".into();
         b.role = Use::Validate;
         b.t0 = 12.5;
+        (b.u_before, b.lead) = (Some(0.25), 100);
         let set = DataSet::from_records(Some("A \"title\"".into()), vec![a, b]).unwrap();
         let target = folder.path().join("set");
         set.save(&target).unwrap();

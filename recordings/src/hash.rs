@@ -1,7 +1,8 @@
 //! The content hash of a data set: what a model file states as its provenance.
 //!
-//! FNV-1a, 64 bits, over the sampling period and, per record, its name, its use, t0 and every column's name and values
-//! as IEEE 754 bits (little-endian), each string and column preceded by its length. It tells data sets apart; it is no
+//! FNV-1a, 64 bits, over the sampling period and, per record, its name, its use, t0, every column's name and values
+//! as IEEE 754 bits (little-endian), each string and column preceded by its length, and, where they are stated, the
+//! command before the record and its lead. It tells data sets apart; it is no
 //! protection against someone who wants two sets to collide. The title is not part of it.
 
 use crate::record::{Record, Use};
@@ -46,6 +47,14 @@ pub(crate) fn of(sample_period_s: f64, records: &[Record]) -> String {
             hash.bytes(&(values.len() as u64).to_le_bytes());
             values.iter().for_each(|&v| hash.number(v));
         }
+        if let Some(before) = record.u_before {
+            hash.text("u_before");
+            hash.number(before);
+        }
+        if record.lead > 0 {
+            hash.text("lead_samples");
+            hash.bytes(&(record.lead as u64).to_le_bytes());
+        }
     }
     format!("{:016x}", hash.0)
 }
@@ -74,10 +83,12 @@ mod tests {
         let reference = of(0.001, std::slice::from_ref(&base));
         assert_eq!(reference.len(), 16);
         assert_eq!(reference, of(0.001, std::slice::from_ref(&base.clone())));
-        let changes: [fn(&mut Record); 6] = [
+        let changes: [fn(&mut Record); 8] = [
             |r| r.name.push('b'),
             |r| r.role = Use::Validate,
             |r| r.t0 = 0.5,
+            |r| r.u_before = Some(0.0),
+            |r| r.lead = 1,
             |r| r.y[1] = 0.500_000_000_000_000_1,
             |r| r.y_sd = Some(vec![0.0, 0.0]),
             |r| std::mem::swap(&mut r.u, &mut r.y),

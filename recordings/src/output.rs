@@ -68,7 +68,7 @@ where
     }
     let mut temporary = permitted(tempfile::Builder::new().prefix(".host-fit-"), 0o666)
         .tempfile_in(parent_of(&target))
-        .map_err(failed)?;
+        .map_err(|e| failed(without_temporary_name(e)))?;
     {
         let mut buffered = BufWriter::with_capacity(1 << 16, temporary.as_file_mut());
         write(&mut buffered)
@@ -108,7 +108,7 @@ impl Staging {
         };
         let folder = permitted(tempfile::Builder::new().prefix(".host-fit-"), 0o777)
             .tempdir_in(parent_of(&real))
-            .map_err(failed)?;
+            .map_err(|e| failed(without_temporary_name(e)))?;
         Ok(Self {
             target: real,
             folder,
@@ -154,9 +154,12 @@ impl Staging {
         Ok(())
     }
 
-    /// Moves everything into the target folder, in the order it was written; files of the same names are replaced.
+    /// Moves everything into the target folder; files of the same names are replaced, others stay.
     ///
-    /// A target that does not exist yet appears complete in one rename.
+    /// A target that does not exist yet appears complete in one rename; one that does is exchanged in one rename, where
+    /// the system can do that and it holds files only. Elsewhere the file that was written last, which says what the
+    /// others are (`dataset.toml`), is taken away first and moved in last: at no time are old and new files mixed to
+    /// something that loads.
     ///
     /// # Errors
     /// [`OutputError`] when a rename is refused.
@@ -175,12 +178,79 @@ impl Staging {
         if let Some(folder) = destinations.iter().find(|d| d.is_dir()) {
             return Err(failed(folder, io::Error::from(io::ErrorKind::IsADirectory)));
         }
+        if swap::with(self.folder.path(), &self.target).is_ok() {
+            return Ok(());
+        }
+        if let (Some(last), 2..) = (destinations.last(), destinations.len()) {
+            match fs::remove_file(last) {
+                Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(failed(last, e)),
+                _ => {}
+            }
+        }
         for (name, destination) in self.names.iter().zip(&destinations) {
             fs::create_dir_all(parent_of(destination)).map_err(|e| failed(destination, e))?;
             fs::rename(self.folder.path().join(name), destination)
                 .map_err(|e| failed(destination, e))?;
         }
         Ok(())
+    }
+}
+
+/// A folder put in the place of another at one stroke.
+mod swap {
+    use std::fs;
+    use std::io;
+    use std::path::Path;
+
+    /// Exchanges the folders `new` and `old`, and leaves the files in `old`'s place that `new` did not have. Afterwards
+    /// `new` holds what was replaced.
+    pub(super) fn with(new: &Path, old: &Path) -> io::Result<()> {
+        let unfit = || io::Error::from(io::ErrorKind::Unsupported);
+        // Whoever stands in the folder would be left in the one that is taken away.
+        let here = std::env::current_dir()?;
+        if here.starts_with(old) {
+            return Err(unfit());
+        }
+        let others: Vec<_> = fs::read_dir(old)?.collect::<Result<_, _>>()?;
+        for entry in &others {
+            let kept = new.join(entry.file_name());
+            if !entry.file_type()?.is_file() {
+                return Err(unfit());
+            }
+            if !kept.exists() {
+                fs::hard_link(entry.path(), kept)?;
+            }
+        }
+        fs::set_permissions(new, fs::metadata(old)?.permissions())?;
+        exchange(new, old)?;
+        // What came in between.
+        for entry in fs::read_dir(new)?.flatten() {
+            let place = old.join(entry.file_name());
+            if !place.exists() {
+                let _ = fs::rename(entry.path(), place);
+            }
+        }
+        Ok(())
+    }
+
+    #[cfg(any(target_os = "linux", target_vendor = "apple"))]
+    fn exchange(a: &Path, b: &Path) -> io::Result<()> {
+        use rustix::fs::{CWD, RenameFlags, renameat_with};
+        Ok(renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE)?)
+    }
+
+    #[cfg(not(any(target_os = "linux", target_vendor = "apple")))]
+    fn exchange(_: &Path, _: &Path) -> io::Result<()> {
+        Err(io::ErrorKind::Unsupported.into())
+    }
+}
+
+/// What the operating system said, without the temporary name that the user has never heard of.
+fn without_temporary_name(error: io::Error) -> io::Error {
+    match (error.get_ref(), error.kind()) {
+        (None, _) => error,
+        (Some(_), kind @ io::ErrorKind::NotFound) => io::Error::new(kind, "no such folder"),
+        (Some(_), kind) => io::Error::from(kind),
     }
 }
 
@@ -235,7 +305,11 @@ mod tests {
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(entries(folder.path()), ["model.toml"]);
         assert!(write_atomic(folder.path(), |w| w.write_all(b"x")).is_err());
-        assert!(write_atomic(&folder.path().join("no/such/x"), |w| w.write_all(b"x")).is_err());
+        let missing = folder.path().join("no/such/x");
+        let message = write_atomic(&missing, |w| w.write_all(b"x"))
+            .unwrap_err()
+            .to_string();
+        assert!(!message.contains(".host-fit-"), "{message}");
     }
 
     #[cfg(target_os = "linux")]
@@ -292,5 +366,58 @@ mod tests {
             assert_eq!(fs::read(target.join("sub/b.csv")).unwrap(), content);
         }
         assert!(Staging::new(&target.join("a.csv")).is_err());
+    }
+
+    /// Whoever looks while a folder is replaced sees all of the old or all of the new.
+    #[test]
+    fn a_folder_is_replaced_at_one_stroke_and_keeps_what_is_not_replaced() {
+        use std::sync::atomic::{AtomicBool, Ordering};
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("set");
+        let write = |content: &str| {
+            let mut staging = Staging::new(&target).unwrap();
+            for name in ["a.csv", "b.csv", "dataset.toml"] {
+                staging
+                    .write(name, |w| w.write_all(content.as_bytes()))
+                    .unwrap();
+            }
+            staging.commit().unwrap();
+        };
+        write("0");
+        fs::write(target.join("notes.txt"), "mine").unwrap();
+        let done = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            let looks = scope.spawn(|| {
+                let (mut mixed, mut seen) = (0, 0);
+                while !done.load(Ordering::Relaxed) {
+                    // A folder that is held open stays what it was.
+                    let names = ["dataset.toml", "a.csv", "b.csv", "dataset.toml"];
+                    let read = names.map(|n| fs::read(target.join(n)).unwrap_or_default());
+                    // Only where nothing was swapped while it was read.
+                    if read[0] == read[3] && !read[0].is_empty() {
+                        seen += 1;
+                        mixed += u32::from(read[1] != read[0] || read[2] != read[0]);
+                    }
+                }
+                (mixed, seen)
+            });
+            for round in 1..200 {
+                write(&round.to_string());
+            }
+            done.store(true, Ordering::Relaxed);
+            let (mixed, seen) = looks.join().unwrap();
+            assert!(mixed == 0 && seen > 0, "{mixed} of {seen}");
+        });
+        assert_eq!(
+            entries(&target),
+            ["a.csv", "b.csv", "dataset.toml", "notes.txt"]
+        );
+        assert_eq!(fs::read(target.join("notes.txt")).unwrap(), b"mine");
+        assert_eq!(entries(folder.path()), ["set"]);
+        // With a folder inside, its files are moved, the last one last.
+        fs::create_dir(target.join("more")).unwrap();
+        write("end");
+        assert_eq!(fs::read(target.join("a.csv")).unwrap(), b"end");
+        assert_eq!(entries(&target).len(), 5);
     }
 }

@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use crate::error::{DataError, DataProblem};
-use crate::rows::{RowReader, number};
+use crate::rows::{RowReader, number, open_text};
 use crate::sampling::tidy;
 use crate::thresholds::RULES;
 
@@ -54,10 +54,7 @@ pub(crate) struct RawReader<R> {
 impl RawReader<BufReader<File>> {
     /// Opens a file; its sampling period is taken from its first rows.
     pub(crate) fn open(path: &Path) -> Result<Self, DataError> {
-        let open = || -> Result<_, DataError> {
-            let file = File::open(path).map_err(|e| DataError::unreadable(path, e))?;
-            Ok(BufReader::with_capacity(1 << 18, file))
-        };
+        let open = || open_text(path, 1 << 18);
         let sample_period_s = head_period(open()?, path)?;
         Self::new(open()?, path, sample_period_s)
     }

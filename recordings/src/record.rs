@@ -11,6 +11,13 @@ pub(crate) const RESERVED: [&str; 6] = ["t", "u", "y", "y_sd", "y_min", "y_max"]
 /// Values beyond this are refused: their squares would not be finite.
 const LARGEST: f64 = 1e100;
 
+/// Shortest and longest sampling period, s: times are written to 12 decimals, a thousandth of the shortest.
+pub const PERIODS_S: [f64; 2] = [1e-9, 1e9];
+
+/// Most measured channels of a record, and the longest name of one, bytes: a row and the header of its file stay
+/// shorter than the longest line that is read.
+const CHANNELS: (usize, usize) = (4096, 200);
+
 /// What a record is used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -21,7 +28,7 @@ pub enum Use {
     Validate,
 }
 
-/// One measured (usually phase-averaged) record, sampled uniformly. History before it is 0.
+/// One measured (usually phase-averaged) record, sampled uniformly.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
     /// Unique within the data set.
@@ -32,6 +39,17 @@ pub struct Record {
     pub sample_period_s: f64,
     /// Time of sample 0 as written in the file, s.
     pub t0: f64,
+    /// Command before the first sample, in the unit of `u`, constant for all times before it; the first value of `u`
+    /// where nothing is said.
+    pub u_before: Option<f64>,
+    /// Number of first samples that only lead up to the judged ones: they are simulated and not scored. At least one
+    /// sample follows them. 0 for a record that is judged whole.
+    pub lead: usize,
+    /// y before the first sample, where it is known; prepared from the data, no part of a file.
+    pub y_before: Option<f64>,
+    /// Number of first samples at which a free run takes the measured y over, as the past that they answer is not
+    /// recorded: 0 for a record that begins at rest. Prepared from the data, no part of a file.
+    pub follow: usize,
     /// Command (or input) per sample; 0 and 1 for an on/off actuator, any finite value otherwise.
     pub u: Vec<f64>,
     /// Measured output per sample (normalised friction gain), as long as `u`.
@@ -48,6 +66,9 @@ pub struct Record {
 
 impl Record {
     /// The samples `from..to` as a record of their own; what lies beyond the end is left out.
+    ///
+    /// The command before a part is the sample before it. Samples of the lead stay lead: a part that lies inside the
+    /// lead is lead altogether.
     #[must_use]
     pub fn part(&self, from: usize, to: usize) -> Self {
         let cut = |series: &Vec<f64>| -> Vec<f64> {
@@ -59,6 +80,13 @@ impl Record {
             role: self.role,
             sample_period_s: self.sample_period_s,
             t0: self.t0 + from as f64 * self.sample_period_s,
+            u_before: match from.checked_sub(1).and_then(|k| self.u.get(k)) {
+                Some(&before) => Some(before),
+                None => self.u_before,
+            },
+            lead: self.lead.min(to).saturating_sub(from),
+            y_before: self.y_before.filter(|_| from == 0),
+            follow: self.follow.min(to).saturating_sub(from),
             u: cut(&self.u),
             y: cut(&self.y),
             y_sd: self.y_sd.as_ref().map(cut),
@@ -80,6 +108,10 @@ impl Record {
             role,
             sample_period_s,
             t0: 0.0,
+            u_before: None,
+            lead: 0,
+            y_before: None,
+            follow: 0,
             u,
             y,
             y_sd: None,
@@ -93,6 +125,12 @@ impl Record {
     #[must_use]
     pub fn len(&self) -> usize {
         self.u.len()
+    }
+
+    /// Bytes of memory that it takes.
+    pub(crate) fn bytes(&self) -> u64 {
+        let columns = self.columns().count() as u64;
+        (columns + 2) * 8 * self.len() as u64
     }
 
     /// Whether the record has no sample (never true for a record of a data set).
@@ -151,13 +189,24 @@ impl Record {
         if self.name.trim().is_empty() || self.name.chars().any(char::is_control) {
             return Err(place(None).error(DataProblem::BadName));
         }
-        if !(self.sample_period_s.is_finite() && self.sample_period_s > 0.0) {
-            return Err(place(None).error(DataProblem::BadPeriod(self.sample_period_s)));
-        }
+        check_period(self.sample_period_s).map_err(|problem| place(None).error(problem))?;
         if self.u.len() < 2 {
             return Err(place(None).error(DataProblem::TooFewRows(self.u.len())));
         }
         check_values("t", &[self.t0], place)?;
+        self.check_times()
+            .map_err(|problem| place(None).in_column("t").error(problem))?;
+        let (most, longest) = CHANNELS;
+        if self.channels.len() > most {
+            let found = self.channels.len();
+            return Err(place(None).error(DataProblem::TooManyChannels { found, most }));
+        }
+        if let Some(name) = self.channels.keys().find(|name| name.len() > longest) {
+            return Err(place(None)
+                .in_column(name)
+                .error(DataProblem::LongName(longest)));
+        }
+        self.check_start(&place(None))?;
         for (name, values) in self.columns() {
             if values.len() != self.u.len() {
                 return Err(place(None)
@@ -197,6 +246,49 @@ impl Record {
             }
         }
         Ok(())
+    }
+}
+
+impl Record {
+    /// Whether the times are some, and tell samples apart in double precision.
+    fn check_times(&self) -> Result<(), DataProblem> {
+        let latest = self.t0.abs().max(self.time(self.len()).abs());
+        if latest >= RULES.latest_s {
+            return Err(DataProblem::NotSeconds(latest));
+        }
+        if latest * f64::EPSILON > RULES.uneven * self.sample_period_s {
+            return Err(DataProblem::LateTimes {
+                time: latest,
+                period: self.sample_period_s,
+            });
+        }
+        Ok(())
+    }
+
+    /// Checks what is said about the start of the record; `place` is the file or record, or its `dataset.toml`.
+    pub(crate) fn check_start(&self, place: &FilePlace) -> Result<(), DataError> {
+        let before = self.u_before.unwrap_or(0.0);
+        if !before.is_finite() || before.abs() > LARGEST {
+            let problem = DataProblem::BadCommandBefore(before);
+            return Err(place.clone().at_key("u_before").error(problem));
+        }
+        if self.lead >= self.len() {
+            let problem = DataProblem::OnlyLead {
+                lead: self.lead,
+                samples: self.len(),
+            };
+            return Err(place.clone().at_key("lead_samples").error(problem));
+        }
+        Ok(())
+    }
+}
+
+/// Whether a sampling period is one, s.
+pub(crate) fn check_period(seconds: f64) -> Result<(), DataProblem> {
+    let [shortest, longest] = PERIODS_S;
+    match (shortest..=longest).contains(&seconds) {
+        true => Ok(()),
+        false => Err(DataProblem::BadPeriod(seconds)),
     }
 }
 
@@ -283,6 +375,24 @@ mod tests {
         assert_eq!(of(levels), None);
         assert_eq!(of(vec![0.0, 0.0, 2.0, 0.0]), None);
         assert_eq!(of(vec![0.0, 1.0, 2.0, 0.0]), Some(2));
+    }
+
+    #[test]
+    fn a_part_keeps_the_command_before_it_and_its_share_of_the_lead() {
+        let mut whole = record();
+        (whole.u_before, whole.lead) = (Some(0.5), 2);
+        let start_of = |whole: &Record, from, to| {
+            let part = whole.part(from, to);
+            (part.u_before, part.lead, part.len())
+        };
+        assert_eq!(start_of(&whole, 0, 3), (Some(0.5), 2, 3));
+        assert_eq!(start_of(&whole, 0, 1), (Some(0.5), 1, 1));
+        assert_eq!(start_of(&whole, 1, 3), (Some(0.0), 1, 2));
+        assert_eq!(start_of(&whole, 2, 3), (Some(1.0), 0, 1));
+        whole.u_before = None;
+        assert_eq!(start_of(&whole, 0, 3).0, None);
+        assert!(message(|r| r.lead = 3).contains("key `lead_samples`"));
+        assert!(message(|r| r.u_before = Some(f64::NAN)).contains("key `u_before`"));
     }
 
     #[test]

@@ -4,13 +4,40 @@
 //! here, because the line numbers of the `csv` crate are off after blank lines and with CRLF line ends, and because a
 //! raw recording of several GB is read through this same code.
 
-use std::io::{BufRead, Read};
+use std::collections::HashSet;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use crate::error::{DataError, DataProblem, FilePlace, printable};
+use crate::import::ImportProblem;
 
 /// The longest line that is still taken for a row of measurements, bytes.
 const LONGEST_LINE: u64 = 1 << 20;
+
+/// Opens a file whose rows are to be read; one of another program is named as such, with the command that reads it.
+pub(crate) fn open_text(path: &Path, buffer: usize) -> Result<BufReader<File>, DataError> {
+    let unreadable = |e| DataError::unreadable(path, e);
+    let mut reader = BufReader::with_capacity(buffer, File::open(path).map_err(unreadable)?);
+    let start = reader.fill_buf().map_err(unreadable)?;
+    let ends_in = |ending: &str| {
+        path.extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case(ending))
+    };
+    let kind = if start.starts_with(b"MATLAB") || (ends_in("mat") && start.contains(&0)) {
+        "MATLAB file"
+    } else if start.starts_with(b"\x93NUMPY") || (ends_in("npz") && start.starts_with(b"PK")) {
+        "NumPy file"
+    } else if start.starts_with(b"PK\x03\x04") {
+        return Err(FilePlace::file(path).error(ImportProblem::NoArrays.into()));
+    } else if start.starts_with(b"\x89HDF") {
+        return Err(FilePlace::file(path).error(ImportProblem::Hdf5.into()));
+    } else {
+        return Ok(reader);
+    };
+    let name = path.display().to_string();
+    Err(FilePlace::file(path).error(DataProblem::ToImport { kind, name }))
+}
 
 /// Reads the rows of one CSV file in order; holds one line in memory.
 pub(crate) struct RowReader<R> {
@@ -158,6 +185,7 @@ fn split_header(text: &str, place: &FilePlace) -> Result<Vec<String>, DataError>
         .read_record(&mut record)
         .map_err(|e| place.clone().error(DataProblem::BadHeader(e.to_string())))?;
     let names: Vec<String> = record.iter().map(str::to_owned).collect();
+    let mut before = HashSet::new();
     for (i, name) in names.iter().enumerate() {
         if name.is_empty() {
             return Err(place.clone().error(DataProblem::UnnamedColumn(i + 1)));
@@ -165,7 +193,7 @@ fn split_header(text: &str, place: &FilePlace) -> Result<Vec<String>, DataError>
         if name.chars().any(char::is_control) {
             return Err(place.clone().in_column(name).error(DataProblem::BadName));
         }
-        if names.iter().take(i).any(|n| n == name) {
+        if !before.insert(name) {
             return Err(place
                 .clone()
                 .in_column(name)

@@ -11,20 +11,152 @@ pub(crate) struct PrintedTimes {
 }
 
 /// A fault in a time column: the row where it shows (0 is the first row) and what it is.
+#[derive(Debug)]
 pub(crate) struct TimeFault {
     pub(crate) row: usize,
     pub(crate) problem: DataProblem,
 }
 
+/// A sampling period that somebody stated.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stated {
+    pub(crate) period_s: f64,
+    /// Where: subject and verb of a sentence, ``"`sample_period_s` is"``.
+    pub(crate) by: &'static str,
+}
+
+/// What a time column says of the sampling.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Clock {
+    /// Sampling period, s.
+    pub(crate) period_s: f64,
+    /// Set where steps differ by more than the allowance, and the rounding of the printed times explains it.
+    pub(crate) rounded: Option<Rounded>,
+}
+
+/// A time column whose steps differ because its times are rounded to about the sampling period, or coarser.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Rounded {
+    /// One unit in the last printed place, s.
+    pub(crate) unit: f64,
+    /// Shortest step, s.
+    pub(crate) shortest: f64,
+    /// Longest step, s.
+    pub(crate) longest: f64,
+    /// Steps that differ from the most common one by more than the allowance.
+    pub(crate) uncommon: usize,
+    /// The row after the first of them.
+    pub(crate) row: usize,
+}
+
 impl PrintedTimes {
     /// The sampling period: `stated` after checking it against the rows, or taken from the rows.
     ///
-    /// Needs at least two rows; all times finite.
-    pub(crate) fn period(&self, stated: Option<f64>) -> Result<f64, TimeFault> {
-        let n = self.time.len();
-        let (Some(first), Some(last)) = (self.time.first(), self.time.last()) else {
-            return Err(fault(0, DataProblem::TooFewRows(0)));
+    /// Needs at least two rows; all times finite. Steps that vary are allowed where the rounding of the printed times
+    /// explains all of them: then the period is the mean over the record.
+    pub(crate) fn clock(&self, stated: Option<Stated>) -> Result<Clock, TimeFault> {
+        let fault = match self.period_of_steps(stated) {
+            Ok(period_s) => {
+                return Ok(Clock {
+                    period_s,
+                    rounded: None,
+                });
+            }
+            Err(fault) => fault,
         };
+        let Some(rounded) = self.rounded() else {
+            return Err(fault);
+        };
+        Ok(Clock {
+            period_s: self.mean_period(stated)?,
+            rounded: Some(rounded),
+        })
+    }
+
+    /// One unit in the last place of most times, s. A column of shortest decimals has `0` and `1` beside `0.25`, and the
+    /// rounding of binary numbers grows with them.
+    fn resolution(&self) -> f64 {
+        let mut units = self.unit.clone();
+        let middle = units.len() / 2;
+        match units.is_empty() {
+            true => 0.0,
+            false => *units.select_nth_unstable_by(middle, f64::total_cmp).1,
+        }
+    }
+
+    /// Whether times k·period + offset, rounded as the printed ones are, give all of the printed times; each may be off
+    /// its place by the allowance for uneven steps beside. A few uncommon steps are no evidence of rounding unless the clock
+    /// counts whole seconds, and there a doubled time is none.
+    fn rounded(&self) -> Option<Rounded> {
+        let last = self.time.len().checked_sub(1).filter(|&n| n >= 2)?;
+        let unit = self.resolution();
+        let mean = (self.time.last()? - self.time.first()?) / last as f64;
+        let steps = || self.time.windows(2).map(|w| w[1] - w[0]);
+        let (shortest, longest) = steps().fold((f64::INFINITY, 0.0_f64), |(low, high), s| {
+            (low.min(s), high.max(s))
+        });
+        if !(mean > 0.0 && unit > 0.0 && shortest >= 0.0) {
+            return None;
+        }
+        let mut sorted: Vec<f64> = steps().collect();
+        let median = *sorted.select_nth_unstable_by(last / 2, f64::total_cmp).1;
+        let is_uncommon = |s: f64| (s - median).abs() > unit / 2.0;
+        let uncommon = steps().filter(|&s| is_uncommon(s)).count();
+        let row = steps().position(is_uncommon)? + 1;
+        let is_evident = uncommon >= RULES.jumps || (unit >= RULES.coarse_s && shortest > 0.0);
+        if !is_evident {
+            return None;
+        }
+        // The spread of t - k·p about the best p; convex in p, so thirds close in on its minimum.
+        let first = *self.time.first()?;
+        let spread = |p: f64| {
+            let off = |(k, t): (usize, &f64)| t - first - k as f64 * p;
+            let offs = self.time.iter().enumerate().map(off);
+            let (low, high) = offs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), r| {
+                (low.min(r), high.max(r))
+            });
+            high - low
+        };
+        let allowed = unit + RULES.uneven * mean;
+        let (mut low, mut high) = (mean - allowed / last as f64, mean + allowed / last as f64);
+        for _ in 0..40 {
+            let third = (high - low) / 3.0;
+            if spread(low + third) < spread(high - third) {
+                high -= third;
+            } else {
+                low += third;
+            }
+        }
+        (spread((low + high) / 2.0) <= allowed * (1.0 + 1e-9)).then_some(Rounded {
+            unit,
+            shortest,
+            longest,
+            uncommon,
+            row,
+        })
+    }
+
+    /// The time that the mean step is taken over, s, and its number of steps. Where times repeat it goes from one new time to
+    /// another: those are known to a step, not only to the unit in which the times are printed.
+    pub(crate) fn span(&self) -> (f64, usize) {
+        let changes =
+            || (1..self.time.len()).filter(|&row| self.time.get(row) > self.time.get(row - 1));
+        let ends = match changes().count() + 1 < self.time.len() {
+            true => changes().next().zip(changes().next_back()),
+            false => None,
+        };
+        let (first, last) = match ends {
+            Some((first, last)) if last > first => (first, last),
+            _ => (0, self.time.len().saturating_sub(1)),
+        };
+        match (self.time.get(first), self.time.get(last)) {
+            (Some(from), Some(to)) => (to - from, last - first),
+            _ => (0.0, 0),
+        }
+    }
+
+    fn period_of_steps(&self, stated: Option<Stated>) -> Result<f64, TimeFault> {
+        let n = self.time.len();
         if n < 2 {
             return Err(fault(0, DataProblem::TooFewRows(n)));
         }
@@ -43,17 +175,11 @@ impl PrintedTimes {
         let rounding = |row: usize| self.unit[row - 1].max(self.unit[row]);
         // A period that fits no step at all is a wrong statement, not a gap in row 2.
         if let Some(stated) = stated
-            && (median - stated).abs() > tolerance(stated, rounding(1))
+            && (median - stated.period_s).abs() > tolerance(stated.period_s, rounding(1))
         {
-            return Err(fault(
-                1,
-                DataProblem::PeriodMismatch {
-                    found: tidy(median, 1e-6),
-                    stated,
-                },
-            ));
+            return Err(fault(1, stated.contradicted_by(median)));
         }
-        let period = stated.unwrap_or(median);
+        let period = stated.map_or(median, |s| s.period_s);
         for row in 1..n {
             let step = self.time[row] - self.time[row - 1];
             if (step - period).abs() > tolerance(period, rounding(row)) {
@@ -73,19 +199,37 @@ impl PrintedTimes {
                 ));
             }
         }
-        let mean = (last - first) / (n - 1) as f64;
-        let rounding =
-            (self.unit[0].min(period) + self.unit[n - 1].min(period)) / 2.0 / (n - 1) as f64;
+        self.mean_period(stated)
+    }
+
+    /// The mean step over the record in the fewest digits that its rounding leaves, or the stated period, which the mean
+    /// may not contradict.
+    fn mean_period(&self, stated: Option<Stated>) -> Result<f64, TimeFault> {
+        let (span, steps) = self.span();
+        if steps == 0 {
+            return Err(fault(0, DataProblem::TooFewRows(self.time.len())));
+        }
+        let mean = span / steps as f64;
+        let rounding = self.resolution() / steps as f64;
         match stated {
-            Some(stated) if (mean - stated).abs() > RULES.clock * stated + rounding => Err(fault(
-                1,
-                DataProblem::PeriodMismatch {
-                    found: tidy(mean, 1e-6),
-                    stated,
-                },
-            )),
-            Some(stated) => Ok(stated),
+            Some(stated) => {
+                let allowed = RULES.clock * stated.period_s + rounding;
+                match (mean - stated.period_s).abs() > allowed {
+                    true => Err(fault(1, stated.contradicted_by(mean))),
+                    false => Ok(stated.period_s),
+                }
+            }
             None => Ok(tidy(mean, (rounding / mean).clamp(1e-9, 1e-4))),
+        }
+    }
+}
+
+impl Stated {
+    fn contradicted_by(self, found: f64) -> DataProblem {
+        DataProblem::PeriodMismatch {
+            found: tidy(found, 1e-6),
+            stated: self.period_s,
+            by: self.by,
         }
     }
 }
@@ -122,6 +266,11 @@ mod tests {
     use super::*;
     use crate::rows::printed_unit;
 
+    fn stated(period_s: f64) -> Option<Stated> {
+        let by = "`sample_period_s` is";
+        Some(Stated { period_s, by })
+    }
+
     fn printed(n: usize, period: f64, digits: usize) -> PrintedTimes {
         let mut times = PrintedTimes::default();
         for k in 0..n {
@@ -144,17 +293,34 @@ mod tests {
             (9.0, 0),
             (1.0 / 51200.0, 7),
         ] {
-            let found = printed(10_000, period, digits).period(None).ok().unwrap();
+            let found = printed(10_000, period, digits)
+                .clock(None)
+                .ok()
+                .map(|c| c.period_s)
+                .unwrap();
             let allowed = 2.0 * 10f64.powi(-(digits as i32)) / 10_000.0;
             assert!(
                 (found - period).abs() <= allowed,
                 "{period} printed to {digits}: {found}"
             );
-            assert!(printed(10_000, period, digits).period(Some(period)).is_ok());
+            assert!(
+                printed(10_000, period, digits)
+                    .clock(stated(period))
+                    .is_ok()
+            );
         }
-        assert_eq!(printed(10_000, 0.001, 3).period(None).ok(), Some(0.001));
         assert_eq!(
-            printed(10_000, 1.0 / 3.0, 6).period(None).ok(),
+            printed(10_000, 0.001, 3)
+                .clock(None)
+                .ok()
+                .map(|c| c.period_s),
+            Some(0.001)
+        );
+        assert_eq!(
+            printed(10_000, 1.0 / 3.0, 6)
+                .clock(None)
+                .ok()
+                .map(|c| c.period_s),
             Some(1.0 / 3.0)
         );
     }
@@ -165,7 +331,7 @@ mod tests {
             let mut gap = printed(100, period, 3);
             gap.time.remove(40);
             gap.unit.remove(40);
-            let fault = gap.period(None).err().unwrap();
+            let fault = gap.clock(None).err().unwrap();
             assert_eq!(fault.row, 40);
             assert!(matches!(
                 fault.problem,
@@ -173,19 +339,71 @@ mod tests {
             ));
             let mut back = printed(100, period, 3);
             back.time[60] = back.time[59];
-            let fault = back.period(Some(period)).err().unwrap();
+            let fault = back.clock(stated(period)).err().unwrap();
             assert_eq!(fault.row, 60);
             assert!(matches!(fault.problem, DataProblem::TimeBackward { .. }));
         }
-        let wrong = printed(100, 0.001, 3).period(Some(0.01)).err().unwrap();
+        let wrong = printed(100, 0.001, 3).clock(stated(0.01)).err().unwrap();
         assert!(matches!(wrong.problem, DataProblem::PeriodMismatch { .. }));
         let slightly = printed(10_000, 0.00101, 6)
-            .period(Some(0.001))
+            .clock(stated(0.001))
             .err()
             .unwrap();
         assert!(matches!(
             slightly.problem,
             DataProblem::PeriodMismatch { .. }
         ));
+    }
+
+    /// Times of a clock that is read every `period` s and printed in whole units.
+    fn whole(n: usize, period: f64, unit: f64, phase: f64) -> PrintedTimes {
+        let read = |k: usize| ((k as f64 + phase) * period / unit).floor() * unit;
+        PrintedTimes {
+            time: (0..n).map(read).collect(),
+            unit: vec![unit; n],
+        }
+    }
+
+    #[test]
+    fn whole_second_stamps_of_any_period_miss_no_sample() {
+        for (n, period) in [
+            (599, 1.001_7),
+            (599, 0.99),
+            (4000, 1.3),
+            (500, 0.25),
+            (3000, 0.1),
+        ] {
+            let times = whole(n, period, 1.0, 0.3);
+            let clock = times.clock(None).unwrap();
+            let off = (clock.period_s - period).abs() * (n - 1) as f64;
+            let off = if period < 1.0 {
+                off / 2.0 / period
+            } else {
+                off
+            };
+            assert!(off <= 1.0, "{period}: {}", clock.period_s);
+            assert!(times.clock(stated(period)).is_ok(), "{period}");
+            let wrong = times.clock(stated(1.5 * period)).unwrap_err();
+            assert!(matches!(wrong.problem, DataProblem::PeriodMismatch { .. }));
+        }
+        // Two samples missing at once, or single ones where no clock puts them, are no rounding.
+        for missing in [&[200, 201][..], &[100, 150, 170]] {
+            let mut times = whole(600, 1.0, 1.0, 0.0);
+            for &row in missing.iter().rev() {
+                times.time.remove(row);
+                times.unit.remove(row);
+            }
+            let fault = times.clock(None).unwrap_err();
+            assert!(matches!(fault.problem, DataProblem::TimeGap { .. }));
+        }
+        let minutes = whole(400, 10.0, 60.0, 0.0).clock(None).unwrap();
+        assert!((minutes.period_s - 10.0).abs() < 0.2);
+    }
+
+    /// Milliseconds are printed by clocks that do not slip: a step of two periods there is a missing sample.
+    #[test]
+    fn fine_clocks_are_rounded_only_where_many_steps_say_so() {
+        let slow = whole(5000, 0.001_3, 0.001, 0.0).clock(None).unwrap();
+        assert!(slow.rounded.is_some() && (slow.period_s - 0.001_3).abs() < 1e-6);
     }
 }

@@ -3,6 +3,11 @@
 use crate::error::{DataError, DataProblem, FilePlace};
 use crate::hash;
 use crate::record::{Origin, Record, Use, indexed};
+use crate::sampling::tidy;
+use crate::thresholds::RULES;
+
+/// The file that makes a folder a data set.
+pub(crate) const MANIFEST: &str = "dataset.toml";
 
 /// Records of one rig and one sampling period.
 ///
@@ -15,12 +20,40 @@ pub struct DataSet {
     pub title: Option<String>,
     /// Sampling period of every record, s.
     pub sample_period_s: f64,
+    /// What kind of plant was recorded: decides how effects are interpreted, never what is computed.
+    pub plant: Plant,
     /// At least one; names are unique.
     pub records: Vec<Record>,
     /// Hash of names, uses, sampling period and every value, 16 hexadecimal digits: FNV-1a, 64 bits.
     pub hash: String,
     /// Where each record was read from (folder or file, line of each sample), for later messages.
     origin: Vec<Origin>,
+}
+
+/// Kinds of plants (`plant` in `dataset.toml`). Effects of the catalogue are named after what they are in a flow; in
+/// other plants only the observed behaviour is reported.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Plant {
+    /// A separated flow with jets: the default.
+    #[default]
+    Flow,
+    /// Heating, cooling, heat exchangers.
+    Thermal,
+    /// Electric drives.
+    Motor,
+    /// Tanks, pumps, valves.
+    Process,
+    /// Anything else.
+    Other,
+}
+
+impl Plant {
+    /// Whether it is the default, which files leave out.
+    #[must_use]
+    pub fn is_flow(&self) -> bool {
+        *self == Self::Flow
+    }
 }
 
 impl DataSet {
@@ -50,9 +83,10 @@ impl DataSet {
             if record.sample_period_s != sample_period_s {
                 return Err(origin
                     .place(&record.name, None)
-                    .error(DataProblem::PeriodMismatch {
+                    .error(DataProblem::PeriodsDiffer {
                         found: record.sample_period_s,
-                        stated: sample_period_s,
+                        other: sample_period_s,
+                        first: first.name.clone(),
                     }));
             }
             if records.iter().take(i).any(|r| r.name == record.name) {
@@ -65,6 +99,7 @@ impl DataSet {
         Ok(Self {
             hash: hash::of(sample_period_s, &records),
             title,
+            plant: Plant::default(),
             sample_period_s,
             records,
             origin,
@@ -130,6 +165,46 @@ impl DataSet {
     }
 }
 
+/// Sampling periods of records that were made one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct OnePeriod {
+    /// Shortest of the records' own periods, s.
+    pub(crate) shortest: f64,
+    /// Longest, s.
+    pub(crate) longest: f64,
+    /// Their mean over all steps, s: the period of the records now.
+    pub(crate) mean: f64,
+}
+
+/// Gives records whose sampling periods differ by less than a sample over the longest of them one period, the mean over
+/// all steps. Nothing is done, and none returned, where they are equal or differ by more.
+pub(crate) fn unite_periods(records: &mut [Record]) -> Option<OnePeriod> {
+    let mut found = OnePeriod {
+        shortest: f64::INFINITY,
+        longest: 0.0,
+        mean: 0.0,
+    };
+    let (mut steps, mut most) = (0.0, 0.0_f64);
+    for record in &*records {
+        found.shortest = found.shortest.min(record.sample_period_s);
+        found.longest = found.longest.max(record.sample_period_s);
+        let own = record.len().saturating_sub(1) as f64;
+        found.mean += own * record.sample_period_s;
+        steps += own;
+        most = most.max(own);
+    }
+    found.mean /= steps;
+    let spread = found.longest - found.shortest;
+    if !(spread > 0.0 && spread * most < RULES.drift * found.mean) {
+        return None;
+    }
+    found.mean = tidy(found.mean, (spread / found.mean / 4.0).max(1e-9));
+    for record in records {
+        record.sample_period_s = found.mean;
+    }
+    Some(found)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -159,6 +234,24 @@ mod tests {
             ..record()
         };
         assert!(error(vec![record(), other]).contains("0.002"));
+    }
+
+    #[test]
+    fn periods_that_differ_by_less_than_a_sample_are_made_one() {
+        let of = |period: f64, n: usize| {
+            let u = (0..n).map(|k| k as f64).collect::<Vec<_>>();
+            Record::new("a", Use::Identify, period, u.clone(), u)
+        };
+        let mut records = [of(0.990396, 900), of(0.990492, 900)];
+        let found = unite_periods(&mut records).unwrap();
+        assert!((found.mean - 0.990444).abs() < 2e-5, "{found:?}");
+        assert!(records.iter().all(|r| r.sample_period_s == found.mean));
+        assert_eq!(unite_periods(&mut records), None);
+        // 899 steps that are each 0.2 % longer are 1.8 samples more.
+        let mut records = [of(0.990, 900), of(0.992, 900)];
+        assert_eq!(unite_periods(&mut records), None);
+        assert_eq!(records[1].sample_period_s, 0.992);
+        assert_eq!(unite_periods(&mut [of(1.0, 1), of(1.0, 1)]), None);
     }
 
     #[test]

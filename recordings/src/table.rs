@@ -1,14 +1,16 @@
 //! One CSV file in memory: columns by name, the line of each row, the sampling period.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::BufRead;
 use std::path::Path;
 
 use crate::error::{DataError, DataProblem, FilePlace};
+use crate::import::ImportProblem;
+use crate::memory;
 use crate::record::{Origin, Record, Use, check_values};
-use crate::rows::{RowReader, number, printed_unit};
-use crate::sampling::PrintedTimes;
+use crate::rows::{RowReader, number, open_text, printed_unit};
+use crate::sampling::{PrintedTimes, Stated};
+use crate::thresholds::RULES;
 
 /// The columns of one file; all have the same length, at least 2, and only finite values.
 #[derive(Debug)]
@@ -19,18 +21,31 @@ pub(crate) struct Table {
     origin: Origin,
 }
 
+/// Rows after which the memory is checked.
+const CHECKED: usize = 4096;
+const REMEDY: &str = "phase-average it with `host-fit average`, or use a part of it";
+
 impl Table {
     /// Reads a file; `stated` is the sampling period it has to have, otherwise its own is found.
-    pub(crate) fn load(path: &Path, stated: Option<f64>) -> Result<Self, DataError> {
-        let file = File::open(path).map_err(|e| DataError::unreadable(path, e))?;
-        Self::read(BufReader::with_capacity(1 << 16, file), path, stated)
+    pub(crate) fn load(path: &Path, stated: Option<Stated>) -> Result<Self, DataError> {
+        Self::load_beside(path, stated, 0)
+    }
+
+    /// The same where so many bytes of memory are taken already.
+    pub(crate) fn load_beside(
+        path: &Path,
+        stated: Option<Stated>,
+        taken: u64,
+    ) -> Result<Self, DataError> {
+        Self::read(open_text(path, 1 << 16)?, path, stated, taken)
     }
 
     /// Reads from anything that yields bytes; `path` is used in messages only.
     pub(crate) fn read(
         source: impl BufRead,
         path: &Path,
-        stated: Option<f64>,
+        stated: Option<Stated>,
+        taken: u64,
     ) -> Result<Self, DataError> {
         let mut rows = RowReader::new(source, path)?;
         let time_column = rows.required("t")?;
@@ -38,7 +53,14 @@ impl Table {
         let mut columns = vec![Vec::new(); names.len()];
         let mut times = PrintedTimes::default();
         let mut lines = Vec::new();
+        // Its values, and of each row its line and the last place of its time.
+        let row = 8 * (names.len() as u64 + 2);
         while rows.advance()? {
+            if lines.len() % CHECKED == 0 {
+                let needed = taken + (lines.len() + CHECKED) as u64 * row;
+                memory::allow(needed, "its rows", REMEDY)
+                    .map_err(|e| rows.here().error(ImportProblem::from(e).into()))?;
+            }
             let found = rows.cells().count();
             if found != names.len() {
                 return Err(rows.here().error(DataProblem::RowLength {
@@ -66,7 +88,12 @@ impl Table {
         }
         let mut columns: BTreeMap<String, Vec<f64>> = names.into_iter().zip(columns).collect();
         times.time = columns.remove("t").unwrap_or_default();
-        let sample_period_s = times.period(stated).map_err(|fault| {
+        if let Some(row) = times.time.iter().position(|t| t.abs() >= RULES.latest_s) {
+            let time = times.time.get(row).copied().unwrap_or(f64::NAN);
+            let here = place(Some(row)).in_column("t");
+            return Err(here.error(DataProblem::NotSeconds(time)));
+        }
+        let clock = times.clock(stated).map_err(|fault| {
             let at = match fault.problem {
                 DataProblem::TooFewRows(_) => place(None),
                 _ => place(Some(fault.row)).in_column("t"),
@@ -76,7 +103,7 @@ impl Table {
         Ok(Self {
             t0: times.time.first().copied().unwrap_or(0.0),
             columns,
-            sample_period_s,
+            sample_period_s: clock.period_s,
             origin,
         })
     }
@@ -111,6 +138,10 @@ impl Table {
             role,
             sample_period_s: self.sample_period_s,
             t0: self.t0,
+            u_before: None,
+            lead: 0,
+            y_before: None,
+            follow: 0,
             u,
             y,
             y_sd: self.columns.remove("y_sd"),
@@ -144,6 +175,8 @@ impl InputFile {
     /// # Errors
     /// [`DataError`] naming file, line and column of the first fault.
     pub fn load(path: &Path, stated: Option<f64>) -> Result<Self, DataError> {
+        let by = "the sampling period is stated as";
+        let stated = stated.map(|period_s| Stated { period_s, by });
         let mut table = Table::load(path, stated)?;
         Ok(Self {
             sample_period_s: table.sample_period_s,
@@ -181,7 +214,7 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> Result<Table, DataError> {
-        Table::read(text.as_bytes(), Path::new("run.csv"), None)
+        Table::read(text.as_bytes(), Path::new("run.csv"), None, 0)
     }
 
     fn message(text: &str) -> String {

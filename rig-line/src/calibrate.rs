@@ -10,17 +10,16 @@ use wire::reply::Phase;
 use crate::command::Command;
 use crate::error::LineError;
 use crate::host::{Host, word};
-use crate::record::{Progress, record};
+use crate::record::{MOST_SAMPLES, Progress, record};
 use crate::rig_file::{ChannelEntry, FULL_SCALE, RigFile, SensorEntry, VERSION, ValveEntry};
 
 /// How a rig is measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
-    /// How long the valve stays open, and shut, for the flow to become steady, s;
-    /// the second half of it is measured.
-    pub steady_s: f64,
-    /// Longest pulse that is tried, s.
-    pub longest_pulse_s: f64,
+    /// How long the valve stays open, and shut, for the flow to become steady, s; the second half of it is measured.
+    /// `None`: 4 s, or 1000 samples where that is longer. Flows that take longer than 4 s are given longer rests and
+    /// longer pulses in proportion.
+    pub steady_s: Option<f64>,
     /// Pulses of each length.
     pub pulses: u32,
     /// Standard errors by which the flow must have answered a pulse.
@@ -35,12 +34,37 @@ pub struct Plan {
 impl Default for Plan {
     fn default() -> Self {
         Self {
-            steady_s: 4.0,
-            longest_pulse_s: 0.05,
+            steady_s: None,
             pulses: 24,
             sigmas: 5.0,
             envelope_sigmas: 6.0,
             least_envelope: 0.25,
+        }
+    }
+}
+
+/// How long a usual flow takes to become steady, s, and the fewest samples that it is given.
+const STEADY: (f64, f64) = (4.0, 1000.0);
+
+/// How long flow and valve are given, s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Times {
+    /// For a steady flow.
+    steady: f64,
+    /// Between two pulses: as long as the flow needs to forget.
+    rest: f64,
+    /// Longest pulse that is tried.
+    longest_pulse: f64,
+}
+
+impl Times {
+    fn of(plan: &Plan, period: f64) -> Self {
+        let steady = plan.steady_s.unwrap_or(STEADY.0.max(STEADY.1 * period));
+        let slower = (steady / STEADY.0).max(1.0);
+        Self {
+            steady,
+            rest: 0.5 * slower,
+            longest_pulse: 0.05 * slower,
         }
     }
 }
@@ -83,7 +107,17 @@ pub fn calibrate(
         )));
     }
     let period = f64::from(board.period_us) * 1e-6;
-    let steady = (plan.steady_s / period).round() as usize;
+    let times = Times::of(plan, period);
+    let steady = (times.steady / period).round().max(1.0) as usize;
+    let longest = 2.0 * times.steady + f64::from(plan.pulses) * (times.rest + times.longest_pulse);
+    if longest / period > MOST_SAMPLES as f64 {
+        return Err(LineError::Calibration(format!(
+            "{} pulses and {} s of steady flow take {:.0} samples at once, and {MOST_SAMPLES} are the most; wait for less (--steady, --pulses)",
+            plan.pulses,
+            times.steady,
+            longest / period
+        )));
+    }
     let mut play = |what: &str, levels: Vec<bool>| {
         let command = Command::new("calibration", period, levels);
         played(host, &command, &mut |progress| watch(what, progress))
@@ -128,7 +162,8 @@ pub fn calibrate(
     let per_count = 1.0 / swing;
 
     let (shortest_on, shortest_off) = {
-        let mut answers = |open: bool| shortest(&mut play, plan, period, steady, open, swing);
+        let mut answers =
+            |open: bool| shortest(&mut play, (plan, times), period, steady, open, swing);
         (answers(true)?, answers(false)?)
     };
     let slow_noise = sixty_four(&off).max(sixty_four(&on));
@@ -167,17 +202,16 @@ type Play<'a> = dyn FnMut(&str, Vec<bool>) -> Result<Vec<f64>, LineError> + 'a;
 /// The shortest pulse (`open`), or gap in steady blowing, that the flow answers, s.
 fn shortest(
     play: &mut Play<'_>,
-    plan: &Plan,
+    (plan, times): (&Plan, Times),
     period: f64,
     steady: usize,
     open: bool,
     swing: f64,
 ) -> Result<f64, LineError> {
-    let longest = (plan.longest_pulse_s / period).round() as usize;
+    let longest = (times.longest_pulse / period).round().max(1.0) as usize;
     let what = if open { "pulses" } else { "gaps" };
     let mut answers = |length: usize| {
-        // Rests of half a second, as long as the flow needs to forget.
-        let rest = (0.5 / period).round() as usize;
+        let rest = (times.rest / period).round().max(1.0) as usize;
         let mut levels = if open { Vec::new() } else { vec![true; steady] };
         for _ in 0..plan.pulses {
             levels.extend(std::iter::repeat_n(!open, rest));
@@ -211,7 +245,7 @@ fn shortest(
         Some(length) => Ok(length as f64 * period),
         None => Err(LineError::Calibration(format!(
             "the flow answers no {what} up to {} s; allow longer ones, or more of them",
-            plan.longest_pulse_s
+            times.longest_pulse
         ))),
     }
 }
@@ -323,6 +357,37 @@ fn significant(value: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn slow_flows_and_long_periods_are_given_their_time() {
+        let of = |steady_s, period| {
+            Times::of(
+                &Plan {
+                    steady_s,
+                    ..Plan::default()
+                },
+                period,
+            )
+        };
+        let usual = Times {
+            steady: 4.0,
+            rest: 0.5,
+            longest_pulse: 0.05,
+        };
+        assert_eq!(of(None, 2e-4), usual);
+        assert_eq!(of(None, 1e-3), usual);
+        // Less is asked for at the user's risk; pulses are not shorter for it.
+        let hasty = Times {
+            steady: 1.5,
+            ..usual
+        };
+        assert_eq!(of(Some(1.5), 1e-3), hasty);
+        let slow = of(None, 0.1);
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        assert!(
+            near(slow.steady, 100.0) && near(slow.rest, 12.5) && near(slow.longest_pulse, 1.25)
+        );
+    }
 
     #[test]
     fn the_shortest_answered_length_is_found_in_few_plays() {

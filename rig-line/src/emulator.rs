@@ -12,12 +12,16 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex};
 
+use wire::reply::lost_after_samples;
+
 use crate::error::LineError;
 use crate::port::Port;
 
-/// Samples that the rig runs ahead of what the host was told: well below the
-/// half second after which a board gives its host up.
-const AHEAD: u64 = 150;
+/// Samples of `period_us` that the rig runs ahead of what the host was told: well below those after which a board gives
+/// its host up.
+fn ahead(period_us: u32) -> u64 {
+    u64::from(lost_after_samples(period_us) * 3 / 10)
+}
 
 /// What is measured and driven.
 pub trait Rig: Send {
@@ -72,9 +76,9 @@ impl Pace {
 }
 
 impl Presence {
-    /// The host was there.
-    pub fn touch(&self) {
-        self.0.change(|ahead| ahead.left = AHEAD);
+    /// The host of a board that samples every `period_us` was there.
+    pub fn touch(&self, period_us: u32) {
+        self.0.change(|now| now.left = ahead(period_us));
     }
 
     /// Samples that the board has taken.
@@ -218,5 +222,15 @@ impl Behind {
             let [d0, d1] = channel.to_le_bytes();
             line.write_all(&[button, c0, c1 | (d0 << 4), (d0 >> 4) | (d1 << 4)])?;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rig_waits_for_its_host_before_the_board_gives_it_up() {
+        assert_eq!([200, 1000, 10_000, 100_000].map(ahead), [750, 150, 15, 3]);
     }
 }

@@ -41,6 +41,11 @@ pub enum LineError {
         /// This program's.
         host: u8,
     },
+    /// The board's constants are none.
+    #[error(
+        "the board says that it has {0}, which cannot be; build the firmware anew with `cargo xtask firmware`"
+    )]
+    Constants(String),
     /// After a broken link somebody else answers.
     #[error(
         "after the link was broken a board with other firmware or constants answered; what was whole until then is kept"
@@ -67,6 +72,14 @@ pub enum LineError {
         command: String,
         /// What is wrong with it, and what to do.
         reason: String,
+    },
+    /// A time of more samples than memory is allowed for.
+    #[error("the longest {what} at this board's period is {longest_s:.0} s; ask for less")]
+    TooLong {
+        /// What is too long.
+        what: &'static str,
+        /// The longest, s.
+        longest_s: f64,
     },
     /// The rig is not as a calibration needs it.
     #[error("the rig cannot be calibrated: {0}")]

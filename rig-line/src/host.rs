@@ -2,10 +2,11 @@
 //! stream of samples, with the board told that its host is there.
 
 use std::collections::VecDeque;
+use std::ops::RangeInclusive;
 use std::time::{Duration, Instant};
 
 use wire::frame::Receiver;
-use wire::reply::{Answer, Info, PROTOCOL, Phase, Reply, Status};
+use wire::reply::{Answer, Info, PROTOCOL, Phase, Reply, Scale, Status};
 use wire::request::{Ask, Request};
 use wire::samples::{Sample, Samples};
 
@@ -87,6 +88,8 @@ pub struct Host {
     alive_at: Instant,
     unheard: usize,
     waiting: VecDeque<Streamed>,
+    /// The board's sample period, µs; until it has said so, that of the bundled model.
+    period_us: u32,
     /// Frames that came damaged.
     pub damaged: u64,
     /// Of an emulated board, whose time waits for its host.
@@ -105,6 +108,7 @@ impl Host {
             alive_at: Instant::now(),
             unheard: 0,
             waiting: VecDeque::new(),
+            period_us: 1000,
             damaged: 0,
             presence: pace.map(|pace| pace.enter()),
         }
@@ -133,7 +137,11 @@ impl Host {
     /// [`LineError`] when nobody is, or one of another version.
     pub fn hello(&mut self) -> Result<Info, LineError> {
         match self.ask("who are you", |_, _| Ask::Hello)? {
-            Answer::Info(info) if info.protocol == PROTOCOL => Ok(info),
+            Answer::Info(info) if info.protocol == PROTOCOL => {
+                check(&info)?;
+                self.period_us = info.period_us;
+                Ok(info)
+            }
             Answer::Info(info) => Err(LineError::Version {
                 board: info.protocol,
                 host: PROTOCOL,
@@ -306,7 +314,8 @@ impl Host {
     }
 
     fn patience(&self, time: Duration) -> Patience {
-        let samples = u64::try_from(time.as_millis()).unwrap_or(u64::MAX);
+        let samples = time.as_micros() / u128::from(self.period_us);
+        let samples = u64::try_from(samples).unwrap_or(u64::MAX);
         Patience {
             until: Instant::now() + time,
             sample: self.presence.as_ref().map(|p| p.samples() + samples),
@@ -318,7 +327,7 @@ impl Host {
         self.unheard = 0;
         self.alive_at = Instant::now();
         if let Some(presence) = &self.presence {
-            presence.touch();
+            presence.touch(self.period_us);
         }
     }
 
@@ -358,7 +367,7 @@ impl Host {
 }
 
 /// How long something is waited for. An emulated board has a time of its own, its
-/// samples: a millisecond each is near enough.
+/// samples.
 struct Patience {
     until: Instant,
     sample: Option<u64>,
@@ -374,6 +383,28 @@ impl Patience {
         };
         now >= self.until && (sampled || now >= self.at_last)
     }
+}
+
+/// Sampling periods that a board's loop can have, µs; `model_core::control::period` says so.
+const PERIODS_US: RangeInclusive<u32> = 200..=100_000;
+
+/// Refuses a board whose constants are none: everything that is recorded of it would be wrong.
+fn check(info: &Info) -> Result<(), LineError> {
+    let wrong = |what: String| Err(LineError::Constants(what));
+    let Scale { zero, per_count } = info.sensor;
+    if !PERIODS_US.contains(&info.period_us) {
+        return wrong(format!("a sampling period of {} µs", info.period_us));
+    }
+    if !(zero.is_finite() && per_count.is_normal()) {
+        return wrong(format!("y = (counts - {zero}) * {per_count}"));
+    }
+    if !(info.rails.iter().all(|rail| rail.is_finite()) && info.rails[0] < info.rails[1]) {
+        return wrong(format!("rails of {:?} counts", info.rails));
+    }
+    if !info.envelope.is_finite() {
+        return wrong(format!("a residual's envelope of {}", info.envelope));
+    }
+    Ok(())
 }
 
 /// Why the board refuses, and what to do.
@@ -397,5 +428,113 @@ fn reason(status: Status, detail: u32) -> String {
             None => "it is not disarmed; disarm it first (`--disarm`)".into(),
         },
         _ => format!("it says {status:?} {detail}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_board_that_cannot_be_is_refused() {
+        use model_core::control::period::{LONGEST_US, SHORTEST_US};
+        assert_eq!(PERIODS_US, SHORTEST_US..=LONGEST_US);
+        let good = Info {
+            protocol: PROTOCOL,
+            version: [0, 1, 0],
+            period_us: 1000,
+            model: 1,
+            rig: 2,
+            sensor: Scale {
+                zero: 800.0,
+                per_count: 0.0005,
+            },
+            rails: [8.0, 4087.0],
+            stuck_after: 500,
+            envelope: 0.5,
+            hold: [4, 4],
+            channel: Scale {
+                zero: 0.0,
+                per_count: 0.0,
+            },
+            phase: Phase::Disarmed,
+            samples: 0,
+            most_runs: 1024,
+            damaged: 0,
+            session: 0,
+        };
+        assert!(check(&good).is_ok());
+        let scale = |zero, per_count| Scale { zero, per_count };
+        for (bad, word) in [
+            (
+                Info {
+                    period_us: 0,
+                    ..good
+                },
+                "0 µs",
+            ),
+            (
+                Info {
+                    period_us: u32::MAX,
+                    ..good
+                },
+                "4294967295 µs",
+            ),
+            (
+                Info {
+                    sensor: scale(f32::NAN, 0.1),
+                    ..good
+                },
+                "NaN",
+            ),
+            (
+                Info {
+                    sensor: scale(0.0, f32::NAN),
+                    ..good
+                },
+                "NaN",
+            ),
+            (
+                Info {
+                    sensor: scale(0.0, f32::INFINITY),
+                    ..good
+                },
+                "inf",
+            ),
+            (
+                Info {
+                    sensor: scale(0.0, 0.0),
+                    ..good
+                },
+                "* 0",
+            ),
+            (
+                Info {
+                    rails: [f32::NAN; 2],
+                    ..good
+                },
+                "rails",
+            ),
+            (
+                Info {
+                    rails: [4087.0, 8.0],
+                    ..good
+                },
+                "rails",
+            ),
+            (
+                Info {
+                    envelope: f32::INFINITY,
+                    ..good
+                },
+                "envelope",
+            ),
+        ] {
+            let error = check(&bad).expect_err(word).to_string();
+            assert!(
+                error.contains(word) && error.contains("firmware"),
+                "{error}"
+            );
+        }
     }
 }

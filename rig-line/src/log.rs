@@ -19,8 +19,10 @@ use crate::rig_file::RigFile;
 #[derive(Clone, Debug, Serialize)]
 pub struct Written {
     /// The rows: t, u, y and the channel.
+    #[serde(serialize_with = "as_text")]
     pub file: PathBuf,
     /// What is said of them.
+    #[serde(serialize_with = "as_text")]
     pub header: PathBuf,
     /// Repeats in the file.
     pub repeats: u32,
@@ -36,6 +38,11 @@ pub struct Written {
     pub parts: usize,
     /// Why there are fewer repeats than were asked for.
     pub cut_short: Option<String>,
+}
+
+/// JSON has no other names: what is no UTF-8 is shown as a mark.
+fn as_text<S: serde::Serializer>(path: &Path, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_str(&path.to_string_lossy())
 }
 
 /// What the columns of a recording are.

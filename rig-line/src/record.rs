@@ -18,6 +18,10 @@ use crate::host::{Event, Host, Streamed, word};
 const SILENCE: Duration = Duration::from_millis(1000);
 /// A board that has gone is waited for so long.
 const GONE: Duration = Duration::from_secs(30);
+/// So long samples may come without a new one among them.
+const NO_PROGRESS: Duration = Duration::from_secs(10);
+/// Longest command that is played at once, samples: 2.8 h at 1 kHz, some 100 MB until it is written.
+pub(crate) const MOST_SAMPLES: u64 = 10_000_000;
 /// Turns without a whole repeat after which the line is given up.
 const FRUITLESS: u32 = 10;
 
@@ -204,6 +208,12 @@ fn fits(command: &Command, board: &Info) -> Result<(), LineError> {
             "the board samples every {period} s, and the line takes every sample only from 0.0004 s on"
         )));
     }
+    if command.samples() > MOST_SAMPLES {
+        return Err(refused(format!(
+            "with its rest it has {} samples and {MOST_SAMPLES} are the most; play it in shorter pieces",
+            command.samples()
+        )));
+    }
     if command.runs.len() > usize::from(board.most_runs) {
         return Err(refused(format!(
             "it has {} runs and the board keeps {}; play it in shorter pieces",
@@ -250,11 +260,22 @@ impl Session<'_, '_> {
             repeat: Vec::new(),
         };
         let mut unanswered = 0;
+        let mut progressed = (0, Instant::now());
         loop {
             match host.next(SILENCE)? {
                 Event::Samples(streamed) => {
                     unanswered = 0;
                     self.take(&mut taken, &streamed)?;
+                    if taken.next != progressed.0 {
+                        progressed = (taken.next, Instant::now());
+                    } else if progressed.1.elapsed() > NO_PROGRESS {
+                        return Ok(End::Broken("the same samples come again and again".into()));
+                    }
+                    if u64::from(taken.next) > total {
+                        return Ok(End::Broken(
+                            "the board plays on after the command's end".into(),
+                        ));
+                    }
                     if streamed.phase != Phase::Playing
                         && !(streamed.last && streamed.samples.is_empty())
                     {
@@ -313,7 +334,7 @@ impl Session<'_, '_> {
             }
             taken.next = number.wrapping_add(1);
             self.recording.samples += 1;
-            if taken.repeat.len() == taken.period {
+            if taken.repeat.len() == taken.period && self.recording.whole < self.repeats {
                 (self.keep)(self.recording.whole, &taken.repeat).map_err(LineError::Keep)?;
                 self.recording.whole += 1;
                 taken.repeat.clear();

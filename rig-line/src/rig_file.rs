@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use recordings::output::write_atomic;
+use recordings::visible;
 use serde::{Deserialize, Serialize};
 
 use crate::error::LineError;
@@ -83,6 +84,8 @@ pub struct ChannelEntry {
 
 /// Largest count of the boards' converter.
 pub(crate) const FULL_SCALE: f64 = 4095.0;
+/// Longest time of a valve, s: an hour.
+const LONGEST_S: f64 = 3600.0;
 
 impl RigFile {
     /// Reads and checks a file.
@@ -122,8 +125,31 @@ impl RigFile {
             ("valve.shortest_off_s", self.valve.shortest_off_s),
         ];
         for (key, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(format!("key `{key}`: {value} is no time or size above 0"));
+            if !(value > 0.0 && single(value)) {
+                return Err(format!(
+                    "key `{key}`: {value:?} is no time or size above 0 that a board can hold"
+                ));
+            }
+        }
+        let [shortest, longest] = recordings::PERIODS_S;
+        for (key, value, range) in [
+            ("sample_period_s", self.sample_period_s, shortest..=longest),
+            (
+                "valve.shortest_on_s",
+                self.valve.shortest_on_s,
+                0.0..=LONGEST_S,
+            ),
+            (
+                "valve.shortest_off_s",
+                self.valve.shortest_off_s,
+                0.0..=LONGEST_S,
+            ),
+        ] {
+            if !range.contains(&value) {
+                let (low, high) = range.into_inner();
+                return Err(format!(
+                    "key `{key}`: {value:?} s lies outside {low:?} to {high:?} s"
+                ));
             }
         }
         let sensor = &self.sensor;
@@ -142,12 +168,23 @@ impl RigFile {
                     .into(),
             );
         }
-        if let Some(noise) = sensor.slow_noise_counts
-            && !(noise.is_finite() && noise >= 0.0)
-        {
-            return Err(format!(
-                "key `sensor.slow_noise_counts`: {noise} is no size of noise; calibrate anew"
-            ));
+        let noises = (sensor
+            .noise_counts
+            .iter()
+            .flatten()
+            .map(|n| ("noise_counts", n)))
+        .chain(
+            sensor
+                .slow_noise_counts
+                .iter()
+                .map(|n| ("slow_noise_counts", n)),
+        );
+        for (key, noise) in noises {
+            if !(0.0..=FULL_SCALE).contains(noise) {
+                return Err(format!(
+                    "key `sensor.{key}`: {noise:?} is no size of noise, in counts of a converter; calibrate anew"
+                ));
+            }
         }
         if let Some(channel) = &self.channel {
             line("channel", channel.zero_counts, channel.per_count)?;
@@ -156,6 +193,20 @@ impl RigFile {
                 channel.lower_rail_counts,
                 channel.upper_rail_counts,
             )?;
+            for (key, text) in [("name", &channel.name), ("unit", &channel.unit)] {
+                // It becomes the header of a column, and stands in the board's constants.
+                let acts = |c: char| c.is_control() || matches!(c, ',' | '"');
+                if text.contains(acts)
+                    || visible(text) != *text
+                    || text.trim() != text
+                    || text.len() > 100
+                {
+                    return Err(format!(
+                        "key `channel.{key}`: `{text}` cannot be shown on one line, has a comma or a quote, or is longer than \
+                         100 bytes"
+                    ));
+                }
+            }
             if channel.name.is_empty()
                 || ["t", "u", "y", "y_sd", "y_min", "y_max"].contains(&&*channel.name)
             {
@@ -171,8 +222,12 @@ impl RigFile {
     /// Writes the file.
     ///
     /// # Errors
-    /// [`LineError::Output`].
+    /// [`LineError::Output`]; [`LineError::RigFile`] for what could not be read again.
     pub fn save(&self, path: &Path) -> Result<(), LineError> {
+        self.check().map_err(|reason| LineError::RigFile {
+            file: path.to_path_buf(),
+            reason,
+        })?;
         let body = toml::to_string(self).unwrap_or_default();
         let text = format!(
             "# A rig, as `host-fit record --calibrate` found it; `cargo xtask firmware --rig` builds with it.\n{body}"
@@ -195,13 +250,20 @@ impl RigFile {
     }
 }
 
+/// Whether single precision, in which a board reckons, holds the value, and holds it as something.
+fn single(value: f64) -> bool {
+    (value as f32).is_normal() || value == 0.0
+}
+
 fn line(of: &str, zero: f64, per_count: f64) -> Result<(), String> {
-    if !zero.is_finite() {
-        return Err(format!("key `{of}.zero_counts`: {zero} is no number"));
-    }
-    if !(per_count.is_finite() && per_count != 0.0) {
+    if !single(zero) {
         return Err(format!(
-            "key `{of}.per_count`: {per_count} makes every reading the same"
+            "key `{of}.zero_counts`: {zero:?} is no number that a board can hold"
+        ));
+    }
+    if !(single(per_count) && per_count != 0.0) {
+        return Err(format!(
+            "key `{of}.per_count`: {per_count:?} makes every reading the same, or none"
         ));
     }
     Ok(())
@@ -242,22 +304,23 @@ mod tests {
         }
     }
 
+    fn channel() -> ChannelEntry {
+        ChannelEntry {
+            name: "u_inf".into(),
+            unit: "m/s".into(),
+            zero_counts: 0.0,
+            per_count: 0.005,
+            lower_rail_counts: 8.0,
+            upper_rail_counts: 4087.0,
+        }
+    }
+
     #[test]
     fn a_file_is_read_as_it_was_written() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("rig.toml");
         let mut rig = rig();
-        for channel in [
-            None,
-            Some(ChannelEntry {
-                name: "u_inf".into(),
-                unit: "m/s".into(),
-                zero_counts: 0.0,
-                per_count: 0.005,
-                lower_rail_counts: 8.0,
-                upper_rail_counts: 4087.0,
-            }),
-        ] {
+        for channel in [None, Some(channel())] {
             rig.channel = channel;
             rig.save(&path).expect("written");
             assert_eq!(RigFile::load(&path).expect("read"), rig);
@@ -268,7 +331,7 @@ mod tests {
     #[test]
     fn what_is_wrong_is_refused_with_its_key() {
         type Change = fn(&mut RigFile);
-        let wrong: [(&str, Change); 7] = [
+        let wrong: [(&str, Change); 18] = [
             ("format_version", |r| r.format_version = 9),
             ("sample_period_s", |r| r.sample_period_s = f64::NAN),
             ("sensor.zero_counts", |r| r.sensor.zero_counts = 4090.0),
@@ -278,6 +341,40 @@ mod tests {
             }),
             ("stuck_after_samples", |r| r.sensor.stuck_after_samples = 0),
             ("valve.shortest_on_s", |r| r.valve.shortest_on_s = -1.0),
+            // What single precision cannot hold would be written as `inf`, or as 0.
+            ("residual_envelope", |r| r.residual_envelope = 1e300),
+            ("residual_envelope", |r| r.residual_envelope = 1e-300),
+            ("sensor.per_count", |r| r.sensor.per_count = 1e39),
+            ("sensor.per_count", |r| r.sensor.per_count = -1e-300),
+            ("valve.shortest_off_s", |r| r.valve.shortest_off_s = 1e9),
+            ("sample_period_s", |r| r.sample_period_s = 1e-12),
+            ("sensor.noise_counts", |r| {
+                r.sensor.noise_counts = Some([1.0, f64::NAN])
+            }),
+            ("channel.zero_counts", |r| {
+                r.channel = Some(ChannelEntry {
+                    zero_counts: 1e300,
+                    ..channel()
+                })
+            }),
+            ("channel.name", |r| {
+                r.channel = Some(ChannelEntry {
+                    name: "a b,*/\n".into(),
+                    ..channel()
+                })
+            }),
+            ("channel.name", |r| {
+                r.channel = Some(ChannelEntry {
+                    name: "\u{202e}u".into(),
+                    ..channel()
+                })
+            }),
+            ("channel.unit", |r| {
+                r.channel = Some(ChannelEntry {
+                    unit: "m\r".into(),
+                    ..channel()
+                })
+            }),
         ];
         for (key, change) in wrong {
             let mut rig = rig();

@@ -5,7 +5,7 @@
 //! is missing, because a record needs its whole history. The judgement goes on.
 
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use recordings::output::{OutputError, Staging};
 use serde::Serialize;
@@ -16,6 +16,7 @@ use crate::alarm::{Alarm, Test, Verdict};
 use crate::error::LineError;
 use crate::host::{Event, Host, Streamed, word};
 use crate::log::{Columns, value};
+use crate::record::MOST_SAMPLES;
 
 /// What is watched and how long.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,6 +78,7 @@ pub struct Watched {
     #[serde(flatten)]
     pub verdict: Option<Verdict>,
     /// The data set, if one was asked for.
+    #[serde(serialize_with = "some_text")]
     pub log: Option<PathBuf>,
     /// Samples in it.
     pub logged: u64,
@@ -84,10 +86,20 @@ pub struct Watched {
     pub ended: Option<String>,
 }
 
+fn some_text<S: serde::Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::Ok, S::Error> {
+    path.as_ref()
+        .map(|path| path.to_string_lossy())
+        .serialize(to)
+}
+
 /// How long nothing may come.
 const SILENCE: Duration = Duration::from_secs(2);
-/// At the beginning of an armed loop the flow is far from y*; figures begin later, s.
+/// So long the board may answer without a new sample.
+const NOTHING_NEW: Duration = Duration::from_secs(10);
+/// At the beginning of an armed loop the flow is far from y*; figures begin after this, s …
 const SETTLING_S: f64 = 1.0;
+/// … and after so many samples: at a long period flows are slow.
+const SETTLING: u64 = 1000;
 
 /// Watches the loop behind `host` until `go_on` says no, and writes the log's
 /// folder, if any.
@@ -109,6 +121,13 @@ pub fn watch(
         });
     }
     let period_s = f64::from(board.period_us) * 1e-6;
+    let most_rows = plan.log_s / period_s;
+    if log.is_some() && most_rows > MOST_SAMPLES as f64 {
+        return Err(LineError::TooLong {
+            what: "log",
+            longest_s: MOST_SAMPLES as f64 * period_s,
+        });
+    }
     let mut watcher = Watcher {
         period_s,
         sensor: columns.sensor.unwrap_or(board.sensor),
@@ -119,7 +138,7 @@ pub fn watch(
         rows: Vec::new(),
         // Only what begins at rest is a record.
         logs: log.is_some() && board.phase == Phase::Disarmed,
-        most_rows: (plan.log_s / period_s) as usize,
+        most_rows: most_rows as usize,
         armed: Sums::default(),
         watched: Watched::default(),
         armed_since: 0,
@@ -127,7 +146,11 @@ pub fn watch(
     };
     host.stream()?;
     let mut armed = false;
+    let mut came = Instant::now();
     let ended = loop {
+        if came.elapsed() > NOTHING_NEW {
+            break Some("the board answers, but sends no new samples".to_owned());
+        }
         let streamed = match host.next(SILENCE)? {
             Event::Samples(streamed) => streamed,
             Event::Silence => {
@@ -144,6 +167,7 @@ pub fn watch(
         let Some(now) = watcher.take(&streamed) else {
             continue;
         };
+        came = Instant::now();
         if let Phase::Faulted(_) = streamed.phase {
             break Some(format!(
                 "the board shut the valve: {}",
@@ -225,7 +249,7 @@ impl Watcher {
         self.phase = streamed.phase;
         let mut newest = None;
         for (number, sample) in &streamed.samples {
-            self.next = number + 1;
+            self.next = number.wrapping_add(1);
             self.watched.samples += 1;
             if self.logs && self.rows.len() < self.most_rows {
                 self.rows.push(Row {
@@ -242,7 +266,9 @@ impl Watcher {
                 self.armed_since += 1;
                 let residual = f64::from(law.residual * self.board.per_count);
                 self.alarm.push(residual);
-                if self.armed_since as f64 * self.period_s > SETTLING_S {
+                let settled = self.armed_since > SETTLING
+                    && self.armed_since as f64 * self.period_s > SETTLING_S;
+                if settled {
                     let sums = &mut self.armed;
                     sums.samples += 1;
                     sums.y += y;
@@ -291,14 +317,6 @@ impl Watcher {
 fn write(folder: &Path, watcher: &Watcher, columns: &Columns) -> Result<(), OutputError> {
     let mut files = Staging::new(folder)?;
     let time = |k: usize| (k as f64 * watcher.period_s * 1e9).round() / 1e9;
-    files.write("dataset.toml", |out| {
-        writeln!(
-            out,
-            "title = \"The loop in service\"\nsample_period_s = {}\n\n[[record]]\nname = \"service\"\nfile = \
-             \"service.csv\"\nuse = \"validate\"",
-            watcher.period_s
-        )
-    })?;
     files.write("service.csv", |out| {
         match &columns.channel {
             Some((name, _)) => writeln!(out, "t,u,y,{name}")?,
@@ -325,6 +343,15 @@ fn write(folder: &Path, watcher: &Watcher, columns: &Columns) -> Result<(), Outp
             }
         }
         Ok(())
+    })?;
+    // The one that makes a data set of the others comes last.
+    files.write("dataset.toml", |out| {
+        writeln!(
+            out,
+            "title = \"The loop in service\"\nsample_period_s = {}\n\n[[record]]\nname = \"service\"\nfile = \
+             \"service.csv\"\nuse = \"validate\"",
+            watcher.period_s
+        )
     })?;
     files.commit()
 }

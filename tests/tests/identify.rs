@@ -93,7 +93,7 @@ fn the_document_has_the_keys_that_scripts_rely_on() {
     assert!(
         warnings
             .iter()
-            .any(|w| w.as_str().is_some_and(|w| w.contains("249–251"))),
+            .any(|w| w.as_str().is_some_and(|w| w.contains("249 to 251 samples"))),
         "{warnings:?}"
     );
 }
@@ -110,6 +110,8 @@ fn a_seed_repeats_bit_for_bit_with_any_number_of_threads() {
             for changing in ["wall_time_s", "model"] {
                 document[changing] = Value::Null;
             }
+            // It names the model's file.
+            document["answer"]["next"] = Value::Null;
             (document.to_string(), model)
         };
         let first = run(&["--seed", "3"]);
@@ -142,16 +144,9 @@ fn every_kind_of_model_is_identified() {
 
     let (document, model) = found(
         "ramp-cfd",
-        &small(&[
-            "--delay-law",
-            "9,2,10",
-            "--factors",
-            "1",
-            "--lags",
-            "literal",
-        ]),
+        &small(&["--delay-law", "9,2,10", "--factors", "1"]),
     );
-    assert!(model.contains("literal"));
+    assert!(model.contains("one-step"));
     assert_eq!(document["delays"]["factors"], serde_json::json!([1.0]));
     assert_eq!(
         document["delays"]["law"],
@@ -192,6 +187,28 @@ fn averaged_models_are_refined_on_their_free_run() {
     );
 }
 
+/// Delay laws that do better on validation are kept (the flow simulation), those that do not give way to a constant delay.
+#[test]
+fn the_validation_error_decides_between_a_law_and_a_constant_delay() {
+    let sizes = ["--n1", "2", "--n2", "2", "--max-lag", "150"];
+    let fit = |set: &str, delay: &str| {
+        let options = ["--evaluations", "600", "--delay", delay];
+        let (document, model) = found(set, &[&sizes[..], &options].concat());
+        let fit = document["validate"]["fit_percent"].as_f64();
+        (
+            fit.expect("validation records"),
+            model.contains("law = \"state-dependent\""),
+        )
+    };
+    let (law, constant) = (fit("ramp-cfd", "state-dependent"), fit("ramp-cfd", "fixed"));
+    assert!(law.1 && law.0 > constant.0 + 1.0, "{law:?} {constant:?}");
+    let (law, constant) = (
+        fit("paper-like", "state-dependent"),
+        fit("paper-like", "fixed"),
+    );
+    assert!(!law.1 && law.0 >= constant.0, "{law:?} {constant:?}");
+}
+
 #[test]
 fn factors_need_a_law() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -205,30 +222,39 @@ fn factors_need_a_law() {
     }
 }
 
-/// Ctrl-C: the best so far, as a model file.
+/// Ctrl-C: the best so far, as a model file. On a busy machine the first wait may end before there is one.
 #[cfg(unix)]
 #[test]
 fn an_interrupt_keeps_the_best_so_far() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let model = folder.path().join("model.toml");
+    let interrupted = [2.5, 10.0, 40.0].into_iter().find_map(|seconds| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let model = folder.path().join("model.toml");
+        let output = interrupted_after(seconds, &model);
+        output.status.success().then(|| (output, model.is_file()))
+    });
+    let (output, is_written) = interrupted.expect("a model after 40 s");
+    let document: Value = serde_json::from_slice(&output.stdout).expect("one JSON document");
+    assert_eq!(document["stop"], "interrupted");
+    assert!(is_written);
+}
+
+/// A search that is not over by then, and is told to stop.
+#[cfg(unix)]
+fn interrupted_after(seconds: f64, model: &Path) -> Output {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/paper-like");
     let process = Command::new(program())
-        // Ten lags take a search that is not over by then.
+        // Ten lags take minutes.
         .args(["--json", "identify", "--n1", "5"])
         .arg(data)
         .arg("-o")
-        .arg(&model)
+        .arg(model)
         .stdout(std::process::Stdio::piped())
         .spawn()
         .expect("the program starts");
-    std::thread::sleep(std::time::Duration::from_millis(2500));
+    std::thread::sleep(std::time::Duration::from_secs_f64(seconds));
     let asked = Command::new("kill")
         .args(["-INT", &process.id().to_string()])
         .status();
     assert!(asked.expect("kill runs").success());
-    let output = process.wait_with_output().expect("it ends");
-    assert_eq!(output.status.code(), Some(0));
-    let document: Value = serde_json::from_slice(&output.stdout).expect("one JSON document");
-    assert_eq!(document["stop"], "interrupted");
-    assert!(model.is_file());
+    process.wait_with_output().expect("it ends")
 }

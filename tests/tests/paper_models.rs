@@ -12,11 +12,7 @@ fn model(name: &str) -> Model {
 }
 
 fn run(model: &Model, u: &[f64]) -> Result<Vec<f64>, usize> {
-    model.run_free(&Signals {
-        u,
-        y: None,
-        channels: Vec::new(),
-    })
+    model.run_free(&Signals::commanded(model, u))
 }
 
 fn on_then_off(on: usize, off: usize) -> Vec<f64> {

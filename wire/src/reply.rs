@@ -9,6 +9,19 @@ pub const PROTOCOL: u8 = 1;
 /// play ends then.
 pub const LOST_AFTER_MS: u32 = 500;
 
+/// The same in samples of `period_us`, and no fewer than ten: the board hears its host once a sample at most.
+///
+/// ```
+/// use wire::reply::lost_after_samples;
+/// assert_eq!([200, 1000, 10_000, 100_000].map(lost_after_samples), [2500, 500, 50, 10]);
+/// ```
+#[must_use]
+pub const fn lost_after_samples(period_us: u32) -> u32 {
+    let period_us = if period_us == 0 { 1 } else { period_us };
+    let samples = LOST_AFTER_MS * 1000 / period_us;
+    if samples < 10 { 10 } else { samples }
+}
+
 /// How a request ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -126,6 +126,12 @@ impl Batch {
         self.next = self.next.wrapping_add(1);
     }
 
+    /// Samples that wait to be sent.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
     /// Whether there is something to send and no room for more.
     #[must_use]
     pub fn is_full(&self) -> bool {

@@ -5,10 +5,11 @@
 //! the log of how on disk ([`Project`]).
 
 mod guard;
+mod intake;
 mod project;
 mod server;
 mod work;
 
-pub use project::{Node, Project, ProjectError};
+pub use project::{Node, Project, ProjectError, beneath};
 pub use server::{Bench, Download, Refusal, serve};
 pub use work::Work;

@@ -59,6 +59,9 @@ pub enum ProjectError {
     /// Not written.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// A link, which may lead out of the folder.
+    #[error("{path} is a link, and a project has none: put the file itself in its place", path = .0.display())]
+    Link(PathBuf),
     /// Another workbench is open on it.
     #[error("{path} is open in another workbench; use that one, or close it", path = .0.display())]
     Locked(PathBuf),
@@ -76,6 +79,21 @@ pub enum ProjectError {
     /// A model that is not in the tree.
     #[error("there is no model {0}")]
     NoNode(u32),
+}
+
+/// The path of `relative` within `folder`, if no step of it is a link: nothing is read or written elsewhere.
+///
+/// # Errors
+/// [`ProjectError::Link`] naming the link.
+pub fn beneath(folder: &Path, relative: &Path) -> Result<PathBuf, ProjectError> {
+    let mut path = folder.to_path_buf();
+    for part in relative.components() {
+        path.push(part);
+        if fs::symlink_metadata(&path).is_ok_and(|found| found.is_symlink()) {
+            return Err(ProjectError::Link(path));
+        }
+    }
+    Ok(path)
 }
 
 /// A project folder that is open.
@@ -98,7 +116,7 @@ impl Project {
             move |cause| ProjectError::Io { path, cause }
         };
         fs::create_dir_all(folder).map_err(io(folder))?;
-        let path = folder.join("lock");
+        let path = beneath(folder, Path::new("lock"))?;
         let lock = File::options()
             .create(true)
             .truncate(false)
@@ -112,7 +130,7 @@ impl Project {
             }
             Err(fs::TryLockError::Error(cause)) => return Err(io(&path)(cause)),
         }
-        let path = folder.join(TREE);
+        let path = beneath(folder, Path::new(TREE))?;
         let wrong = |cause: String| ProjectError::Tree {
             path: path.clone(),
             cause,
@@ -181,9 +199,11 @@ impl Project {
     }
 
     /// Where a model's file lies.
-    #[must_use]
-    pub fn path(&self, node: &Node) -> PathBuf {
-        self.folder.join(&node.file)
+    ///
+    /// # Errors
+    /// [`ProjectError::Link`].
+    pub fn path(&self, node: &Node) -> Result<PathBuf, ProjectError> {
+        beneath(&self.folder, Path::new(&node.file))
     }
 
     /// The file name of the next model.
@@ -227,7 +247,9 @@ impl Project {
     /// The commands so far, oldest first; the last hundred.
     #[must_use]
     pub fn log(&self) -> Vec<String> {
-        let text = fs::read_to_string(self.folder.join(LOG)).unwrap_or_default();
+        let path = beneath(&self.folder, Path::new(LOG));
+        let text = path.ok().and_then(|path| fs::read_to_string(path).ok());
+        let text = text.unwrap_or_default();
         let lines: Vec<&str> = text.lines().collect();
         let from = lines.len().saturating_sub(100);
         let last = lines.iter().skip(from);
@@ -239,7 +261,7 @@ impl Project {
     /// # Errors
     /// [`ProjectError`] when the log cannot be written.
     pub fn note(&self, command: &str) -> Result<(), ProjectError> {
-        let path = self.folder.join(LOG);
+        let path = beneath(&self.folder, Path::new(LOG))?;
         let line = format!("{}\n", command.replace(['\n', '\r'], " "));
         File::options()
             .create(true)
@@ -251,7 +273,9 @@ impl Project {
 
     fn keep(&mut self, tree: Tree) -> Result<(), ProjectError> {
         let text = serde_json::to_vec_pretty(&tree).unwrap_or_default();
-        write_atomic(&self.folder.join(TREE), |out| out.write_all(&text))?;
+        write_atomic(&beneath(&self.folder, Path::new(TREE))?, |out| {
+            out.write_all(&text)
+        })?;
         self.tree = tree;
         Ok(())
     }
@@ -288,6 +312,38 @@ fn check(tree: &Tree) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_not_followed() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p");
+        let victim = folder.path().join("victim");
+        fs::write(&victim, "PRECIOUS").unwrap();
+        let mut project = Project::open(&path, Some("abc")).unwrap();
+        for name in [LOG, TREE, "model-1.toml"] {
+            let _ = fs::remove_file(path.join(name));
+            symlink(&victim, path.join(name)).unwrap();
+        }
+        assert!(matches!(project.note("x"), Err(ProjectError::Link(_))));
+        assert!(matches!(
+            project.add(node(None, "m.toml")),
+            Err(ProjectError::Link(_))
+        ));
+        assert!(matches!(
+            project.path(&node(None, "model-1.toml")),
+            Err(ProjectError::Link(_))
+        ));
+        assert!(project.log().is_empty());
+        symlink(folder.path(), path.join("data")).unwrap();
+        assert!(beneath(&path, Path::new("data/victim")).is_err());
+        assert!(beneath(&path, Path::new("new/victim")).is_ok());
+        drop(project);
+        let error = Project::open(&path, None).unwrap_err().to_string();
+        assert!(error.contains("tree.json is a link"), "{error}");
+        assert_eq!(fs::read_to_string(victim).unwrap(), "PRECIOUS");
+    }
 
     fn node(parent: Option<u32>, file: &str) -> Node {
         Node {

@@ -18,12 +18,8 @@ use serde_json::{Value, json};
 use tokio::sync::broadcast::error::RecvError;
 
 use crate::guard::{Guard, guard};
+use crate::intake;
 use crate::work::Work;
-
-/// The largest request, bytes.
-const LARGEST: usize = 256 << 10;
-/// The largest file that is uploaded, bytes.
-const LARGEST_FILE: usize = 512 << 20;
 
 /// Why something was not done: one paragraph with the remedy.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -119,9 +115,8 @@ pub fn serve(bench: impl Bench, port: u16, ready: impl FnOnce(&str)) -> std::io:
         .enable_all()
         .build()?;
     runtime.block_on(async {
-        let listener = tokio::net::TcpListener::from_std(listener)?;
         ready(&address);
-        axum::serve(listener, router(bench, guard)).await
+        intake::serve(listener, router(bench, guard)).await
     })
 }
 
@@ -137,15 +132,17 @@ fn router<B: Bench>(bench: B, rules: Guard) -> Router {
         .route("/api/events", get(events::<B>))
         .route("/api/select", post(select::<B>))
         .route("/api/ask", post(ask::<B>))
-        .route(
-            "/api/upload/{name}",
-            post(upload::<B>).layer(DefaultBodyLimit::max(LARGEST_FILE)),
-        )
+        .route("/api/upload/{name}", post(upload::<B>))
         .route("/api/run", post(run::<B>))
         .route("/api/cancel", post(cancel::<B>))
         .route("/api/file/{kind}/{model}", get(file::<B>))
         .with_state(shared)
-        .layer(DefaultBodyLimit::max(LARGEST))
+        .layer(DefaultBodyLimit::disable())
+        .layer(middleware::from_fn_with_state(
+            intake::Uploads::new(),
+            intake::take_in,
+        ))
+        // Asked first: of a stranger's request nothing is read.
         .layer(middleware::from_fn_with_state(rules, guard))
 }
 

@@ -1,7 +1,7 @@
 //! Report and workbench in a real browser.
 
 use crate::Task;
-use crate::shell::{cargo, command, exists, root, run};
+use crate::shell::{cargo, command, exists, program, root, run};
 use anyhow::{Result, bail};
 
 pub(crate) const TASK: Task = Task {
@@ -30,7 +30,7 @@ pub(crate) fn browser(arguments: &[String]) -> Result<()> {
         run(&mut npm)?;
     }
     // The tests run the program as it is now.
-    run(&mut cargo(&["build", "--release", "--package=host-fit"]))?;
+    program()?;
     let mut tests = cargo(&[
         "test",
         "--release",

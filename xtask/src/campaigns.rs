@@ -2,7 +2,7 @@
 //! catalogue has.
 
 use crate::Task;
-use crate::shell::{cargo, output, root, run, scenario};
+use crate::shell::{cargo, output, program, root, run, scenario};
 use anyhow::Context;
 
 pub(crate) const EFFECTS: Task = Task {
@@ -23,8 +23,39 @@ pub(crate) const TERMS: Task = Task {
     run: |arguments| campaign("hidden-terms", arguments),
 };
 
+pub(crate) const LITERATURE: Task = Task {
+    name: "literature",
+    does: "the diagnosis on flows that others published, behind the instruments of a real rig; --help for its options",
+    run: |arguments| campaign("literature", arguments),
+};
+
+pub(crate) const LAWS: Task = Task {
+    name: "laws",
+    does: "laws on rigs whose plants share no code with the model: wrong refusals, laws that lose attachment, margins; --help for its options",
+    run: |arguments| campaign("laws", arguments),
+};
+
+pub(crate) const KEPT: Task = Task {
+    name: "kept-rigs",
+    does: "tests of the diagnosis that take minutes each and that CI leaves out: rigs that it once told wrong",
+    run: |_| {
+        program()?;
+        run(&mut cargo(&[
+            "test",
+            "--release",
+            "--package=scenarios",
+            "--test=hidden_effects",
+            "--test=hidden_terms",
+            "--",
+            "--ignored",
+            "--nocapture",
+            "--test-threads=1",
+        ]))
+    },
+};
+
 fn campaign(name: &str, arguments: &[String]) -> anyhow::Result<()> {
-    run(&mut cargo(&["build", "--release", "--package", "host-fit"]))?;
+    program()?;
     run(scenario(name).args(arguments))
 }
 
@@ -33,7 +64,7 @@ const CALIBRATION: &str = "--draws 4 --altered 17 --nulls 300 --pairs 0 --outsid
                            --seed 2026 --rows target/calibration.jsonl --calibration";
 
 fn calibrate(arguments: &[String]) -> anyhow::Result<()> {
-    run(&mut cargo(&["build", "--release", "--package", "host-fit"]))?;
+    program()?;
     let page = root().join("docs/calibration.md");
     let text = output(
         scenario("hidden-effects")

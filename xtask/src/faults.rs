@@ -4,16 +4,17 @@
 
 use crate::Task;
 use crate::firmware::{build, qemu};
-use crate::shell::{firmware_cargo, output};
+use crate::shell::{firmware_cargo, output, run, scenario};
 use anyhow::{Context, Result, bail};
 use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
 use std::process::{ChildStdin, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 pub(crate) const TASK: Task = Task {
     name: "faults",
-    does: "fault injection under QEMU: each fault shuts the valve, is latched and logged; faults on the line",
+    does: "fault injection under QEMU: each fault shuts the valve, is latched and logged; faults on the line; --model FILE",
     run: faults,
 };
 
@@ -29,9 +30,21 @@ const INJECTED: [(&str, &str); 6] = [
 /// A restart with damaged constants: what injects it, and what the log says.
 const DAMAGED: [(&str, &str); 2] = [("7", "self-test: Checksum"), ("8", "self-test: Golden")];
 
-pub(crate) fn faults(_arguments: &[String]) -> Result<()> {
-    crate::line_faults::line_faults()?;
-    let elf = build("qemu-mps2", "qemu-mps2", &["--features", "defmt"], None)?;
+pub(crate) fn faults(arguments: &[String]) -> Result<()> {
+    let constants = match arguments {
+        [] => None,
+        [option, model] if option == "--model" => {
+            Some(crate::identified::of(Some(Path::new(model)), None)?)
+        }
+        _ => bail!("the only option is --model FILE"),
+    };
+    on_the_line(constants.as_deref())?;
+    let elf = build(
+        "qemu-mps2",
+        "qemu-mps2",
+        &["--features", "defmt"],
+        constants.as_deref(),
+    )?;
     let log = elf.with_extension("log");
     let mut process = qemu(&elf)
         .args(["-semihosting-config", "enable=on,target=native,chardev=log"])
@@ -69,6 +82,10 @@ pub(crate) fn faults(_arguments: &[String]) -> Result<()> {
             "--quiet",
             "--package",
             "log-reader",
+            // It runs for a second; the boards' profile would optimise for minutes.
+            "--config=profile.release.opt-level=0",
+            "--config=profile.release.lto=\"off\"",
+            "--config=profile.release.codegen-units=16",
             "--",
         ])
         .arg(&elf)
@@ -83,6 +100,12 @@ pub(crate) fn faults(_arguments: &[String]) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Those between host and board only.
+pub(crate) fn on_the_line(constants: Option<&Path>) -> Result<()> {
+    let rig = build("qemu-mps2", "qemu-rig", &[], constants)?;
+    run(scenario("line-faults").arg(&rig))
 }
 
 fn dialogue(line: &mut Line) -> Result<()> {

@@ -122,14 +122,19 @@ pub(crate) fn build(
         .join(bin))
 }
 
-/// Builds the loop's library, with its log messages, for `target`.
-pub(crate) fn library(target: &str) -> Result<()> {
-    let mut cargo = cross_cargo("build", target)?;
-    cargo
-        .args(["--package", "firmware", "--features", "defmt"])
-        .current_dir(root().join("firmware"))
-        .env("CARGO_TARGET_DIR", firmware_target());
-    run(&mut cargo)
+/// Builds the libraries of loop, line and model for `target`, without log messages and with them.
+pub(crate) fn libraries(target: &str) -> Result<()> {
+    let libraries = |arguments: &[&str]| {
+        let mut cargo = cross_cargo("build", target)?;
+        cargo
+            .args(["--package", "firmware"])
+            .args(arguments)
+            .current_dir(root().join("firmware"))
+            .env("CARGO_TARGET_DIR", firmware_target());
+        run(&mut cargo).with_context(|| format!("for {target}"))
+    };
+    libraries(&[])?;
+    libraries(&["--features", "defmt"])
 }
 
 /// QEMU with the program, its serial line on standard input and output. Time

@@ -2,7 +2,7 @@
 //! those of a user's model for one build.
 
 use crate::Task;
-use crate::shell::{cargo, firmware_target, root, run};
+use crate::shell::{firmware_target, program, root, run};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ pub(crate) const TASK: Task = Task {
 const RIG: &str = "rig";
 
 /// The model files in `firmware/identified/models`, without `.toml`.
-const MODELS: [&str; 4] = ["full", "averaged", "effects", "own"];
+const MODELS: [&str; 5] = ["full", "averaged", "effects", "own", "slow"];
 
 pub(crate) fn identified(arguments: &[String]) -> Result<()> {
     let check = match arguments {
@@ -82,7 +82,7 @@ pub(crate) fn of(model: Option<&Path>, rig: Option<&Path>) -> Result<PathBuf> {
 }
 
 fn generate(model: &Path, to: &Path, rig: Option<&Path>, options: &[&str]) -> Result<()> {
-    let mut codegen = cargo(&["run", "--release", "--quiet", "--package", "host-fit", "--"]);
+    let mut codegen = program()?;
     codegen
         .arg("codegen")
         .arg(model)

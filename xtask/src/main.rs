@@ -1,25 +1,33 @@
 //! The project's chores; `cargo xtask help` lists them.
 
+mod agreement;
 mod bench_law;
 mod bench_search;
 mod bench_step;
+mod book;
 mod browser;
 mod budgets;
 mod campaigns;
 mod ci;
 mod elf;
+mod examples;
 mod faults;
 mod firmware;
+mod fuzz;
 mod identified;
-mod line_faults;
+mod invariances;
+mod msrv;
 mod new_effect;
 mod nucleo;
 mod pages;
+mod periods;
 mod pil;
 mod rig_day;
 mod setup;
 mod shell;
 mod size;
+mod strangers;
+mod supply;
 
 use std::process::ExitCode;
 
@@ -31,24 +39,36 @@ struct Task {
 }
 
 const TASKS: &[Task] = &[
+    agreement::TASK,
     bench_law::TASK,
     bench_step::TASK,
     bench_search::TASK,
+    book::TASK,
     browser::TASK,
     ci::TASK,
+    examples::TASK,
     faults::TASK,
     firmware::TASK,
+    fuzz::TASK,
     campaigns::EFFECTS,
     campaigns::CALIBRATE,
     campaigns::TERMS,
+    campaigns::LITERATURE,
+    campaigns::LAWS,
+    campaigns::KEPT,
     identified::TASK,
+    invariances::TASK,
+    msrv::TASK,
     new_effect::TASK,
     nucleo::TASK,
     pages::TASK,
+    periods::TASK,
     pil::TASK,
     rig_day::TASK,
     setup::TASK,
     size::TASK,
+    strangers::TASK,
+    supply::TASK,
 ];
 
 fn main() -> ExitCode {

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 pub(crate) const TASK: Task = Task {
     name: "pil",
-    does: "firmware and plant in lockstep, bit for bit; --model FILE, --case NAME, --serial DEVICE, --steps N, --lose N",
+    does: "firmware and plant in lockstep, bit for bit; --model FILE, --periods S,S, --case NAME, --serial DEVICE, --steps N, --lose N",
     run: |arguments| pil(arguments).map(|_| ()),
 };
 
@@ -40,6 +40,7 @@ struct Report {
 
 pub(crate) fn pil(arguments: &[String]) -> Result<Outcome> {
     let (mut model, mut passed, mut serial) = (None::<PathBuf>, Vec::new(), false);
+    let mut periods = None::<&String>;
     let mut rest = arguments.iter();
     while let Some(option) = rest.next() {
         let value = rest
@@ -47,16 +48,22 @@ pub(crate) fn pil(arguments: &[String]) -> Result<Outcome> {
             .with_context(|| format!("{option} needs a value"))?;
         match option.as_str() {
             "--model" => model = Some(std::path::absolute(value)?),
+            "--periods" => periods = Some(value),
             "--serial" | "--steps" | "--lose" | "--case" => {
                 serial |= option == "--serial";
                 passed.extend([option, value]);
             }
             _ => bail!(
-                "unknown option {option}; there are --model, --case, --serial, --steps, --lose"
+                "unknown option {option}; there are --model, --periods, --case, --serial, --steps, --lose"
             ),
         }
     }
-    let constants = constants(model.as_deref())?;
+    if model.is_some() && periods.is_some() {
+        bail!(
+            "--periods is of the bundled models, and --model has a period of its own: choose one"
+        );
+    }
+    let constants = constants(model.as_deref(), periods)?;
     let elf = if serial {
         build("nucleo-f446re", "nucleo-pil", &[], Some(&constants))?
     } else {
@@ -68,6 +75,9 @@ pub(crate) fn pil(arguments: &[String]) -> Result<Outcome> {
     host.arg("run").arg("--report").arg(&report).args(passed);
     if let Some(model) = &model {
         host.arg("--model").arg(model);
+    }
+    if let Some(periods) = periods {
+        host.arg("--periods").arg(periods);
     }
     if !serial {
         let qemu = qemu(&elf);
@@ -86,12 +96,21 @@ pub(crate) fn pil(arguments: &[String]) -> Result<Outcome> {
 }
 
 /// The folder of constants that the board's program is built with.
-fn constants(model: Option<&Path>) -> Result<PathBuf> {
+fn constants(model: Option<&Path>, periods: Option<&String>) -> Result<PathBuf> {
     if let Some(model) = model {
         return crate::identified::of(Some(model), None);
     }
-    let folder = firmware_target().join("cases");
+    let folder = firmware_target().join(if periods.is_some() {
+        "cases-at-periods"
+    } else {
+        "cases"
+    });
     std::fs::create_dir_all(&folder)?;
-    run(scenario("pil").arg("constants").arg(&folder))?;
+    let mut write = scenario("pil");
+    write.arg("constants").arg(&folder);
+    if let Some(periods) = periods {
+        write.arg("--periods").arg(periods);
+    }
+    run(&mut write)?;
     Ok(folder)
 }

@@ -5,14 +5,14 @@
 //! builds `core` from source.
 
 use crate::Task;
-use crate::shell::{cargo, command, exists, output, run, shown};
+use crate::shell::{cargo, command, exists, output, run};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 pub(crate) const TASK: Task = Task {
     name: "setup",
-    does: "installs the cross targets, QEMU, the C peer's compiler, node and chromium",
+    does: "installs the cross targets, QEMU, the C peer's compiler, node, chromium, GCC, NumPy and Octave",
     run: setup,
 };
 
@@ -45,10 +45,14 @@ pub(crate) fn setup(_arguments: &[String]) -> Result<()> {
         ("node", "nodejs"),
         ("npm", "npm"),
         ("chromium", "chromium"),
+        ("gcc", "gcc"),
+        ("octave-cli", "octave"),
     ]
     .into_iter()
     .filter(|(program, _)| !exists(program))
     .map(|(_, package)| package)
+    // No program of its own: asked for as Python would ask for it.
+    .chain((!has_numpy()).then_some("python3-numpy"))
     .collect();
     install(&packages)?;
     if core_source().is_none() && exists("rustup") {
@@ -97,6 +101,15 @@ fn install(packages: &[&str]) -> Result<()> {
     }
     run(&mut apt(&["update", "--quiet"]))?;
     run(&mut apt(&arguments))
+}
+
+fn has_numpy() -> bool {
+    imports_numpy("python3") || imports_numpy("/usr/bin/python3")
+}
+
+/// Whether a Python has NumPy.
+pub(crate) fn imports_numpy(python: &str) -> bool {
+    output(&mut command(python, &["-c", "import numpy"])).is_ok()
 }
 
 fn is_root() -> bool {
@@ -157,11 +170,4 @@ fn rust_lld(sysroot: &Path) -> Option<PathBuf> {
         .flatten()
         .map(|host| host.path().join("bin/rust-lld"))
         .find(|path| path.is_file())
-}
-
-/// Builds for `target` without linking a program.
-pub(crate) fn cross_build(target: &str, arguments: &[&str]) -> Result<()> {
-    let mut build = cross_cargo("build", target)?;
-    build.args(arguments);
-    run(&mut build).with_context(|| format!("for {target}: `{}`", shown(&build)))
 }

@@ -23,10 +23,38 @@ pub(crate) fn cargo(arguments: &[&str]) -> Command {
     command(&program, arguments)
 }
 
+/// Set where the workspace's programs are built: nothing then waits until another step's compiler has ended.
+pub(crate) const BUILT: &str = "XTASK_BUILT";
+
 /// A program of the scenarios, its arguments to follow.
 pub(crate) fn scenario(program: &str) -> Command {
+    if std::env::var_os(BUILT).is_some() {
+        return built(program);
+    }
     let mut command = cargo(&["run", "--release", "--quiet", "--package", "scenarios"]);
     command.args(["--bin", program, "--"]);
+    command
+}
+
+/// `host-fit` as it is now, its arguments to follow.
+pub(crate) fn program() -> Result<Command> {
+    if std::env::var_os(BUILT).is_none() {
+        run(&mut cargo(&[
+            "build",
+            "--release",
+            "--quiet",
+            "--package",
+            "host-fit",
+        ]))?;
+    }
+    Ok(built("host-fit"))
+}
+
+fn built(program: &str) -> Command {
+    let mut path = target().join("release").join(program);
+    path.set_extension(std::env::consts::EXE_EXTENSION);
+    let mut command = Command::new(path);
+    command.current_dir(root());
     command
 }
 

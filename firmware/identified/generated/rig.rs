@@ -6,11 +6,11 @@ pub const ZERO: f32 = 800.0;
 pub const PER_COUNT: f32 = 0.0005;
 /// Readings at or beyond these are at a rail, counts.
 pub const RAILS: [f32; 2] = [8.0, 4087.0];
-/// Equal readings in a row that mean a stuck sensor.
-pub const STUCK_AFTER: u32 = 500;
+/// How long equal readings in a row come before the sensor is stuck, s.
+pub const STUCK_AFTER_S: f32 = 0.5;
 /// Largest residual, averaged over about 64 samples, y.
 pub const RESIDUAL_ENVELOPE: f32 = 0.5;
-/// The valve's shortest times open and shut, samples.
-pub const SHORTEST: [u32; 2] = [4, 4];
+/// The valve's shortest times open and shut, s.
+pub const SHORTEST_S: [f32; 2] = [0.004, 0.004];
 /// The measured channel: counts of 0, units per count, rails in counts; `None` if it was not measured.
 pub const CHANNEL: Option<[f32; 4]> = None;

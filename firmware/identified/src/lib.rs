@@ -42,7 +42,7 @@ mod tests {
             }
         )+};
     }
-    decides_what_the_host_decided!(full: law_of_full, effects: law_of_effects);
+    decides_what_the_host_decided!(full: law_of_full, effects: law_of_effects, slow: law_of_slow);
 
     #[test]
     fn pulses_come_as_designed() {

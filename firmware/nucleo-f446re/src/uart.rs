@@ -12,6 +12,13 @@ use wire::Outbox;
 
 const BAUD: u32 = 115_200;
 
+/// Bytes that the line takes in a period have to wait for its end, and some more; at 10 ms 115 of them.
+const WAITING: usize = if firmware::on_board::PERIOD_US > 10_000 {
+    2048
+} else {
+    256
+};
+
 /// Where the interrupt puts what was received while the loop was busy. It is
 /// handed over once, and only the interrupt has it then.
 static RECEIVED: Mutex<Cell<Option<Producer<'static, u8>>>> = Mutex::new(Cell::new(None));
@@ -33,7 +40,7 @@ impl Uart {
         USART2::enable(rcc);
         USART2::reset(rcc);
         // `None` if this were called twice: there is one line.
-        let queue = cortex_m::singleton!(: Queue<u8, 256> = Queue::new());
+        let queue = cortex_m::singleton!(: Queue<u8, WAITING> = Queue::new());
         let received = queue.map(|queue| {
             let (producer, consumer) = queue.split();
             critical_section::with(|section| RECEIVED.borrow(section).set(Some(producer)));

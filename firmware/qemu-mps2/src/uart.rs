@@ -66,10 +66,17 @@ impl<const BASE: usize> Uart<BASE> {
 
     /// Waits for a byte.
     pub fn wait(&mut self) -> u8 {
+        self.wait_beside(|| {})
+    }
+
+    /// Waits for a byte, and does something else meanwhile.
+    #[inline]
+    pub fn wait_beside(&mut self, mut meanwhile: impl FnMut()) -> u8 {
         loop {
             if let Some(byte) = self.receive() {
                 return byte;
             }
+            meanwhile();
         }
     }
 

@@ -33,7 +33,7 @@ impl Desk {
     pub fn new(board: Board) -> Self {
         let service = Service::new(board);
         Self {
-            operator: Operator::new(),
+            operator: Operator::new(board.period_us),
             emergency: Console::new(),
             receiver: Receiver::new(),
             since_frames: service.lost_after(),

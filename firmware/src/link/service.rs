@@ -11,9 +11,12 @@ use crate::player::{Player, RUNS, Refusal};
 use crate::sensor::Calibration;
 use model_core::self_test::Crc32;
 use wire::Outbox;
-use wire::reply::{Answer, Info, LOST_AFTER_MS, PROTOCOL, Phase, Reply, Scale, Status};
+use wire::reply::{Answer, Info, PROTOCOL, Phase, Reply, Scale, Status, lost_after_samples};
 use wire::request::{Ask, Request};
 use wire::samples::{self, Batch, FULL, Sample};
+
+/// No sample of the stream waits longer for its frame, ms.
+const STREAMED_MS: u32 = 100;
 
 /// What the board is, for [`Info`].
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +51,8 @@ pub struct Service {
     board: Board,
     /// Samples after which a silent host is lost.
     lost_after: u32,
+    /// Samples of a frame of the stream: as many as it takes, or fewer that are a tenth of a second.
+    streamed: usize,
     session: Option<Session>,
     player: Player,
     batch: Batch,
@@ -62,8 +67,8 @@ impl Service {
     pub fn new(board: Board) -> Self {
         Self {
             board,
-            // No shorter than some samples, however slow the board.
-            lost_after: (LOST_AFTER_MS * 1000 / board.period_us.max(1)).max(10),
+            lost_after: lost_after_samples(board.period_us),
+            streamed: (STREAMED_MS * 1000 / board.period_us.max(1)).max(1) as usize,
             session: None,
             player: Player::new(),
             batch: Batch::new(),
@@ -146,7 +151,7 @@ impl Service {
         if let Mode::Faulted(_) = tick.mode {
             // What shut the valve is told at once.
             self.end_stream(phase, outbox);
-        } else if self.batch.is_full() {
+        } else if self.batch.is_full() || self.batch.count() >= self.streamed {
             self.batch.end(false, |bytes| outbox.offer(bytes));
         }
     }

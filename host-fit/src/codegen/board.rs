@@ -3,14 +3,13 @@
 use super::items::{buffer, setting};
 use crate::model::{Law, Model};
 use crate::user_effect::line_lengths;
+use model_core::control::period::{LONGEST_US, SHORTEST_US, loop_period_us};
 use model_core::effect::RustType;
 use thiserror::Error;
 
 /// What the loop may take of a board's RAM, bytes. The firmware has the number,
 /// and a test across the crates holds both equal.
 pub const MOST: usize = 30 * 1024;
-/// Sample periods that the boards' timers and watchdogs are good for, s.
-const PERIODS: [f64; 2] = [2e-4, 0.1];
 /// What loop and law take however short a model's memory is, bytes.
 const OVERHEAD: usize = 2 * 1024;
 
@@ -35,8 +34,9 @@ pub enum BoardError {
     },
     /// The timers do not go so fast or so slow.
     #[error(
-        "key `sample_period_s`: the board samples every 0.2 to 100 ms, not every {period} s. \
-         Identify the model from records of another period."
+        "key `sample_period_s`: the board samples every {} to {} ms, not every {period} s. \
+         Identify the model from records of another period.",
+        f64::from(SHORTEST_US) * 1e-3, f64::from(LONGEST_US) * 1e-3
     )]
     Period {
         /// The model's, s.
@@ -73,7 +73,7 @@ pub fn check(model: &Model) -> Result<(), BoardError> {
         return Err(BoardError::NoLaw);
     };
     let period = model.sample_period_s;
-    if !(PERIODS[0]..=PERIODS[1]).contains(&period) {
+    if loop_period_us(period).is_none() {
         return Err(BoardError::Period { period });
     }
     let memory = model.memory();

@@ -20,7 +20,9 @@ mod delay;
 mod items;
 mod law;
 mod pieces;
+pub mod portable;
 
+use crate::data::visible;
 use crate::model::{Added, Delay, Footprint, Law, Model};
 use model_core::control::Unusable;
 use model_core::effect::Spec;
@@ -53,6 +55,15 @@ pub enum CodegenError {
          nor defined by the model. Remove it from the model."
     )]
     UnknownEffect {
+        /// Its name.
+        name: String,
+    },
+    /// An effect of the catalogue is written in Rust alone.
+    #[error(
+        "effect `{name}` has no form in other languages than Rust. \
+         Write it with `--lang rust`, or give it a form in host-fit/src/user_effect/forms.toml."
+    )]
+    NoForm {
         /// Its name.
         name: String,
     },
@@ -100,7 +111,35 @@ pub fn generate(model: &Model) -> Result<String, CodegenError> {
     ];
     sections.extend(items::own_effects(model));
     let sections = sections.into_iter().map(text);
-    Ok(sections.collect::<Result<Vec<_>, _>>()?.join("\n"))
+    let text = sections.collect::<Result<Vec<_>, _>>()?.join("\n");
+    // Names and notes of the model file stand in comments, where the compiler refuses what cannot be seen.
+    Ok(visible(&text).into_owned())
+}
+
+/// In which language a model is written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Language {
+    /// Constants for `model-core`.
+    Rust,
+    /// C99 in numbers of a precision.
+    C(portable::Precision),
+    /// A module for NumPy.
+    Python,
+    /// A function file of this name, for MATLAB and Octave.
+    Matlab(String),
+}
+
+/// `model`, its effects and its law in `language`.
+///
+/// # Errors
+/// As [`generate`]; or an effect that is written in Rust alone.
+pub fn write(model: &Model, language: &Language) -> Result<String, CodegenError> {
+    match language {
+        Language::Rust => generate(model),
+        Language::C(precision) => portable::c(model, *precision),
+        Language::Python => portable::python(model),
+        Language::Matlab(name) => portable::matlab(model, name),
+    }
 }
 
 /// Items as text, one section of the file.
@@ -147,12 +186,20 @@ fn spec_of(model: &Model, added: &Added) -> Result<&'static Spec, CodegenError> 
 }
 
 fn header(model: &Model) -> TokenStream {
+    let lines = header_lines(model).into_iter().map(|text| {
+        // A line break would end what is a comment.
+        let text = text.replace(char::is_control, " ");
+        let space = if text.is_empty() { "" } else { " " };
+        format!("{space}{text}")
+    });
+    quote!(#(#![doc = #lines])*)
+}
+
+/// Where a model comes from, in lines.
+fn header_lines(model: &Model) -> Vec<String> {
     let training = &model.training;
     let mut lines = Vec::new();
-    let mut line = |text: String| {
-        let space = if text.is_empty() { "" } else { " " };
-        lines.push(format!("{space}{text}"));
-    };
+    let mut line = |text: String| lines.push(text);
     let tool = if training.tool_version.is_empty() {
         env!("CARGO_PKG_VERSION")
     } else {
@@ -195,7 +242,14 @@ fn header(model: &Model) -> TokenStream {
             training.identify_fit_percent,
             training
                 .validate_fit_percent
-                .map_or(String::new(), |fit| format!(", {fit:.2} % held out"))
+                .map_or(String::new(), |fit| format!(", {fit:.2} % validation"))
+        ));
+    }
+    if !model.command.is_unit() {
+        let range = model.command;
+        line(format!(
+            "- command: {:?} is no jet, {:?} a full one; in Rust the model is given the share of a full jet",
+            range.off, range.full
         ));
     }
     let lost = model.law.as_ref().map_or(&[][..], Law::lost);
@@ -209,7 +263,7 @@ fn header(model: &Model) -> TokenStream {
         "- units: y is the normalised friction gain, u is 0 or 1, delays and lags are samples of {:?} s",
         model.sample_period_s
     ));
-    quote!(#(#![doc = #lines])*)
+    lines
 }
 
 /// Checksum and golden run, by the code that the host simulates with.

@@ -1,9 +1,10 @@
-//! `codegen`: Rust constants for the board from a model file.
+//! `codegen`: a model file as Rust constants for the board, or as C, Python or MATLAB.
 
 use std::path::PathBuf;
 
 use anyhow::{Context, anyhow};
-use host_fit::codegen::board;
+use host_fit::codegen::portable::{Precision, function_name};
+use host_fit::codegen::{Language, board};
 use host_fit::model::Model;
 use host_fit::output::write_atomic;
 use host_fit::steps;
@@ -11,14 +12,25 @@ use rig_line::RigFile;
 
 use super::{Console, rig_constants};
 
-/// Write a model's constants as Rust for a no_std crate on model-core, the designed law's with them.
+/// Write a model, its effects and its law as Rust constants, C, Python or MATLAB.
+///
+/// Rust: constants for a no_std crate on model-core. C: C99 without a heap, `model_step` and `law_step`, bit for bit what
+/// the host computes. Python: classes `Model` and `Law` for NumPy. MATLAB: a function file that GNU Octave runs too.
+///
+/// Example: host-fit codegen model.toml --lang python -o flow.py
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The model file.
     model: PathBuf,
-    /// The Rust file to write.
-    #[arg(short, long, default_value = "identified.rs")]
-    output: PathBuf,
+    /// The file to write; identified.rs, model.c, model.py or identified_model.m if not given.
+    #[arg(short, long, visible_alias = "out")]
+    output: Option<PathBuf>,
+    /// The language.
+    #[arg(long, value_enum, default_value_t = Lang::Rust)]
+    lang: Lang,
+    /// The numbers of C: single (float) or double.
+    #[arg(long, value_enum, default_value_t = Numbers::Single)]
+    precision: Numbers,
     /// Refuse what the boards of this project cannot run: a model without a law, with more
     /// than one measured channel, or too large.
     #[arg(long)]
@@ -27,6 +39,52 @@ pub(crate) struct Args {
     /// written beside the output, as `rig.rs`.
     #[arg(long, value_name = "rig.toml")]
     rig: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Lang {
+    Rust,
+    C,
+    Python,
+    Matlab,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Numbers {
+    Single,
+    Double,
+}
+
+impl Args {
+    /// The file to write and its language. A function of MATLAB is called as its file is.
+    fn target(&self) -> (PathBuf, Language) {
+        let usual = match self.lang {
+            Lang::Rust => "identified.rs",
+            Lang::C => "model.c",
+            Lang::Python => "model.py",
+            Lang::Matlab => "identified_model.m",
+        };
+        let output = self.output.clone().unwrap_or_else(|| usual.into());
+        match self.lang {
+            Lang::Rust => (output, Language::Rust),
+            Lang::C => {
+                let precision = match self.precision {
+                    Numbers::Single => Precision::Single,
+                    Numbers::Double => Precision::Double,
+                };
+                (output, Language::C(precision))
+            }
+            Lang::Python => (output, Language::Python),
+            Lang::Matlab => {
+                let stem = output.file_stem().unwrap_or_default();
+                let name = function_name(&stem.to_string_lossy());
+                (
+                    output.with_file_name(format!("{name}.m")),
+                    Language::Matlab(name),
+                )
+            }
+        }
+    }
 }
 
 /// Runs the command.
@@ -42,15 +100,14 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
             anyhow!("{rig} contradicts {model}: {reason}")
         })?;
     }
-    let constants = steps::constants(&model)
-        .with_context(|| format!("no constants from {}", args.model.display()))?;
+    let (output, language) = args.target();
+    let constants = steps::written(&model, &language)
+        .with_context(|| format!("nothing written of {}", args.model.display()))?;
     if let Some(rig) = &rig {
         let text = rig_constants::rust(rig);
-        let path = args.output.with_file_name("rig.rs");
+        let path = output.with_file_name("rig.rs");
         write_atomic(&path, |file| file.write_all(text.as_bytes()))?;
     }
-    write_atomic(&args.output, |file| {
-        file.write_all(constants.text.as_bytes())
-    })?;
-    console.show(&constants, &[("output", &args.output)], &[&args.output])
+    write_atomic(&output, |file| file.write_all(constants.text.as_bytes()))?;
+    console.show(&constants, &[("output", &output)], &[&output])
 }

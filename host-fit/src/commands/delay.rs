@@ -8,25 +8,28 @@ use host_fit::output::Staging;
 use host_fit::steps;
 
 use super::Console;
+use super::time_span::TimeSpan;
 
 /// Measure the delay of the response to every edge of the command, and fit the law h = p0 + p1·exp(−p2·ỹ).
 ///
-/// A delay is the time from an edge to the kink where y starts to head elsewhere, located by least squares between
-/// the neighbouring responses. The law is fitted to the identify records.
+/// One plant of first or second order with a dead time is fitted to whole records; where it describes them, the delay of
+/// an edge is its place on that trajectory. Otherwise the start of each response is located alone. The law is
+/// fitted to the identify records, and kept where it is a delay on all of them and better than a constant.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Folder with dataset.toml, or one CSV file.
     #[arg(value_name = "DATASET")]
     dataset: PathBuf,
-    /// W of the averaged output ỹ, in samples.
-    #[arg(long, value_name = "SAMPLES", default_value_t = 250, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
-    window: u32,
-    /// Longest delay that is looked for, in samples.
-    #[arg(long, value_name = "SAMPLES", default_value_t = 250, value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    max_delay: u32,
-    /// Samples of y used on either side of the start of a response.
-    #[arg(long, value_name = "SAMPLES", default_value_t = 30, value_parser = clap::value_parser!(u32).range(8..=10_000))]
-    reach: u32,
+    /// W of the averaged output ỹ: samples (250) or a time (0.25s). Models average over 250 samples [default: 250].
+    #[arg(long, value_name = "TIME")]
+    window: Option<TimeSpan>,
+    /// Longest delay to search: samples (250) or a time (0.25s) [default: what the records can show].
+    #[arg(long, value_name = "TIME")]
+    max_delay: Option<TimeSpan>,
+    /// Stretch of y on either side of the start of a response where each edge is measured alone: samples (30) or a
+    /// time (0.03s) [default: three response times, or half the time between edges if that is less].
+    #[arg(long, value_name = "TIME")]
+    reach: Option<TimeSpan>,
     /// Seed of the permutation tests.
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -38,10 +41,17 @@ pub(crate) struct Args {
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let set = DataSet::load(&args.dataset)?;
+    let within = |time: Option<TimeSpan>, option: &str, least: u32, most: u32| {
+        time.map(|time| time.samples_within(set.sample_period_s, option, least..=most))
+            .transpose()
+    };
+    let usual = DelayOptions::default();
+    let max_delay = within(args.max_delay, "--max-delay", 1, 100_000)?;
+    let reach = within(args.reach, "--reach", 4, 10_000)?;
     let options = DelayOptions {
-        window: args.window,
-        max_delay: args.max_delay as usize,
-        reach: args.reach as usize,
+        window: within(args.window, "--window", 2, 1_000_000)?.unwrap_or(usual.window),
+        max_delay: max_delay.map(|samples| samples as usize),
+        reach: reach.map(|samples| samples as usize),
         seed: args.seed,
     };
     let report = steps::measure_delays(&set, &options)?;

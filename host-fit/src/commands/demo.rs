@@ -1,8 +1,9 @@
 //! `host-fit demo`: the whole way on bundled and simulated data, from recordings to constants and a loop.
 
+use anyhow::Context;
 use std::path::{Path, PathBuf};
 
-use closed_loop::{Figures, OpenLoop, Relay, SAMPLE_PERIOD_S, run as close_the_loop};
+use closed_loop::{Figures, OpenLoop, Relay, run as close_the_loop};
 use firmware_sim::family::{Family, NoiseKind, RigPlan};
 use firmware_sim::hidden_set::HiddenSetPlan;
 use firmware_sim::plant::{PlantSpec, Rig};
@@ -11,22 +12,25 @@ use host_fit::design::{TrackRequest, run_law};
 use host_fit::diagnose::Options;
 use host_fit::discover;
 use host_fit::indicators::Indicators;
-use host_fit::model::Model;
+use host_fit::model::{Delay, Model};
 use host_fit::output::{Staging, write_atomic};
 use host_fit::picture::{Column, Report};
-use host_fit::steps::{self, DelayKind, Design, DesignOutcome, DesignRequest, IdentifyRequest};
+use host_fit::steps::{
+    self, Answer, DelayKind, Design, DesignOutcome, DesignRequest, IdentifyRequest,
+};
 use model_core::control::HoldTimes;
 
 use super::Console;
 use super::drawings::{LoopPicture, ladder_picture, loop_picture};
+use super::load::shell_word;
 use super::page::{
-    command_line, provenance, report_climb, report_discovery, report_finding, report_runs,
-    report_scores,
+    command_line, discovery_details, discovery_lead, finding_details, finding_lead, lead,
+    provenance, report_runs, report_scores,
 };
-use super::words::{aligned, ladder_table};
+use super::words::aligned;
 
-/// Show the whole way on bundled data: identify, compare, find the missing effect, add it, find a term that no
-/// catalogue has, generate constants, close the loop; leaves a report, models and data to play with.
+/// Run the whole workflow on bundled data: identify, compare, diagnose, extend, discover, generate constants, close
+/// the loop. Takes about a minute; writes a report page, models and data.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Folder for the report, the pictures, the models and the data.
@@ -87,7 +91,7 @@ fn request(delay: DelayKind) -> IdentifyRequest {
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let out = &args.out;
-    std::fs::create_dir_all(out)?;
+    std::fs::create_dir_all(out).with_context(|| format!("{} cannot be made", out.display()))?;
     let data = out.join("data");
     let mut staging = Staging::new(&data)?;
     for (name, text) in FILES {
@@ -97,7 +101,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
 
     let mut report = Report::new(
         "Demo",
-        "recordings → model → missing effect → constants → loop",
+        "From recordings to a model, to the effect that it lacks, to a law for the board: four parts, each with its answer first",
     );
     let fits = real_input(&data, out, console, &mut report)?;
     let (model, words) = hidden_effect(&data, out, console, &mut report)?;
@@ -105,8 +109,8 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let design = steps::design(
         &model,
         &DesignRequest::Track(TrackRequest {
-            min_on_s: SAMPLE_PERIOD_S * f64::from(TIMES.on),
-            min_off_s: SAMPLE_PERIOD_S * f64::from(TIMES.off),
+            min_on_s: model.sample_period_s * f64::from(TIMES.on),
+            min_off_s: model.sample_period_s * f64::from(TIMES.off),
             ..TrackRequest::holding(TARGET)
         }),
     )?;
@@ -132,7 +136,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     }))
 }
 
-/// Fixed against state-dependent delay on the flow simulation; held-out FIT of both.
+/// Fixed against state-dependent delay on the flow simulation; validation FIT of both.
 fn real_input(
     data: &Path,
     out: &Path,
@@ -140,10 +144,10 @@ fn real_input(
     report: &mut Report,
 ) -> anyhow::Result<[f64; 2]> {
     let set = DataSet::load(&data.join("ramp-cfd"))?;
-    report.section("A flow over a ramp (2-D Navier–Stokes)");
+    report.section("1. A flow over a ramp: identify and compare");
     let mut rows = Vec::new();
     let mut fits = [f64::NAN; 2];
-    let mut runs = Vec::new();
+    let mut models = Vec::new();
     let kinds = [
         (DelayKind::Fixed, "fixed delay", "ramp-fixed.toml"),
         (
@@ -153,8 +157,14 @@ fn real_input(
         ),
     ];
     for ((kind, name, file), fit) in kinds.into_iter().zip(&mut fits) {
-        let found = steps::identify(&set, &request(kind), &console.watch())?;
+        let found = steps::identify(&set, &request(kind), &console.show_progress())?;
         found.model.save(&out.join(file))?;
+        // A law that does no better than a constant delay is not kept.
+        let is_constant = matches!(found.model.delay, Delay::Fixed { .. });
+        let name = match (kind, is_constant) {
+            (DelayKind::StateDependent, true) => "constant: no law is better",
+            _ => name,
+        };
         let percent = |i: &Option<Indicators>| i.as_ref().map_or(f64::NAN, |i| i.fit_percent);
         *fit = percent(&found.scores.validate);
         rows.push(vec![
@@ -162,19 +172,30 @@ fn real_input(
             format!("{:.1}", percent(&found.scores.identify)),
             format!("{:.1}", *fit),
         ]);
-        report.subsection(name);
-        report_scores(report, &found.scores);
-        runs.push((name, steps::compare(&found.model, &set)?.runs));
+        models.push((name.to_owned(), found.model));
     }
-    let runs: Vec<(&str, &[Vec<f64>])> = runs.iter().map(|(n, r)| (*n, r.as_slice())).collect();
-    report_runs(report, &set.records, &runs, None);
+    let borrowed: Vec<(String, &Model)> = models.iter().map(|(n, m)| (n.clone(), m)).collect();
+    let compared = steps::compare_several(&borrowed, &set).map_err(|(_, error)| error)?;
+    let runs: Vec<(&str, &[Vec<f64>])> = compared
+        .models
+        .iter()
+        .map(|named| (named.model.as_str(), named.comparison.runs.as_slice()))
+        .collect();
+    let worst = lead(report, &compared.answer, None, &set.records, &runs);
+    report.fold("Every record of part 1");
+    for named in &compared.models {
+        report.subsection(&named.model);
+        report_scores(report, &named.comparison.scores);
+    }
+    report_runs(report, &set.records, &runs, None, worst);
+    report.end_fold();
     provenance(report, &set, 0, &command_line());
-    console.say("flow over a ramp (2-D Navier–Stokes), free run")?;
-    console.say(&aligned(
-        &["model", "FIT % identified", "held out"],
+    console.say("1. flow over a ramp (2-D Navier–Stokes): FIT of the free run, %")?;
+    console.say(&indented(&aligned(
+        &["model", "estimation", "validation"],
         &rows,
         1,
-    ))?;
+    )))?;
     Ok(fits)
 }
 
@@ -187,27 +208,49 @@ fn hidden_effect(
 ) -> anyhow::Result<(Model, String)> {
     let set = DataSet::load(&data.join("hidden-ramp"))?;
     let request = request(DelayKind::StateDependent);
-    let found = steps::identify(&set, &request, &console.watch())?;
+    let found = steps::identify(&set, &request, &console.show_progress())?;
     found.model.save(&out.join("hidden-before.toml"))?;
-    let finding = steps::diagnose(&found.model, &set, &Options::default(), &console.watch())?;
-    let (headline, meaning) = (&finding.headline, &finding.meaning);
-    console.say(&format!(
-        "\na ramp with a hidden effect: {headline}\n{meaning}"
-    ))?;
-    console.say(&ladder_table(&finding.diagnosis.ladder))?;
-    report.section("A ramp with a hidden effect");
-    report_finding(report, &set, &finding);
+    let finding = steps::diagnose(
+        &found.model,
+        &set,
+        &Options::default(),
+        &console.show_progress(),
+    )?;
+    let mut finding = finding;
+    let model = shell_word(&out.join("hidden-before.toml"));
+    let records = shell_word(&data.join("hidden-ramp"));
+    finding.answer = finding.answer.with_files(&model, &records);
+    console.say("\n2. a ramp with a hidden effect: diagnose")?;
+    console.say(&indented(&short_form(&finding.answer)))?;
+    report.section("2. A ramp with a hidden effect: diagnose");
+    let worst = finding_lead(report, &found.model, &set, &finding);
+    report
+        .fold("Details of part 2: candidates, where the model fails, residual tests, every record");
+    finding_details(report, &found.model, &set, &finding, worst);
+    report.end_fold();
     let svg = ladder_picture(&finding.diagnosis, &set);
     write_atomic(&out.join("ladder.svg"), |file| {
         file.write_all(svg.as_bytes())
     })?;
-    report.section("With what was missing");
-    report_scores(report, &finding.scores);
-    report_climb(report, &set.records, &finding, None);
     finding.model.save(&out.join("hidden-after.toml"))?;
     provenance(report, &set, 0, &command_line());
-    let words = format!("{headline}. {meaning}");
+    let words = finding.answer.sentence();
     Ok((finding.model, words))
+}
+
+/// The answer without its notes, which stand in the report.
+fn short_form(answer: &Answer) -> String {
+    let short = Answer {
+        notes: Vec::new(),
+        ..answer.clone()
+    };
+    short.words()
+}
+
+/// Lines set in, below a heading.
+fn indented(text: &str) -> String {
+    let lines = text.lines().map(|line| format!("   {line}"));
+    lines.collect::<Vec<_>>().join("\n")
 }
 
 /// Recordings of a rig whose physics no catalogue has, and the term that is found in them, in words.
@@ -222,20 +265,24 @@ fn beyond_the_catalogue(
     let folder = data.join(name);
     plan.build()?.data.save(&folder)?;
     let set = DataSet::load(&folder)?;
-    let given = steps::identify(&set, &IdentifyRequest::default(), &console.watch())?.model;
+    let given = steps::identify(&set, &IdentifyRequest::default(), &console.show_progress())?.model;
     given.save(&out.join("beyond-before.toml"))?;
     let options = discover::Options {
         terms: 1,
         ..discover::Options::default()
     };
-    let found = steps::discover(&given, &set, &options, &console.watch())?;
-    console.say(&format!(
-        "\na ramp with physics that no catalogue has: {}\n{}",
-        found.headline, found.meaning
-    ))?;
-    console.say(&ladder_table(&found.discovery.ladder))?;
-    report.section("A ramp with physics that no catalogue has");
-    report_discovery(report, &given.targets(&set.records), &found);
+    let found = steps::discover(&given, &set, &options, &console.show_progress())?;
+    let mut found = found;
+    let model = shell_word(&out.join("beyond-before.toml"));
+    found.answer = found.answer.with_files(&model, &shell_word(&folder));
+    console.say("\n3. a ramp with physics that no catalogue has: discover")?;
+    console.say(&indented(&short_form(&found.answer)))?;
+    report.section("3. A ramp with physics that no catalogue has: discover");
+    let records = given.targets(&set.records);
+    let worst = discovery_lead(report, &records, &found);
+    report.fold("Details of part 3: formula, trace, residual tests, every record");
+    discovery_details(report, &given, &records, &found, worst);
+    report.end_fold();
     provenance(report, &set, 0, &command_line());
     found.model.save(&out.join("beyond-after.toml"))?;
     if let Some(term) = found.discovery.terms.first() {
@@ -243,7 +290,7 @@ fn beyond_the_catalogue(
             file.write_all(term.file.as_bytes())
         })?;
     }
-    Ok(format!("{}. {}", found.headline, found.meaning))
+    Ok(found.answer.sentence())
 }
 
 #[derive(Clone, Copy, serde::Serialize)]
@@ -304,7 +351,7 @@ fn the_loop(
             air: figures.air,
         }
     });
-    report.section("In the loop at 1 kHz, on the plant");
+    report.section("4. The generated law in the loop, at 1 kHz on the plant");
     report.figure(
         &loop_picture(&LoopPicture {
             title: "Held at 0.7",
@@ -331,24 +378,15 @@ fn the_loop(
         "",
         &[
             Column::Text("controller"),
-            Column::Number("mean friction"),
+            Column::Number("mean y"),
             Column::Number("rms error"),
             Column::Number("switches/s"),
             Column::Number("air"),
         ],
         &table,
     );
-    console.say("")?;
-    console.say(&aligned(
-        &[
-            "in the loop, on the plant",
-            "mean friction",
-            "rms error",
-            "switches/s",
-            "air",
-        ],
-        &table,
-        1,
-    ))?;
+    console.say("\n4. the generated law in the loop, on the plant: hold y at 0.7")?;
+    let head = ["controller", "mean y", "rms error", "switches/s", "air"];
+    console.say(&indented(&aligned(&head, &table, 1)))?;
     Ok(rows.to_vec())
 }

@@ -1,46 +1,53 @@
 //! `host-fit design`: an on/off law from a model, tried in the loop before it is written.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
-use host_fit::design::{MaximiseRequest, Proof, TrackRequest};
+use anyhow::{Context, anyhow, bail};
+use host_fit::data::DataSet;
+use host_fit::design::{MaximiseRequest, TrackRequest, check_period};
 use host_fit::model::Model;
 use host_fit::output::write_atomic;
-use host_fit::steps::{self, DesignRequest};
+use host_fit::steps::{self, DesignOutcome, DesignRequest};
 use rig_line::RigFile;
 
 use super::average::{not_negative, positive};
-use super::drawings::proof_picture;
+use super::drawings::{margin_picture, proof_picture};
+use super::time_span::TimeSpan;
 use super::tried::Tried;
-use super::{Console, page};
+use super::{Console, page, rig_constants};
 use crate::plants::Plants;
 
 /// Design an on/off law for the valve from a model and write it into the model file.
 ///
-/// `--goal track` holds the friction at `--target`; `--goal maximise` finds the pulses that give the most friction for
-/// the air. The law is then tried in the loop: on the model, on the nearest physical plant, on that plant with every
-/// effect of the catalogue, and with wrong delays and gains, more noise and lost readings. A law that loses attachment in
-/// one of these trials is not written unless `--force` says so; then the file names the trials.
+/// `--goal track` holds y at `--target`; `--goal maximise` finds the pulses that give the highest mean y for the air. The
+/// law is then tried in the loop: on the model, and on every plant that is consistent with the records of DATASET (delay, gain and time constants at the ends of their intervals, each effect at the largest size that is not
+/// excluded). A law that loses attachment on one of these is refused, with the targets that pass. Stress beyond the
+/// records (every effect at its worst, wrong delays and gains, more noise, lost readings) is reported and never refuses a law.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The model.
     #[arg(value_name = "MODEL.toml")]
     model: PathBuf,
-    /// Where the model goes with its law.
+    /// The records of the model: folder with dataset.toml, or one CSV file. Without them only the model is tried.
+    #[arg(value_name = "DATASET")]
+    dataset: Option<PathBuf>,
+    /// File for the model with its law.
     #[arg(short, long, value_name = "FILE.toml")]
     output: PathBuf,
     /// What the law is for.
     #[arg(long, value_enum, default_value_t = Goal::Track)]
     goal: Goal,
-    /// Friction to hold, in y of the flow (needed for `--goal track`).
+    /// Level of y to hold, as measured, offset included (needed for `--goal track`).
     #[arg(long, value_name = "Y", allow_negative_numbers = true)]
     target: Option<f64>,
-    /// Shortest time the valve stays open, in seconds.
-    #[arg(long, value_name = "S", default_value_t = 0.010, value_parser = not_negative)]
-    min_on: f64,
-    /// Shortest time the valve stays closed, in seconds.
-    #[arg(long, value_name = "S", default_value_t = 0.010, value_parser = not_negative)]
-    min_off: f64,
+    /// Shortest time the valve stays open, in seconds (`0.02`, `20ms`) or samples of the model (`2samples`); seconds are
+    /// rounded up to whole samples. Shorter than what `rig.toml` measured, or without it than the shortest between two
+    /// switches in the records, is refused [default: that time; 10 ms where neither is known].
+    #[arg(long, value_name = "S", value_parser = valve_time)]
+    min_on: Option<TimeSpan>,
+    /// Shortest time the valve stays closed, likewise.
+    #[arg(long, value_name = "S", value_parser = valve_time)]
+    min_off: Option<TimeSpan>,
     /// Switches per second that the valve can give in the long run (tracking).
     #[arg(long, value_name = "PER_S", value_parser = positive)]
     max_switches: Option<f64>,
@@ -59,26 +66,28 @@ pub(crate) struct Args {
     /// Most pulses in a period (maximising).
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=4))]
     pulses: u8,
-    /// Horizon over which free on/off commands are searched as well, in seconds (maximising).
-    #[arg(long, value_name = "S", value_parser = positive)]
-    horizon: Option<f64>,
+    /// Horizon over which free on/off commands are searched as well, in seconds (`2`, `500ms`) or samples
+    /// (`2000samples`) (maximising).
+    #[arg(long, value_name = "S", value_parser = some_time)]
+    horizon: Option<TimeSpan>,
     /// The rig, as `record --calibrate` measured it: the law weighs its sensor's noise and keeps its valve's shortest
     /// times.
     #[arg(long, value_name = "rig.toml")]
     rig: Option<PathBuf>,
-    /// Picture of the loop; by default beside the model file, ending in `-loop.svg`.
+    /// Picture of the loop; by default beside the model file, ending in `-loop.svg`. That of the margin stands beside the
+    /// model file, ending in `-margin.svg`.
     #[arg(long, value_name = "FILE.svg")]
     picture: Option<PathBuf>,
-    /// The run on the plant as CSV (t, reference, friction, y, u).
+    /// The run on the model through a noisy sensor as CSV (t, reference, friction, y, u).
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
     /// Write a report page: the law, the loop, every trial.
     #[arg(long, value_name = "out.html")]
     report: Option<PathBuf>,
-    /// Write the law even if a trial loses attachment; the file says in which.
+    /// Write the law even if it loses attachment on a plant that is consistent with the records; the file says on which.
     #[arg(long)]
     force: bool,
-    /// Seed of the plants' effects and noise.
+    /// Seed of the noise, and of the effects under stress.
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
@@ -96,16 +105,120 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Shortest times of a valve that nothing is said of, s.
+const USUAL_VALVE_S: f64 = 0.010;
+
+/// A time of this command: a number without a unit is seconds, as it has always been here.
+fn valve_time(text: &str) -> Result<TimeSpan, String> {
+    if let Ok(seconds) = not_negative(text) {
+        return Ok(TimeSpan::Seconds(seconds));
+    }
+    if let Some(count) = text.strip_suffix("samples").or(text.strip_suffix("sample")) {
+        let count = count.trim().parse();
+        return count
+            .map(TimeSpan::Samples)
+            .map_err(|_| format!("`{text}` is no count of samples: `2samples`"));
+    }
+    match text.parse() {
+        Ok(TimeSpan::Seconds(seconds)) => Ok(TimeSpan::Seconds(seconds)),
+        _ => Err(format!(
+            "`{text}` is no time: give seconds (`0.02`, `20ms`) or samples (`2samples`)"
+        )),
+    }
+}
+
+/// The same, above 0.
+fn some_time(text: &str) -> Result<TimeSpan, String> {
+    match valve_time(text)? {
+        TimeSpan::Samples(0) | TimeSpan::Seconds(0.0) => Err("a time above 0 is needed".into()),
+        time => Ok(time),
+    }
+}
+
+/// The time in seconds; one that is shorter than a sample, but not 0, is refused.
+fn at_period(option: &str, time: TimeSpan, period_s: f64) -> anyhow::Result<f64> {
+    match time {
+        TimeSpan::Samples(samples) => Ok(f64::from(samples) * period_s),
+        // A thousandth is the rounding of what was printed.
+        TimeSpan::Seconds(seconds) if seconds > 0.0 && seconds < 0.999 * period_s => bail!(
+            "{option} {seconds} s is shorter than a sample of this model, {period_s} s (key `sample_period_s`), and the \
+             loop cannot switch within one: give {option} {period_s} or more, or {option} 0 if the valve follows every \
+             sample"
+        ),
+        TimeSpan::Seconds(seconds) => Ok(seconds),
+    }
+}
+
+/// The shortest time of a valve in one position.
+struct ShortestTime<'a> {
+    option: &'a str,
+    /// What is asked for.
+    asked: Option<TimeSpan>,
+    /// What `rig.toml` measured, s.
+    measured: Option<f64>,
+    /// The shortest between two switches in the records, s.
+    recorded: Option<f64>,
+}
+
+impl ShortestTime<'_> {
+    /// The time in seconds: no shorter than was measured, or without a measurement than was recorded.
+    fn seconds(&self, period_s: f64) -> anyhow::Result<f64> {
+        let Self { option, .. } = self;
+        let known = self.measured.or(self.recorded);
+        let Some(asked) = self.asked else {
+            return Ok(known.unwrap_or(USUAL_VALVE_S));
+        };
+        let asked = at_period(option, asked, period_s)?;
+        // Half a sample for what rounding does.
+        match known {
+            Some(known) if asked < known - 0.5 * period_s => {
+                let known = (known * 1e6).round() * 1e-6;
+                let reason = if self.measured.is_some() {
+                    format!(
+                        "the rig answers nothing shorter than {known} s, as rig.toml measured it"
+                    )
+                } else {
+                    format!(
+                        "the shortest time between two switches in the records of the model is {known} s, and how the flow answers \
+                         shorter ones is not known; record shorter ones, or measure the valve (`record --calibrate`, then `--rig rig.toml`)"
+                    )
+                };
+                bail!(
+                    "{option} {asked} s is too short: {reason}. Give {option} {known} or more, or leave it out"
+                )
+            }
+            _ => Ok(asked),
+        }
+    }
+}
+
 impl Args {
-    fn request(&self, rig: Option<&RigFile>) -> DesignRequest {
-        let at_least =
-            |asked: f64, of: fn(&RigFile) -> f64| rig.map_or(asked, |rig| asked.max(of(rig)));
-        match self.goal {
+    fn request(&self, rig: Option<&RigFile>, model: &Model) -> anyhow::Result<DesignRequest> {
+        let period_s = model.sample_period_s;
+        let recorded = model.training.shortest_time_s();
+        let min_on_s = ShortestTime {
+            option: "--min-on",
+            asked: self.min_on,
+            measured: rig.map(|rig| rig.valve.shortest_on_s),
+            recorded,
+        };
+        let min_off_s = ShortestTime {
+            option: "--min-off",
+            asked: self.min_off,
+            measured: rig.map(|rig| rig.valve.shortest_off_s),
+            recorded,
+        };
+        let (min_on_s, min_off_s) = (min_on_s.seconds(period_s)?, min_off_s.seconds(period_s)?);
+        let horizon_s = self
+            .horizon
+            .map(|time| at_period("--horizon", time, period_s));
+        let horizon_s = horizon_s.transpose()?;
+        Ok(match self.goal {
             Goal::Track => DesignRequest::Track(TrackRequest {
                 // Asked for before.
                 target: self.target.unwrap_or(f64::NAN),
-                min_on_s: at_least(self.min_on, |rig| rig.valve.shortest_on_s),
-                min_off_s: at_least(self.min_off, |rig| rig.valve.shortest_off_s),
+                min_on_s,
+                min_off_s,
                 slow_noise: rig.and_then(|rig| {
                     let counts = rig.sensor.slow_noise_counts?;
                     Some(counts * rig.sensor.per_count.abs())
@@ -116,37 +229,67 @@ impl Args {
                 least_air: self.least_air,
             }),
             Goal::Maximise => DesignRequest::Maximise(MaximiseRequest {
-                min_on_s: at_least(self.min_on, |rig| rig.valve.shortest_on_s),
-                min_off_s: at_least(self.min_off, |rig| rig.valve.shortest_off_s),
+                min_on_s,
+                min_off_s,
                 air_price: self.air_price,
                 pulses: self.pulses.into(),
-                longest_period_s: 3.0,
-                horizon_s: self.horizon,
+                longest_period_s: None,
+                horizon_s,
             }),
-        }
+        })
     }
 
-    /// The law, tried in the loop.
-    pub(super) fn tried(&self, model: &Model) -> anyhow::Result<Tried> {
+    /// The law, tried in the loop; the records of `set` say which flows are possible. What no loop can be made of is
+    /// refused before anything is read or run.
+    pub(super) fn tried(&self, model: &Model, set: Option<&DataSet>) -> anyhow::Result<Tried> {
+        check_period(model)?;
         if self.tracks() && self.target.is_none() {
             bail!("--goal track needs --target Y, the friction to hold");
         }
         let rig = self.rig.as_deref().map(RigFile::load).transpose()?;
-        let design = steps::design(model, &self.request(rig.as_ref()))?;
-        // A law is worth having also where the simulator has no plant to try it on.
-        let plants = Plants::of(model, self.seed);
-        let proof = plants
-            .as_ref()
-            .ok()
-            .map(|plants| steps::try_out(&design, plants.blown, &plants.nearest, &plants.others));
-        let lost = proof.as_ref().map(Proof::lost).unwrap_or_default();
+        if let (Some(rig), Some(file)) = (&rig, &self.rig) {
+            rig_constants::same_period(rig, model)
+                .map_err(|reason| anyhow!("{}: {reason}", file.display()))?;
+        }
+        let request = self.request(rig.as_ref(), model)?;
+        let design = steps::design(model, &request)?;
+        let mut notes = Vec::new();
+        let possible = match set {
+            Some(set) => steps::possible(model, set)?,
+            None => {
+                notes.push(
+                    "only the model was tried: `host-fit design MODEL.toml DATASET` tries the law on every plant that is \
+                     consistent with the records"
+                        .to_owned(),
+                );
+                Vec::new()
+            }
+        };
+        // A law is worth having also where the simulator has no plant to stress it on.
+        let stress = match Plants::of(model, self.seed) {
+            Ok(plants) => {
+                notes.extend(plants.left_out);
+                plants.stress
+            }
+            Err(error) => {
+                notes.push(format!("the law was not stressed on plants: {error:#}"));
+                Vec::new()
+            }
+        };
+        let proof = steps::try_out(&design, &possible, &stress, self.seed);
+        let lost = proof.lost();
+        let targets = match (&request, &design.outcome) {
+            (DesignRequest::Track(request), DesignOutcome::Track(track)) if !lost.is_empty() => {
+                steps::passing_targets(model, request, track.reachable, &possible, self.seed)
+            }
+            _ => Vec::new(),
+        };
         Ok(Tried {
+            margin: steps::law_margin(&design, self.seed, true),
             design: design.which_lost(lost),
             proof,
-            not_tried: match plants {
-                Ok(plants) => plants.left_out,
-                Err(error) => vec![format!("the law was not tried on a plant: {error:#}")],
-            },
+            targets,
+            not_tried: notes,
         })
     }
 
@@ -164,18 +307,23 @@ impl Args {
         self.goal == Goal::Track
     }
 
-    /// Whether a law goes into the file even if a trial loses attachment.
+    /// Whether a law goes into the file even if a deciding trial loses attachment.
     pub(super) fn force(&self) -> bool {
         self.force
     }
 
     /// Where the picture of the loop goes.
     pub(super) fn picture(&self) -> PathBuf {
-        self.picture.clone().unwrap_or_else(|| {
-            let stem = self.output.file_stem().unwrap_or_default();
-            let name = format!("{}-loop.svg", stem.to_string_lossy());
-            self.output.with_file_name(name)
-        })
+        self.picture
+            .clone()
+            .unwrap_or_else(|| self.beside("loop.svg"))
+    }
+
+    /// A file beside the model file, its name that of the model with `-ending`.
+    fn beside(&self, ending: &str) -> PathBuf {
+        let stem = self.output.file_stem().unwrap_or_default();
+        let name = format!("{}-{ending}", stem.to_string_lossy());
+        self.output.with_file_name(name)
     }
 }
 
@@ -188,34 +336,89 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
             .exit();
     }
     let model = Model::load(&args.model)?;
+    check_period(&model).with_context(|| format!("no law for {}", args.model.display()))?;
+    let set = args.dataset.as_deref().map(DataSet::load).transpose()?;
     let bar = console.progress(0, "{spinner} designing and trying in the loop {elapsed}");
-    let tried = args.tried(&model)?;
+    let tried = args.tried(&model, set.as_ref())?;
     bar.finish_and_clear();
     let refused = tried.refused("--force").filter(|_| !args.force);
     if let Some(refused) = refused {
         console.show(&tried, &[], &[])?;
         bail!("{refused}");
     }
-    let (picture, csv) = (args.picture(), args.csv.as_ref());
-    let mut keys = vec![("model", args.output.as_path())];
-    let mut written = vec![args.output.as_path()];
-    if let Some(proof) = &tried.proof {
-        let svg = proof_picture(proof, args.tracks());
-        write_atomic(&picture, |file| file.write_all(svg.as_bytes()))
-            .context("saving the picture")?;
-        keys.push(("picture", &picture));
-        written.push(&picture);
-        if let Some(path) = csv {
-            let csv = proof.trace.to_csv();
-            write_atomic(path, |file| file.write_all(csv.as_bytes())).context("saving the run")?;
-            written.push(path);
-        }
+    let (picture, margin) = (args.picture(), args.beside("margin.svg"));
+    let save = |path: &Path, text: &str, what: &'static str| {
+        write_atomic(path, |file| file.write_all(text.as_bytes())).context(what)
+    };
+    let mut keys = vec![("model", args.output.as_path()), ("picture", &picture)];
+    let mut written = vec![args.output.as_path(), &picture];
+    let svg = proof_picture(&tried.proof, args.tracks());
+    save(&picture, &svg, "saving the picture")?;
+    if let Some(found) = &tried.margin {
+        save(
+            &margin,
+            &margin_picture(found),
+            "saving the picture of the margin",
+        )?;
+        keys.push(("margin_picture", &margin));
+        written.push(&margin);
+    }
+    if let Some(path) = &args.csv {
+        save(path, &tried.proof.trace.to_csv(), "saving the run")?;
+        written.push(path);
     }
     tried.design.model.save(&args.output)?;
     if let Some(path) = &args.report {
         let page = page::law(&model, &tried, args.tracks(), &page::command_line());
-        write_atomic(path, |file| file.write_all(page.as_bytes())).context("saving the report")?;
+        save(path, &page, "saving the report")?;
         written.push(path);
     }
     console.show(&tried, &keys, &written)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_is_seconds_and_units_say_otherwise() {
+        for (text, time) in [
+            ("0.02", TimeSpan::Seconds(0.02)),
+            ("10", TimeSpan::Seconds(10.0)),
+            ("20ms", TimeSpan::Seconds(0.02)),
+            ("0.3s", TimeSpan::Seconds(0.3)),
+            ("3samples", TimeSpan::Samples(3)),
+            ("1 sample", TimeSpan::Samples(1)),
+        ] {
+            let Ok(TimeSpan::Seconds(read)) = valve_time(text) else {
+                assert_eq!(valve_time(text), Ok(time), "{text}");
+                continue;
+            };
+            assert!(
+                matches!(time, TimeSpan::Seconds(s) if (s - read).abs() < 1e-12),
+                "{text}"
+            );
+        }
+        for wrong in ["", "-1", "nan", "soon", "xsamples", "-1samples"] {
+            assert!(valve_time(wrong).is_err(), "{wrong}");
+        }
+        assert!(some_time("0").is_err() && some_time("0samples").is_err());
+    }
+
+    #[test]
+    fn a_time_within_a_sample_is_refused_and_nought_is_every_sample() {
+        let of = |time| at_period("--min-on", time, 0.01);
+        assert!(matches!(of(TimeSpan::Seconds(0.02)), Ok(s) if s == 0.02));
+        assert!(matches!(of(TimeSpan::Samples(3)), Ok(s) if (s - 0.03).abs() < 1e-12));
+        assert!(matches!(of(TimeSpan::Seconds(0.0)), Ok(0.0)));
+        let error = of(TimeSpan::Seconds(0.004)).unwrap_err().to_string();
+        for part in [
+            "--min-on 0.004 s",
+            "0.01 s",
+            "`sample_period_s`",
+            "--min-on 0 ",
+        ] {
+            assert!(error.contains(part), "{error}");
+        }
+    }
 }

@@ -11,10 +11,10 @@ use super::effect_files::EffectFiles;
 use super::load::ModelAndData;
 use super::{Console, page};
 
-/// Find the physical effect that a model lacks, judged in free run on held-out records.
+/// Find the physical effect that a model lacks, by the error of its free run on the validation records.
 ///
-/// Every effect of the catalogue is refitted with everything else; an effect counts if the held-out error falls
-/// significantly, by more than chance manages with shifted copies of it.
+/// Every effect of the catalogue is refitted together with the model. An effect is named if the validation error falls
+/// significantly (family-wise p-value over all candidates) and by more than additional lags achieve.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -25,13 +25,13 @@ pub(crate) struct Args {
     /// File for the model with the missing effects added.
     #[arg(short, long, value_name = "new.toml")]
     output: Option<PathBuf>,
-    /// Write the command (columns t, u) that would tell apart what these records cannot.
+    /// Write the command (columns t, u) that would distinguish models that fit these records equally well.
     #[arg(long, value_name = "command.csv")]
     experiment: Option<PathBuf>,
     /// Most effects that are added one after the other.
     #[arg(long, value_name = "COUNT", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=12))]
     most_effects: u32,
-    /// Seed of the signs that stand for noise.
+    /// Seed of the random signs of the significance test.
     #[arg(long, default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
@@ -56,7 +56,8 @@ impl Args {
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let (mut model, set) = args.from.load()?;
     args.define(&mut model)?;
-    let finding = steps::diagnose(&model, &set, &args.options(), &console.watch())?;
+    let mut finding = steps::diagnose(&model, &set, &args.options(), &console.watch())?;
+    finding.answer = args.from.name_in(finding.answer);
     let mut written: Vec<&Path> = Vec::new();
     if let Some(path) = &args.report {
         let page = page::finding(&model, &set, &finding, args.seed, &page::command_line());
@@ -74,7 +75,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     }
     console.show(&finding, &[], &written)?;
     if args.experiment.is_some() && separation.is_none() {
-        console.say("no experiment was written: there is nothing to tell apart")?;
+        console.say("no experiment was written: no other model fits these records equally well")?;
     }
     Ok(())
 }

@@ -12,10 +12,10 @@ use super::effect_files::EffectFiles;
 use super::load::ModelAndData;
 use super::{Console, page};
 
-/// Find a term that no catalogue has: where it acts, on what it depends, its curve and a formula.
+/// Find a missing term that no catalogue has: where it acts, what it depends on, its curve and a formula.
 ///
-/// Curves of every coordinate at every place (jet, delay, flow, sensor) are fitted with everything else; one counts if
-/// the held-out error falls by more than chance and than the flow's own memory manages.
+/// Curves over every coordinate at every place (jet, delay, flow, sensor) are fitted together with the model. A term is
+/// reported if the validation error falls significantly and by more than additional lags achieve.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -23,25 +23,25 @@ pub(crate) struct Args {
     /// File for the model with the terms added.
     #[arg(short, long, value_name = "new.toml")]
     output: Option<PathBuf>,
-    /// File for the first term as an effect of your own, for `extend`, `simulate` and the rest.
+    /// File for the first term as an effect of your own, which every other command reads.
     #[arg(long, value_name = "own.toml")]
     effect_out: Option<PathBuf>,
     /// Write a report page with pictures.
     #[arg(long, value_name = "out.html")]
     report: Option<PathBuf>,
-    /// File for the trace: the signal that would explain the misfit of the best base, at each place.
+    /// File for the trace: the signal at each place that would explain the error of the base model.
     #[arg(long, value_name = "trace.csv")]
     trace: Option<PathBuf>,
-    /// Write the command (columns t, u) that would tell apart what these records cannot.
+    /// Write the command (columns t, u) that would distinguish models that fit these records equally well.
     #[arg(long, value_name = "command.csv")]
     experiment: Option<PathBuf>,
     /// Most terms.
     #[arg(long, value_name = "COUNT", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=6))]
     terms: u32,
-    /// Forget this effect of the catalogue: no term is said to resemble it (repeatable).
+    /// Leave this effect of the catalogue out of the comparison (repeatable).
     #[arg(long, value_name = "NAME")]
     without: Vec<String>,
-    /// Accepted for scripts that seed every command; nothing here is drawn.
+    /// Accepted for scripts that seed every command; this one draws no random numbers.
     #[arg(long, default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
@@ -54,11 +54,11 @@ impl Args {
         self.effect_files.define(model)?;
         for name in &self.without {
             if model.spec(name).is_none() {
-                bail!("there is no effect `{name}` to forget; `host-fit effects` lists them");
+                bail!("--without {name}: there is no such effect; `host-fit effects` lists them");
             }
             if model.effect_names().contains(name) {
                 bail!(
-                    "the model has `{name}`, which is to be forgotten; start from a model without it"
+                    "--without {name}: the model already contains it; start from a model without it"
                 );
             }
         }
@@ -73,7 +73,8 @@ impl Args {
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let (mut model, set) = args.from.load()?;
     let options = args.prepare(&mut model)?;
-    let found = steps::discover(&model, &set, &options, &console.watch())?;
+    let mut found = steps::discover(&model, &set, &options, &console.watch())?;
+    found.answer = args.from.name_in(found.answer);
     let mut written: Vec<&Path> = Vec::new();
     if let Some(path) = &args.report {
         let page = page::discovery(&model, &set, &found, &page::command_line());
@@ -100,11 +101,11 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     }
     console.show(&found, &[], &written)?;
     if args.experiment.is_some() && separation.is_none() {
-        console.say("no experiment was written: there is nothing to tell apart")?;
+        console.say("no experiment was written: no other model fits these records equally well")?;
     }
     if args.trace.is_some() && found.discovery.trace.is_none() {
         console.say(
-            "no trace was written: the best base is at the noise floor, or its free run diverges",
+            "no trace was written: the base model is at the noise level, or its free run diverges",
         )?;
     }
     if args.effect_out.is_some() && first.is_none() {

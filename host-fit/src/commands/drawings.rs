@@ -1,13 +1,13 @@
 //! Results as pictures.
 
-use closed_loop::{SAMPLE_PERIOD_S, Trace};
+use closed_loop::Trace;
 use host_fit::data::{DataSet, Record};
-use host_fit::design::Proof;
+use host_fit::design::{Margin, Proof};
 use host_fit::diagnose::Diagnosis;
 use host_fit::experiment::Separation;
 use host_fit::picture::{
-    ClosedLoop, LabelledRun, Ladder, LadderRecord, LadderStep, LoopRun, Overlay, closed_loop,
-    ladder, overlay,
+    ClosedLoop, LabelledRun, Ladder, LadderRecord, LadderStep, LoopRun, Overlay, Region, Regions,
+    closed_loop, ladder, overlay, regions,
 };
 use host_fit::simulate::Signals;
 
@@ -42,7 +42,7 @@ pub(crate) fn overlays(records: &[Record], runs: &[(&str, &[Vec<f64>])]) -> Vec<
     records.iter().enumerate().map(picture).collect()
 }
 
-/// The held-out error step by step, as a picture.
+/// The validation error step by step, as a picture.
 pub(crate) fn ladder_picture(diagnosis: &Diagnosis, set: &DataSet) -> String {
     let finite = diagnosis
         .ladder
@@ -56,7 +56,7 @@ pub(crate) fn ladder_picture(diagnosis: &Diagnosis, set: &DataSet) -> String {
         .collect();
     let records: [LadderRecord<'_>; 0] = [];
     ladder(&Ladder {
-        title: set.title.as_deref().unwrap_or("Held-out error"),
+        title: set.title.as_deref().unwrap_or("Validation error"),
         y_unit: "y",
         steps: &steps,
         records: &records,
@@ -67,15 +67,12 @@ pub(crate) fn ladder_picture(diagnosis: &Diagnosis, set: &DataSet) -> String {
 /// The experiment that tells models apart: its command, and what each of them expects of it.
 pub(crate) fn experiment_picture(separation: &Separation) -> String {
     let experiment = &separation.experiment;
-    let signals = Signals {
-        u: &experiment.u,
-        y: None,
-        channels: Vec::new(),
-    };
     let named = separation.effects.len() == separation.models.len();
     let numbered = separation.models.iter().enumerate();
     let expected = numbered.filter_map(|(index, model)| {
-        let y = model.run_free(&signals).ok()?;
+        let y = model
+            .run_free(&Signals::commanded(model, &experiment.u))
+            .ok()?;
         // What stands for an effect may be a lag, which is none of a model's effects.
         let label = match separation.effects.get(index).filter(|_| named) {
             Some(effect) => effect.clone(),
@@ -126,11 +123,46 @@ pub(crate) fn proof_picture(proof: &Proof, tracks: bool) -> String {
         false => Vec::new(),
     };
     loop_picture(&LoopPicture {
-        title: "The law on the continuous-time plant, noisy sensor",
+        title: "The law on the model, noisy sensor",
         air: true,
         reference: &reference,
         runs: &runs,
-        seconds: 6.0,
+        // Half of a trial.
+        seconds: 0.5 * proof.trace.samples.len() as f64 * proof.trace.sample_period_s,
+    })
+}
+
+/// The errors of the model that a law bears, two at a time.
+pub(crate) fn margin_picture(margin: &Margin) -> String {
+    let percent = |contour: &[[f64; 2]]| -> Vec<[f64; 2]> {
+        contour
+            .iter()
+            .map(|point| point.map(|share| 100.0 * share))
+            .collect()
+    };
+    let planes: Vec<([String; 2], Vec<[f64; 2]>)> = margin
+        .planes
+        .iter()
+        .map(|plane| {
+            (
+                plane.errors.map(|error| format!("{error}, %")),
+                percent(&plane.contour),
+            )
+        })
+        .collect();
+    let each: Vec<Region<'_>> = planes
+        .iter()
+        .map(|([across, up], contour)| Region {
+            across,
+            up,
+            contour,
+        })
+        .collect();
+    regions(&Regions {
+        title: "How far the flow may be from the model",
+        inside: "attachment kept, rms error within twice that on the model",
+        centre: "the model",
+        regions: &each,
     })
 }
 
@@ -156,7 +188,7 @@ pub(crate) fn loop_picture(picture: &LoopPicture<'_>) -> String {
     let series = |trace: &Trace| {
         let on = trace.samples.iter().map(|s| f64::from(u8::from(s.on)));
         let used = |sum: &mut f64, on: f64| {
-            *sum += on * SAMPLE_PERIOD_S;
+            *sum += on * trace.sample_period_s;
             Some(*sum)
         };
         Series {
@@ -187,7 +219,10 @@ pub(crate) fn loop_picture(picture: &LoopPicture<'_>) -> String {
         title: picture.title,
         y_label: "friction gain y",
         air_label: "",
-        sample_period_s: SAMPLE_PERIOD_S,
+        sample_period_s: picture
+            .runs
+            .first()
+            .map_or(0.0, |(_, trace)| trace.sample_period_s),
         reference: picture.reference,
         runs: &runs,
         window_s: Some((0.0, picture.seconds)),

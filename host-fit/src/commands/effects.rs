@@ -2,12 +2,16 @@
 
 use anyhow::Context;
 use host_fit::extend::nearest_name;
-use host_fit::steps::catalogue;
+use host_fit::steps::{base_terms, catalogue};
 
 use super::Console;
 use super::words::{Words, effect_table};
 
-/// List the physical effects that can be missing, and added.
+/// Base terms that are lags of the recursion and have no card.
+const FLOW_TERMS: &str = "flow-lag         flow   a second lag in series: T2·q̇ = u − q drives the recursion instead of u\n\
+                          flow-memory      flow   a later lag of y: adds a·y(t − T) to the recursion";
+
+/// List the catalogue of effects, and the terms of base models.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Only this effect, with its equation and parameters.
@@ -20,8 +24,12 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let effects = catalogue();
     let Some(name) = &args.name else {
         console.say(&effect_table(&effects))?;
+        console.say("\nTerms of base models: `identify` adds them where they pay, `diagnose` never reports them as missing.")?;
+        console.say(&effect_table(&base_terms()))?;
+        console.say(FLOW_TERMS)?;
         return console.document(&effects);
     };
+    let effects = [effects, base_terms()].concat();
     let known: Vec<&str> = effects.iter().map(|effect| effect.name).collect();
     let named = effects.iter().find(|effect| effect.name == name);
     let effect = named.with_context(|| nearest_name(name, &known))?;

@@ -7,10 +7,10 @@ use host_fit::output::write_atomic;
 use host_fit::steps;
 
 use super::effect_files::EffectFiles;
-use super::load::ModelAndData;
+use super::load::{ModelAndData, shell_word};
 use super::{Console, page};
 
-/// Add physical effects to a model, refit everything, and show the held-out error before and after.
+/// Add physical effects to a model, refit everything, and show the validation error before and after.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -44,14 +44,16 @@ impl Args {
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let (mut model, set) = args.from.load()?;
     args.define(&mut model)?;
-    let extension = steps::extend(&model, &set, &args.effect, &console.watch())?;
+    let mut extension = steps::extend(&model, &set, &args.effect, &console.show_progress())?;
+    let (made, data) = (shell_word(&args.output), args.from.dataset());
+    extension.answer = extension.answer.with_files(&made, &shell_word(data));
     extension.model.save(&args.output)?;
     let mut written: Vec<&Path> = vec![&args.output];
     if let Some(path) = &args.report {
         // A model that diverges is no reason to show nothing of the one that does not.
         let before = steps::compare(&model, &set).ok();
         let after = steps::compare(&extension.model, &set)?;
-        let page = page::extension(&set, &extension, before.as_ref(), &after);
+        let page = page::extension(&set, &extension, (&model, before.as_ref()), &after);
         write_atomic(path, |out| out.write_all(page.as_bytes()))?;
         written.push(path);
     }

@@ -1,5 +1,6 @@
 //! `host-fit identify`: recordings to a model.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -10,13 +11,15 @@ use host_fit::steps::{self, DelayKind, IdentifyRequest};
 use model_core::recursion::LagConvention;
 
 use super::effect_files::EffectFiles;
+use super::load::shell_word;
+use super::time_span::{NotATime, TimeSpan};
 use super::{Console, page};
 
-/// Identify a model: as many lags as earn their place on held-out records, or as many as are asked for.
+/// Identify a model: structure chosen by validation error, or with the counts of lags that are given.
 ///
 /// With counts of lags, the delays are found by search (MADS) and the coefficients by least squares inside it.
 ///
-/// With the objective `free-run` the coefficients are refined on the free run afterwards, and kept if the held-out
+/// With the objective `free-run` the coefficients are refined on the free run afterwards, and kept if the validation
 /// error falls.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
@@ -36,11 +39,11 @@ pub(crate) struct Args {
 /// What to identify and how: the options of the command.
 #[derive(Debug, Clone, clap::Args)]
 struct Request {
-    /// Input delays: constant, eq. (3), or falling with the averaged output, eq. (4) [default: what does better on
-    /// held-out records, a fall that ends at a level of y included; fixed where counts of lags are given].
+    /// Input delays: constant, eq. (3), or falling with the averaged output, eq. (4) [default: the one
+    /// with the lower validation error; fixed where counts of lags are given].
     #[arg(long, value_enum)]
     delay: Option<Delay>,
-    /// Keep delays between samples even where that pays little; with a structure that is chosen.
+    /// Interpolate delays between samples even where the validation error hardly falls; with an automatic structure.
     #[arg(long)]
     interpolated: bool,
     /// Law h = P0 + P1·exp(−P2·ỹ), in samples, in place of a measured one; implies `--delay state-dependent`.
@@ -52,7 +55,7 @@ struct Request {
     /// Identify the model of the moving averages, eqs. (14) and (15).
     #[arg(long)]
     averaged: bool,
-    /// Number of state lags N1, or `auto`: the structure is chosen by held-out error [default: auto where no count is
+    /// Number of state lags N1, or `auto`: the structure is chosen by validation error [default: auto where no count is
     /// given; 5 beside other counts; averaged: 2].
     #[arg(long, value_name = "COUNT|auto")]
     n1: Option<Count>,
@@ -62,9 +65,10 @@ struct Request {
     /// Number of input delays N3 [default: 1; averaged: 2].
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u16).range(1..=20))]
     n3: Option<u16>,
-    /// Longest lag and input delay, in samples [default: 500, at most a quarter of the shortest record].
-    #[arg(long, value_name = "SAMPLES", value_parser = clap::value_parser!(u16).range(1..=20_000))]
-    max_lag: Option<u16>,
+    /// Longest lag and input delay, in samples (`500`) or as a time (`0.5s`) [default: 500 samples, at most a quarter of
+    /// the shortest record].
+    #[arg(long, value_name = "SAMPLES|TIME", value_parser = longest_lag)]
+    max_lag: Option<TimeSpan>,
     /// What a lag τ means: y_{k−τ} as printed in eq. (3), or y_{k+1−τ}.
     #[arg(long, value_enum, default_value_t = Lags::OneStep)]
     lags: Lags,
@@ -151,9 +155,27 @@ impl FromStr for LawArgument {
     }
 }
 
+/// Lags that a search may have, samples.
+const LAGS: RangeInclusive<u32> = 1..=20_000;
+
+fn longest_lag(text: &str) -> Result<TimeSpan, String> {
+    match text.parse().map_err(|error: NotATime| error.to_string())? {
+        TimeSpan::Samples(samples) if !LAGS.contains(&samples) => Err(format!(
+            "{samples} samples are not within {} to {}",
+            LAGS.start(),
+            LAGS.end()
+        )),
+        lag => Ok(lag),
+    }
+}
+
 impl Request {
-    /// The request as the library has it; reads the effect files.
-    fn library(&self) -> anyhow::Result<IdentifyRequest> {
+    /// The request as the library has it, for records with a sample every `period_s`; reads the effect files.
+    fn library(&self, period_s: f64) -> anyhow::Result<IdentifyRequest> {
+        let max_lag = self.max_lag.map(|lag| {
+            let lag = lag.samples_within(period_s, "--max-lag", LAGS)?;
+            anyhow::Ok(u16::try_from(lag)?)
+        });
         Ok(IdentifyRequest {
             delay: match (self.delay_law, self.delay) {
                 (Some(LawArgument(law)), _) => Some(DelayKind::Prescribed(law)),
@@ -170,7 +192,7 @@ impl Request {
             }),
             n2: self.n2,
             n3: self.n3,
-            max_lag: self.max_lag,
+            max_lag: max_lag.transpose()?,
             lags: match self.lags {
                 Lags::Literal => LagConvention::Literal,
                 Lags::OneStep => LagConvention::OneStep,
@@ -189,16 +211,19 @@ impl Request {
 }
 
 impl Args {
-    /// What to identify and how; reads the effect files.
-    pub(super) fn request(&self) -> anyhow::Result<IdentifyRequest> {
-        self.request.library()
+    /// What to identify and how, from records with a sample every `period_s`; reads the effect files.
+    pub(super) fn request(&self, period_s: f64) -> anyhow::Result<IdentifyRequest> {
+        self.request.library(period_s)
     }
 }
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let set = DataSet::load(&args.dataset)?;
-    let found = steps::identify(&set, &args.request()?, &console.watch())?;
+    let request = args.request(set.sample_period_s)?;
+    let mut found = steps::identify(&set, &request, &console.watch())?;
+    let (made, data) = (shell_word(&args.output), shell_word(&args.dataset));
+    found.answer = found.answer.with_files(&made, &data);
     found.model.save(&args.output)?;
     let mut written: Vec<&Path> = vec![&args.output];
     if let Some(path) = &args.report {
@@ -213,6 +238,15 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_longest_lag_is_samples_or_a_time() {
+        assert_eq!(longest_lag("500"), Ok(TimeSpan::Samples(500)));
+        assert_eq!(longest_lag("0.5s"), Ok(TimeSpan::Seconds(0.5)));
+        for wrong in ["0", "20001", "-1", "0.5", "soon"] {
+            assert!(longest_lag(wrong).is_err(), "{wrong}");
+        }
+    }
 
     #[test]
     fn a_law_is_three_numbers() {

@@ -8,20 +8,26 @@ use host_fit::steps::{self, ImportedSet};
 use super::Console;
 use super::average::positive;
 
-/// Make a data set of CSV files of any dialect, MATLAB's .mat (v5 to v7), NumPy's .npy and .npz.
+/// Convert logger files to a data set: CSV of any dialect, serial-monitor lines, MATLAB's .mat (v5 to v7), NumPy's .npy
+/// and .npz.
 ///
-/// Each FILE becomes one record named by the file. Separators, decimal commas, lines before the header and units in it are
-/// recognised. A variable is named as its program would: valve, run.valve, data(:,2), data[:,1]. What is not named is
-/// found by its name (t or time; u, input, command or valve; y, output, shear …). y_sd, y_min, y_max and every other
-/// variable of the same length are kept. The mapping is kept in dataset.toml, for --like.
+/// Each FILE becomes one record named by the file; a folder stands for the files in it. Separators, decimal commas,
+/// thousands marks, lines before the header, dates and clock times, Unix times in s, ms or µs, on/off and true/false,
+/// percentages, and a command that is written on change only are recognised; what was understood is printed. A variable is
+/// named as its program would: valve, run.valve, data(:,2), data[:,1]. What is not named is found by its name (t, time or
+/// timestamp; u, input, heater, valve …; y, output, temperature …). y_sd, y_min, y_max and every other variable of the
+/// same length are kept. The mapping is kept in dataset.toml, for --like.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Files to read.
+    /// Files to read, or folders of them.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Folder for the data set (dataset.toml and one CSV per record).
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+    /// Replace a data set that is in the folder already.
+    #[arg(long)]
+    force: bool,
     /// Take the mapping of a data set that was imported before; other options change it.
     #[arg(long, value_name = "DATASET")]
     like: Option<PathBuf>,
@@ -34,6 +40,9 @@ pub(crate) struct Args {
     /// Sampling period, where the file has no time (or to check it).
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     period: Option<f64>,
+    /// Take the rows as --period apart, whatever the file's time says.
+    #[arg(long, requires = "period")]
+    ignore_time: bool,
     /// Variable that is the command.
     #[arg(long, value_name = "NAME")]
     u: Option<String>,
@@ -46,6 +55,9 @@ pub(crate) struct Args {
     /// u is on (1) above this value and off (0) elsewhere: makes a voltage an on/off command.
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     u_threshold: Option<f64>,
+    /// Command before the first sample of each record [default: its first value].
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
+    u_before: Option<f64>,
     /// Variable that is the output.
     #[arg(long, value_name = "NAME")]
     y: Option<String>,
@@ -64,7 +76,7 @@ pub(crate) struct Args {
     /// Name of a file (without its ending) to hold out for validation; repeatable.
     #[arg(long, value_name = "NAME")]
     validate: Vec<String>,
-    /// Hold out what comes from this time of each record on, as a record of its own.
+    /// Hold out what comes from this time of each record on; the samples before it lead up to it.
     #[arg(long, value_name = "SECONDS")]
     hold_out_from: Option<f64>,
     /// The input has levels between off and on.
@@ -85,6 +97,7 @@ impl Args {
             validate: self.validate.clone(),
             hold_out_from_s: self.hold_out_from,
             graded: self.graded,
+            u_before: self.u_before,
         };
         Ok(steps::import(&files, &request)?)
     }
@@ -103,6 +116,7 @@ impl Args {
             t: self.t.clone().or(base.t),
             t_scale: self.t_scale.or(base.t_scale),
             period_s: self.period.or(base.period_s),
+            ignore_time: self.ignore_time || base.ignore_time,
             u: self.u.clone().or(base.u),
             u_scale: self.u_scale.or(base.u_scale),
             u_offset: self.u_offset.or(base.u_offset),
@@ -118,6 +132,7 @@ impl Args {
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let found = args.import()?;
+    found.imported.refuse_to_replace(&args.output, args.force)?;
     found.imported.save(&args.output)?;
     console.show(&found, &[("dataset", &args.output)], &[&args.output])
 }

@@ -1,12 +1,15 @@
 //! The commands of the program, one file each: they parse, call [`host_fit::steps`] and hand the result to one of three
 //! renderers: [`words`], [`page`] with its [`drawings`], and JSON, which is the result itself ([`Console::show`]).
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
+use anyhow::Context;
+use host_fit::data::{visible, visible_json};
 use host_fit::search::Snapshot;
 use host_fit::steps::Onlooker;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -30,10 +33,13 @@ pub(crate) mod import;
 mod interrupt;
 mod load;
 mod page;
+mod page_parts;
 pub(crate) mod record;
 mod rig_constants;
 pub(crate) mod rules;
 pub(crate) mod simulate;
+pub(crate) mod threads;
+mod time_span;
 mod tried;
 pub(crate) mod watch;
 mod words;
@@ -57,13 +63,17 @@ impl Console {
     ) -> anyhow::Result<()> {
         #[derive(Serialize)]
         struct Document<'a, T> {
+            /// As text: JSON has no other names, and a file that was written is not refused for its name.
             #[serde(flatten)]
-            files: BTreeMap<&'a str, &'a Path>,
+            files: BTreeMap<&'a str, Cow<'a, str>>,
             #[serde(flatten)]
             result: &'a T,
         }
         if self.json {
-            let files = keys.iter().copied().collect();
+            let named = keys
+                .iter()
+                .map(|(key, path)| (*key, path.to_string_lossy()));
+            let files = named.collect();
             return self.document(&Document { files, result });
         }
         print(&result.words())?;
@@ -86,7 +96,8 @@ impl Console {
         if !self.json {
             return Ok(());
         }
-        print(&serde_json::to_string_pretty(value)?)
+        let document = serde_json::to_string_pretty(value)?;
+        write_out(&visible_json(&document))
     }
 
     /// A progress bar on standard error; invisible when that is no terminal.
@@ -99,16 +110,27 @@ impl Console {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        bar.enable_steady_tick(Duration::from_millis(200));
+        // The ticks come from a thread of their own.
+        if threads::are_given() {
+            bar.enable_steady_tick(Duration::from_millis(200));
+        }
         bar
     }
 
-    /// Shows on standard error what a step is at, and lets Ctrl-C end it.
+    /// Shows on standard error what a step is at; Ctrl-C asks it for the best that it has.
     pub(crate) fn watch(self) -> Watch {
+        let mut watch = self.show_progress();
+        watch.interrupt = interrupt::watch();
+        watch
+    }
+
+    /// The same of a step that has nothing to hand over before its end: Ctrl-C ends the program.
+    pub(crate) fn show_progress(self) -> Watch {
+        static NEVER: AtomicBool = AtomicBool::new(false);
         Watch {
             console: self,
             bar: self.progress(0, "{spinner} {msg} ({elapsed})"),
-            interrupt: interrupt::watch(),
+            interrupt: &NEVER,
         }
     }
 }
@@ -122,12 +144,12 @@ pub(crate) struct Watch {
 
 impl Onlooker for Watch {
     fn begins(&self, what: &str) {
-        self.bar.set_message(what.to_owned());
+        self.now(what);
         self.bar.reset_elapsed();
     }
 
     fn now(&self, what: &str) {
-        self.bar.set_message(what.to_owned());
+        self.bar.set_message(visible(what).into_owned());
     }
 
     fn sees(&self, snapshot: &Snapshot) {
@@ -140,7 +162,7 @@ impl Onlooker for Watch {
     /// A warning goes to standard error where that is a terminal, otherwise among the words of the result; with
     /// `--json` the document carries it.
     fn hears(&self, warning: &str) {
-        let text = format!("warning: {warning}");
+        let text = format!("warning: {}", visible(warning));
         if io::stderr().is_terminal() {
             self.bar.suspend(|| eprintln!("{text}"));
         } else {
@@ -160,11 +182,27 @@ impl Drop for Watch {
     }
 }
 
-/// Prints a text and a line end; a reader that has gone away (`| head`) is no error.
+/// One paragraph, whatever the causes wrote; a cause that the message itself names is not said again.
+pub(crate) fn paragraph(error: &anyhow::Error) -> String {
+    let mut text = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !text.contains(&cause) {
+            text.push_str(&format!(": {cause}"));
+        }
+    }
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Prints a text and a line end. Names in it come from files that anybody may have written.
 fn print(text: &str) -> anyhow::Result<()> {
+    write_out(&visible(text))
+}
+
+/// Writes a text and a line end; a reader that has gone away (`| head`) is no error.
+fn write_out(text: &str) -> anyhow::Result<()> {
     let mut out = io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
         Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        other => Ok(other?),
+        other => other.context("standard output cannot be written"),
     }
 }

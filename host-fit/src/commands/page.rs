@@ -1,20 +1,24 @@
 //! Results as pages.
 
 use host_fit::data::{DataSet, Record};
-use host_fit::diagnose::{Diagnosis, Verdict};
+use host_fit::diagnose::{Diagnosis, RULES};
 use host_fit::discover::{Entry, FoundTerm, TRACED, Trace};
 use host_fit::indicators::{Scores, score};
 use host_fit::model::Model;
 use host_fit::picture::{
-    BandPoint, Candidate, Column, CurvePlot, KeyNumber, Living, Ranking, Report, Stretches, Tone,
-    WhereItFails, curve, ranking,
+    BandPoint, Candidate, Column, CurvePlot, Living, Ranking, Report, Stretches, WhereItFails,
+    curve, ranking,
 };
 use host_fit::residual::Failures;
-use host_fit::steps::{Comparison, Extension, Finding, Identification, Terms};
+use host_fit::steps::{Answer, Comparison, Extension, Finding, Identification, SideBySide, Terms};
 
-use super::drawings::{experiment_picture, ladder_picture, proof_picture};
+use super::drawings::{experiment_picture, ladder_picture, margin_picture, proof_picture};
+use super::page_parts::{Run, Stretch, card, checks, stretch_picture, worst_stretch};
 use super::tried::Tried;
-use super::words::{Words, describe, ladder_rows, ranking_rows, role_name, score_rows, short};
+use super::words::{
+    SIDE_BY_SIDE, Words, describe, ladder_rows, named_first, ranking_rows, role_name, score_rows,
+    side_by_side_rows,
+};
 
 /// The page of a comparison, made by `command`.
 pub(crate) fn comparison(
@@ -24,26 +28,64 @@ pub(crate) fn comparison(
     command: &str,
 ) -> String {
     let mut report = Report::new("Comparison", title(set));
-    report.section("How well the model matches");
-    report.paragraph(&describe(model));
-    if let Some(all) = found.scores.held_out() {
-        let noise = all.noise_rmse.map_or_else(|| "–".to_owned(), short);
-        report.key_numbers(&[
-            KeyNumber::new("FIT", format!("{:.1} %", all.fit_percent), "free run"),
-            KeyNumber::new("RMSE", short(all.rmse), "in y"),
-            KeyNumber::new("noise floor", noise, "a perfect model's RMSE"),
-        ]);
-    }
-    report_scores(&mut report, &found.scores);
     let records = model.targets(&set.records);
+    let runs: [(&str, &[Vec<f64>]); 1] = [("model", &found.runs)];
+    let worst = lead(&mut report, &found.answer, None, &records, &runs);
     report_failures(&mut report, &found.failures);
-    report.section("Record by record");
     let samples = found
         .failures
         .samples(&records, &found.runs, model.longest_delay());
     let lit = Some((&found.failures, samples.as_slice()));
-    report_runs(&mut report, &records, &[("model", &found.runs)], lit);
+    report_runs(&mut report, &records, &runs, lit, worst);
+    let runs = &found.runs;
+    let label = "model";
+    checks(&mut report, &records, &[Run { label, model, runs }]);
+    report.section("Every record");
+    report.paragraph(&describe(model));
+    report_scores(&mut report, &found.scores);
     provenance(&mut report, set, model.training.seed, command);
+    report.html()
+}
+
+/// The page of several models beside the same records.
+pub(crate) fn side_by_side(
+    models: &[(String, &Model)],
+    set: &DataSet,
+    found: &SideBySide,
+    command: &str,
+) -> String {
+    let mut report = Report::new("Comparison of models", title(set));
+    let labelled = found.models.iter();
+    let runs: Vec<(&str, &[Vec<f64>])> = labelled
+        .map(|named| (named.model.as_str(), named.comparison.runs.as_slice()))
+        .collect();
+    let records = models
+        .first()
+        .map(|(_, model)| model.targets(&set.records))
+        .unwrap_or_default();
+    let worst = lead(&mut report, &found.answer, None, &records, &runs);
+    let [first, rest @ ..] = SIDE_BY_SIDE;
+    let columns = std::iter::once(Column::Text(first)).chain(rest.map(Column::Number));
+    report.table(
+        "Free run against the measurement; RMSE and noise of the validation records where there are any.",
+        &columns.collect::<Vec<_>>(),
+        &side_by_side_rows(found),
+    );
+    report_runs(&mut report, &records, &runs, None, worst);
+    let tested: Vec<Run<'_>> = models
+        .iter()
+        .zip(&runs)
+        .map(|((label, model), (_, runs))| Run { label, model, runs })
+        .collect();
+    checks(&mut report, &records, &tested);
+    for ((name, model), named) in models.iter().zip(&found.models) {
+        report.section(name);
+        report.paragraph(&describe(model));
+        report_scores(&mut report, &named.comparison.scores);
+    }
+    if let Some((_, model)) = models.first() {
+        provenance(&mut report, set, model.training.seed, command);
+    }
     report.html()
 }
 
@@ -51,25 +93,29 @@ pub(crate) fn comparison(
 pub(crate) fn identification(set: &DataSet, found: &Identification, run: &Comparison) -> String {
     let model = &found.model;
     let mut report = Report::new("Identification", title(set));
+    let records = model.targets(&set.records);
+    let runs: [(&str, &[Vec<f64>]); 1] = [("model", &run.runs)];
+    let worst = lead(&mut report, &found.answer, None, &records, &runs);
     report.section("The model");
     report.paragraph(&describe(model));
     if !found.remarks.is_empty() {
         report.list(&found.remarks);
     }
     if !found.excitation.is_empty() {
-        report.section("What the commands can tell");
+        report.section("Excitation");
         report.list(&found.excitation);
     }
-    report.section("How well it matches");
-    report_scores(&mut report, &found.scores);
     report_failures(&mut report, &run.failures);
-    report.section("Record by record");
-    let records = model.targets(&set.records);
     let samples = run
         .failures
         .samples(&records, &run.runs, model.longest_delay());
     let lit = Some((&run.failures, samples.as_slice()));
-    report_runs(&mut report, &records, &[("model", &run.runs)], lit);
+    report_runs(&mut report, &records, &runs, lit, worst);
+    let label = "model";
+    let runs = &run.runs;
+    checks(&mut report, &records, &[Run { label, model, runs }]);
+    report.section("Every record");
+    report_scores(&mut report, &found.scores);
     provenance(&mut report, set, model.training.seed, &command_line());
     report.html()
 }
@@ -78,41 +124,38 @@ pub(crate) fn identification(set: &DataSet, found: &Identification, run: &Compar
 pub(crate) fn extension(
     set: &DataSet,
     found: &Extension,
-    before: Option<&Comparison>,
+    given: (&Model, Option<&Comparison>),
     after: &Comparison,
 ) -> String {
     let model = &found.model;
+    let (given, before) = given;
     let mut report = Report::new("Extension", title(set));
-    report.section(&format!("With {}", found.effects.join(", ")));
-    report.paragraph(&describe(model));
-    let tile = |label: &str, run: &Scores| {
-        run.held_out().map(|all| {
-            KeyNumber::new(
-                label,
-                short(all.rmse),
-                format!("FIT {:.1} %", all.fit_percent),
-            )
-        })
-    };
-    let noise = after.scores.held_out().and_then(|all| all.noise_rmse);
-    let tiles = [
-        before.and_then(|run| tile("RMSE before", &run.scores)),
-        tile("RMSE after", &after.scores),
-        noise.map(|n| KeyNumber::new("noise floor", short(n), "a perfect model's RMSE")),
-    ];
-    report.key_numbers(&tiles.into_iter().flatten().collect::<Vec<_>>());
-    report_scores(&mut report, &after.scores);
-    report_failures(&mut report, &after.failures);
-    report.section("Record by record");
     let records = model.targets(&set.records);
-    let samples = after
-        .failures
-        .samples(&records, &after.runs, model.longest_delay());
     let mut runs: Vec<(&str, &[Vec<f64>])> = Vec::new();
     runs.extend(before.map(|run| ("before", run.runs.as_slice())));
     runs.push(("after", &after.runs));
+    let worst = lead(&mut report, &found.answer, None, &records, &runs);
+    report_failures(&mut report, &after.failures);
+    let samples = after
+        .failures
+        .samples(&records, &after.runs, model.longest_delay());
     let lit = Some((&after.failures, samples.as_slice()));
-    report_runs(&mut report, &records, &runs, lit);
+    report_runs(&mut report, &records, &runs, lit, worst);
+    let mut tested = Vec::new();
+    tested.extend(before.map(|run| Run {
+        label: "before",
+        model: given,
+        runs: &run.runs,
+    }));
+    tested.push(Run {
+        label: "after",
+        model,
+        runs: &after.runs,
+    });
+    checks(&mut report, &records, &tested);
+    report.section("Every record");
+    report.paragraph(&describe(model));
+    report_scores(&mut report, &after.scores);
     provenance(&mut report, set, model.training.seed, &command_line());
     report.html()
 }
@@ -126,93 +169,205 @@ pub(crate) fn finding(
     command: &str,
 ) -> String {
     let mut report = Report::new("Diagnosis", title(set));
-    report_finding(&mut report, set, found);
-    // A model whose free run diverges has neither scores nor pictures.
-    if let (Some(failures), Some(runs)) = (&found.failures, &found.runs) {
-        report_failures(&mut report, failures);
-        // The bars are of the model as given.
-        let records = given.targets(&set.records);
-        let before = found.runs_before.as_deref().unwrap_or(runs);
-        let samples = failures.samples(&records, before, given.longest_delay());
-        report.section("The model with what was missing");
-        report.paragraph(&describe(&found.model));
-        report_scores(&mut report, &found.scores);
-        report_climb(
-            &mut report,
-            &records,
-            found,
-            Some((failures, samples.as_slice())),
-        );
-    }
+    let worst = finding_lead(&mut report, given, set, found);
+    finding_details(&mut report, given, set, found, worst);
     provenance(&mut report, set, seed, command);
     report.html()
+}
+
+/// The first screen of a diagnosis: answer, falling error, the worst stretch before and after.
+pub(crate) fn finding_lead(
+    report: &mut Report,
+    given: &Model,
+    set: &DataSet,
+    found: &Finding,
+) -> Option<Stretch> {
+    let records = given.targets(&set.records);
+    let mut runs: Vec<(&str, &[Vec<f64>])> = Vec::new();
+    runs.extend(found.runs_before.as_deref().map(|runs| ("as given", runs)));
+    runs.extend(found.runs.as_deref().map(|runs| (after_label(found), runs)));
+    let ladder = ladder_picture(&found.diagnosis, set);
+    let falling = (found.diagnosis.ladder.len() > 1).then_some(ladder.as_str());
+    lead(report, &found.answer, falling, &records, &runs)
+}
+
+/// What the final model of a diagnosis is called.
+fn after_label(found: &Finding) -> &'static str {
+    match found.diagnosis.missing.is_empty() {
+        true => "as diagnosed",
+        false => "with what was missing",
+    }
+}
+
+/// Everything else of a diagnosis, in sections.
+pub(crate) fn finding_details(
+    report: &mut Report,
+    given: &Model,
+    set: &DataSet,
+    found: &Finding,
+    worst: Option<Stretch>,
+) {
+    report_candidates(report, found);
+    // A model whose free run diverges has neither scores nor pictures.
+    let (Some(failures), Some(runs)) = (&found.failures, &found.runs) else {
+        return;
+    };
+    report_failures(report, failures);
+    // The bars are of the model as given.
+    let records = given.targets(&set.records);
+    let before = found.runs_before.as_deref().unwrap_or(runs);
+    let samples = failures.samples(&records, before, given.longest_delay());
+    report_climb(
+        report,
+        &records,
+        found,
+        Some((failures, samples.as_slice())),
+        worst,
+    );
+    let mut tested = Vec::new();
+    tested.extend(found.runs_before.as_deref().map(|runs| Run {
+        label: "as given",
+        model: given,
+        runs,
+    }));
+    if found.model != *given {
+        tested.push(Run {
+            label: after_label(found),
+            model: &found.model,
+            runs,
+        });
+    }
+    checks(report, &records, &tested);
+    report.section("Every record");
+    report.paragraph(&describe(&found.model));
+    report_scores(report, &found.scores);
 }
 
 /// The page of a discovery beside `given`.
 pub(crate) fn discovery(given: &Model, set: &DataSet, found: &Terms, command: &str) -> String {
     let mut report = Report::new("Discovery", title(set));
-    report_discovery(&mut report, &given.targets(&set.records), found);
+    let records = given.targets(&set.records);
+    let worst = discovery_lead(&mut report, &records, found);
+    discovery_details(&mut report, given, &records, found, worst);
     provenance(&mut report, set, 0, command);
     report.html()
 }
 
-/// What was found on `records`, with its curves, and the runs before and after.
-pub(crate) fn report_discovery(report: &mut Report, records: &[Record], found: &Terms) {
-    let terms = &found.discovery.terms;
-    let tone = if terms.is_empty() {
-        Tone::Warning
-    } else {
-        Tone::Finding
+/// The first screen of a discovery: answer, curve of the first term, the worst stretch before and after.
+pub(crate) fn discovery_lead(
+    report: &mut Report,
+    records: &[Record],
+    found: &Terms,
+) -> Option<Stretch> {
+    let curve = found.discovery.terms.first().map(term_picture);
+    let runs = discovery_runs(found);
+    lead(report, &found.answer, curve.as_deref(), records, &runs)
+}
+
+fn discovery_runs(found: &Terms) -> Vec<(&str, &[Vec<f64>])> {
+    let mut runs: Vec<(&str, &[Vec<f64>])> = Vec::new();
+    if let Some(before) = &found.runs_before {
+        runs.push(("as given", before));
+    }
+    let label = match found.discovery.terms.is_empty() {
+        true => "unchanged",
+        false => "with the terms",
     };
-    report.verdict(tone, &found.headline, &found.meaning);
-    report.section("Held-out error, step by step");
+    runs.push((label, &found.runs));
+    runs
+}
+
+/// Everything else of a discovery, in sections.
+pub(crate) fn discovery_details(
+    report: &mut Report,
+    given: &Model,
+    records: &[Record],
+    found: &Terms,
+    worst: Option<Stretch>,
+) {
+    report.section("Validation error, step by step");
     report.table("", &LADDER, &ladder_rows(&found.discovery.ladder));
-    for term in terms {
+    for term in &found.discovery.terms {
         report.section(&format!("{} by {}", term.changes, term.coordinate));
         report.figure(
             &term_picture(term),
-            "The curve that was fitted with everything else, in straight lines between its points.",
+            "The curve was fitted together with all other parameters; it is linear between its points.",
         );
-        report.paragraph("The effect file that the term makes:");
+        report.fold("The effect file of this term");
         report.code(&term.file);
+        report.end_fold();
     }
     if let Some(separation) = &found.discovery.separation {
-        report.section("How to tell it from what is like it");
+        report.section("Experiment that distinguishes the models");
         report.figure(&experiment_picture(separation), &separation.words());
     }
     if let Some(trace) = &found.discovery.trace {
         report_trace(report, trace);
     }
-    report.section("The model with the terms");
+    let runs = discovery_runs(found);
+    report_runs(report, records, &runs, None, worst);
+    let models = [given, &found.model];
+    let first = models.len() - runs.len().min(models.len());
+    let tested: Vec<Run<'_>> = runs
+        .iter()
+        .zip(&models[first..])
+        .map(|((label, runs), model)| Run { label, model, runs })
+        .collect();
+    checks(report, records, &tested);
+    report.section("Every record");
     report.paragraph(&describe(&found.model));
     report_scores(report, &found.scores);
-    let mut all: Vec<(&str, &[Vec<f64>])> = Vec::new();
-    if let Some(before) = &found.runs_before {
-        all.push(("as given", before));
+}
+
+/// The first screen of a page: the answer with a picture beside it, and the stretch where the first of `runs` errs most.
+pub(crate) fn lead(
+    report: &mut Report,
+    answer: &Answer,
+    picture: Option<&str>,
+    records: &[Record],
+    runs: &[(&str, &[Vec<f64>])],
+) -> Option<Stretch> {
+    let worst = runs
+        .first()
+        .and_then(|(_, runs)| worst_stretch(records, runs));
+    report.columns().cell();
+    card(report, answer);
+    if let Some(picture) = picture {
+        report.figure(picture, "");
     }
-    all.push(("with the terms", &found.runs));
-    report_runs(report, records, &all, None);
+    report.end_columns();
+    if let Some(worst) = worst {
+        stretch_picture(report, records, runs, worst);
+    }
+    report.end_columns();
+    worst
 }
 
 /// The page of a law for `model` that was tried in the loop.
 pub(super) fn law(model: &Model, tried: &Tried, tracks: bool, command: &str) -> String {
-    let mut report = Report::new("A law for the valve", &describe(model));
+    let mut report = Report::new("Control law", &describe(model));
+    report.columns();
+    card(&mut report, &tried.answer());
+    report.figure(
+        &proof_picture(&tried.proof, tracks),
+        "In the loop with the model as the plant and a noisy sensor.",
+    );
+    report.end_columns();
     report.section("The law");
     for line in tried.design.words().lines() {
         report.paragraph(line);
     }
-    if !tried.not_tried.is_empty() {
-        report.list(&tried.not_tried);
-    }
-    if let Some(proof) = &tried.proof {
-        report.section("In the loop");
+    if let Some(margin) = &tried.margin {
+        report.section("Robustness margin");
         report.figure(
-            &proof_picture(proof, tracks),
-            "On the physical plant that the model resembles most, seen through a noisy sensor.",
+            &margin_picture(margin),
+            "Inside each contour attachment is kept and the rms error stays within twice that on the model.",
         );
-        report.section("Every trial");
-        report.code(&proof.words());
+        report.paragraph(&margin.words());
+        report.paragraph("The region comes from seeded simulations, not from a Lyapunov function: it is no proof of stability.");
     }
+    report.section("Every trial");
+    report.code(&tried.proof.words());
     report.provenance("tool", concat!("host-fit ", env!("CARGO_PKG_VERSION")));
     report.provenance("command", command);
     report.provenance("data", &model.training.data_hash);
@@ -231,10 +386,10 @@ fn report_trace(report: &mut Report, trace: &Trace) {
     let Some((index, entry)) = likeliest else {
         return;
     };
-    report.section("The trace of what is missing");
+    report.section("Trace of the unexplained error");
     report.paragraph(&format!(
-        "The signal at the {} that would explain the misfit of the best base without a term, whatever it depends on: lay it \
-         beside what else was measured that day. `--trace trace.csv` writes it, with those at the other places.",
+        "The signal at the {} that would explain the error of the base model, whatever it depends on. Compare it with other \
+         measurements of that day; `--trace trace.csv` writes it for every place.",
         entry.place().word()
     ));
     for record in trace.records.iter().rev().take(TRACED_RECORDS) {
@@ -298,7 +453,7 @@ const LADDER: [Column<'_>; 4] = [
     Column::Text("step"),
     Column::Number("RMSE"),
     Column::Number("FIT, %"),
-    Column::Number("noise floor"),
+    Column::Number("noise"),
 ];
 
 fn title(set: &DataSet) -> &str {
@@ -311,8 +466,14 @@ pub(crate) fn report_runs(
     records: &[Record],
     runs: &[(&str, &[Vec<f64>])],
     lit: Option<(&Failures, &[Vec<Stretches>])>,
+    view: Option<Stretch>,
 ) {
-    report.living(&living(records, runs, lit));
+    report.section("Record by record");
+    let mut living = living(records, runs, lit);
+    if let Some(view) = view {
+        living.view(view.from, view.to);
+    }
+    report.living(&living);
 }
 
 /// Measurement and free runs of a diagnosis, record by record: the model as given, the one that it ends in, and, once they are
@@ -322,7 +483,9 @@ pub(crate) fn report_climb(
     records: &[Record],
     found: &Finding,
     lit: Option<(&Failures, &[Vec<Stretches>])>,
+    view: Option<Stretch>,
 ) {
+    report.section("Record by record");
     let (ladder, last) = (&found.diagnosis.ladder, &found.diagnosis.model);
     let steps: Vec<(&str, Vec<Vec<f64>>)> = ladder
         .iter()
@@ -337,23 +500,22 @@ pub(crate) fn report_climb(
     let mut runs: Vec<(&str, &[Vec<f64>])> = Vec::new();
     let before = found.runs_before.as_deref();
     runs.extend(before.map(|before| ("as given", before)));
+    // Before the steps between, so that a model has the same colour in every picture.
+    let after = found.runs.as_deref();
+    runs.extend(after.map(|after| (after_label(found), after)));
     let first = runs.len();
     let shown = steps[skipped..].iter();
     runs.extend(shown.map(|(step, runs)| (*step, runs.as_slice())));
     let between = first..runs.len();
-    if let Some(after) = &found.runs {
-        let label = match found.diagnosis.missing.is_empty() {
-            true => "as diagnosed",
-            false => "with what was missing",
-        };
-        runs.push((label, after));
-    }
     let mut living = living(records, &runs, lit);
     living.off(between);
+    if let Some(view) = view {
+        living.view(view.from, view.to);
+    }
     report.living(&living);
 }
 
-/// How many steps of a ladder a page can carry as curves: it is to weigh less than 5 MB, and six lines can be told apart.
+/// How many steps of a ladder a page can carry as curves: it is to weigh less than 5 MB, and six lines can be distinguished.
 fn most_steps(records: &[Record]) -> usize {
     const SAMPLES: usize = 320_000;
     let samples: usize = records.iter().map(Record::len).sum();
@@ -367,7 +529,7 @@ pub(super) fn living(
     lit: Option<(&Failures, &[Vec<Stretches>])>,
 ) -> Living {
     let role = |record: &Record| role_name(record.role).to_owned();
-    let mut living = Living::new("friction gain y", records, runs, role);
+    let mut living = Living::new("y", records, runs, role);
     if let Some((failures, samples)) = lit {
         for (found, places) in failures.by.iter().zip(samples) {
             let name = found.coordinate.to_string();
@@ -404,50 +566,47 @@ fn report_failures(report: &mut Report, failures: &Failures) {
     }
     report.bars(
         &failures_picture(failures),
-        "Each panel splits the same error by one coordinate. A bar lights up its samples in the records below; the sample that \
-         is read there marks its bars.",
+        "Each panel splits the same error by one coordinate. Click a bar to mark its samples in the records below.",
     );
 }
 
 pub(super) fn failures_picture(failures: &Failures) -> String {
     host_fit::picture::where_it_fails(&WhereItFails {
-        title: "Error of the free run on the held-out records",
+        title: "Error of the free run on the validation records",
         y_label: "rms error, y",
         views: &failures.views(),
     })
 }
 
-/// The sections of a report that tell a diagnosis.
-pub(crate) fn report_finding(report: &mut Report, set: &DataSet, found: &Finding) {
+/// The sections of a diagnosis that list its steps and candidates.
+fn report_candidates(report: &mut Report, found: &Finding) {
     let diagnosis = &found.diagnosis;
-    let tone = match diagnosis.verdict {
-        Verdict::NothingMissing => Tone::Good,
-        Verdict::EffectMissing => Tone::Finding,
-        Verdict::PartlyExplained | Verdict::Unexplained => Tone::Warning,
-    };
-    report.verdict(tone, &found.headline, &found.meaning);
-    report.section("Held-out error, step by step");
-    report.figure(
-        &ladder_picture(diagnosis, set),
-        "Root mean square error of the free run on the held-out records.",
-    );
+    report.section("Validation error, step by step");
     report.table("", &LADDER, &ladder_rows(&diagnosis.ladder));
     if !diagnosis.ranking.is_empty() {
-        report.section("Every effect, refitted alone");
-        report.figure(&ranking_picture(diagnosis), "");
+        report.section("Candidates");
+        report.figure(
+            &ranking_picture(diagnosis),
+            "Each effect alone, refitted with everything else.",
+        );
         report.table(
-            "By chance: the best that time-shifted and swapped copies of the effect's contribution achieved. \
-             p is corrected for the number of effects tried (Holm).",
+            "p is family-wise: it is corrected for all candidates. 5 % level: the fall that one \
+             search of twenty reaches on noise. Screened only: the first-order estimate was too small to refit.",
             &[
                 Column::Text("effect"),
-                Column::Text("counts"),
+                Column::Text("outcome"),
                 Column::Number("error falls"),
-                Column::Number("by chance"),
+                Column::Number("5 % level"),
                 Column::Number("p"),
                 Column::Text("parameters (95 % interval)"),
             ],
-            &ranking_rows(&diagnosis.ranking),
+            &ranking_rows(diagnosis),
         );
+    }
+    if !found.detectable.is_empty() {
+        report.section("What would have been found");
+        let lines: Vec<&str> = found.detectable.iter().map(|d| d.words.as_str()).collect();
+        report.list(&lines);
     }
     if !diagnosis.not_tried.is_empty() {
         report.section("Not tried");
@@ -460,7 +619,7 @@ pub(crate) fn report_finding(report: &mut Report, set: &DataSet, found: &Finding
     }
 }
 
-/// Every candidate's held-out error.
+/// Every candidate's validation error.
 pub(super) fn ranking_picture(diagnosis: &Diagnosis) -> String {
     let base = diagnosis
         .ladder
@@ -475,12 +634,18 @@ pub(super) fn ranking_picture(diagnosis: &Diagnosis) -> String {
             low: f64::NAN,
             high: f64::NAN,
             accepted: diagnosis.missing.contains(&r.effect),
-            note: if r.significant { "" } else { "not significant" },
+            note: match r.significant || diagnosis.missing.contains(&r.effect) {
+                true => "",
+                false if !r.refitted => "screened only",
+                false if r.p_value > RULES.level => "not significant",
+                false => "below the practical margin",
+            },
         }
     };
-    let candidates: Vec<Candidate<'_>> = diagnosis.ranking.iter().map(candidate).collect();
+    let candidates: Vec<Candidate<'_>> =
+        named_first(diagnosis).into_iter().map(candidate).collect();
     ranking(&Ranking {
-        title: "Held-out error with each effect",
+        title: "Validation error with each effect",
         y_unit: "y",
         candidates: &candidates,
         base_rmse: base,

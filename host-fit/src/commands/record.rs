@@ -15,7 +15,7 @@ use super::words::Words;
 use super::{Console, interrupt};
 use crate::rig_port::PortArgs;
 
-/// Have the board at the rig play commands, and write every sample: raw recordings that `average` reads.
+/// Play commands with the board and record every sample: raw recordings that `average` reads.
 ///
 /// The valve is shut at the end, on any fault, and when the link breaks. Repeats of which a sample was lost, or in
 /// which the link broke, are played again: what is written came whole, each repeat from rest. With `--calibrate` the
@@ -32,7 +32,7 @@ pub(crate) struct Args {
     )]
     command: Vec<PathBuf>,
     /// How often each command is played.
-    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     repeats: u32,
     /// How long the valve has been shut at least when a repeat begins, in seconds: the flow must have come to rest.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.5, value_parser = not_negative)]
@@ -50,11 +50,12 @@ pub(crate) struct Args {
     /// per count.
     #[arg(long, value_name = "NAME,UNIT,ZERO,PER_COUNT", requires = "calibrate", value_parser = said)]
     channel: Option<ChannelSaid>,
-    /// With `--calibrate`: how long steady flow is waited for, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 4.0, value_parser = positive, requires = "calibrate")]
-    steady: f64,
+    /// With `--calibrate`: how long steady flow is waited for, in seconds [default: 4, or 1000 samples where that is
+    /// longer].
+    #[arg(long, value_name = "SECONDS", value_parser = positive, requires = "calibrate")]
+    steady: Option<f64>,
     /// With `--calibrate`: pulses of each length that is tried; fewer see short ones less surely.
-    #[arg(long, value_name = "COUNT", default_value_t = 24, value_parser = clap::value_parser!(u32).range(3..), requires = "calibrate")]
+    #[arg(long, value_name = "COUNT", default_value_t = 24, value_parser = clap::value_parser!(u32).range(3..=10_000), requires = "calibrate")]
     pulses: u32,
     /// Take note of a latched fault, or disarm the law, first.
     #[arg(long)]

@@ -5,7 +5,6 @@ use rig_line::RigFile;
 
 /// The constants as Rust: plain numbers, for the firmware's `identified::rig`.
 pub(crate) fn rust(rig: &RigFile) -> String {
-    let [on, off] = rig.hold_samples();
     let sensor = &rig.sensor;
     let mut text = format!(
         "//! Constants of a rig. Generated from its rig.toml; measure the rig anew instead.\n\n\
@@ -15,18 +14,20 @@ pub(crate) fn rust(rig: &RigFile) -> String {
          pub const PER_COUNT: f32 = {:?};\n\
          /// Readings at or beyond these are at a rail, counts.\n\
          pub const RAILS: [f32; 2] = [{:?}, {:?}];\n\
-         /// Equal readings in a row that mean a stuck sensor.\n\
-         pub const STUCK_AFTER: u32 = {};\n\
+         /// How long equal readings in a row come before the sensor is stuck, s.\n\
+         pub const STUCK_AFTER_S: f32 = {:?};\n\
          /// Largest residual, averaged over about 64 samples, y.\n\
          pub const RESIDUAL_ENVELOPE: f32 = {:?};\n\
-         /// The valve's shortest times open and shut, samples.\n\
-         pub const SHORTEST: [u32; 2] = [{on}, {off}];\n",
+         /// The valve's shortest times open and shut, s.\n\
+         pub const SHORTEST_S: [f32; 2] = [{:?}, {:?}];\n",
         sensor.zero_counts as f32,
         sensor.per_count as f32,
         sensor.lower_rail_counts as f32,
         sensor.upper_rail_counts as f32,
-        sensor.stuck_after_samples,
+        (f64::from(sensor.stuck_after_samples) * rig.sample_period_s) as f32,
         rig.residual_envelope as f32,
+        rig.valve.shortest_on_s as f32,
+        rig.valve.shortest_off_s as f32,
     );
     text.push_str(
         "/// The measured channel: counts of 0, units per count, rails in counts; `None` if it was not measured.\n",
@@ -46,18 +47,27 @@ pub(crate) fn rust(rig: &RigFile) -> String {
     text
 }
 
+/// Says whether `rig` was measured at the period of `model`: its noise is of averages over so many samples.
+///
+/// # Errors
+/// Both periods, the key of both files, and what to do.
+pub(crate) fn same_period(rig: &RigFile, model: &Model) -> Result<(), String> {
+    if model.is_sampled_at(rig.sample_period_s) {
+        return Ok(());
+    }
+    Err(format!(
+        "`sample_period_s`: the rig was measured at {} s and the model is for {} s; calibrate with the board at the \
+         model's period, or identify at the rig's",
+        rig.sample_period_s, model.sample_period_s
+    ))
+}
+
 /// Says whether `model` can run at `rig`.
 ///
 /// # Errors
 /// What contradicts what, with the keys of both files and what to do.
 pub(crate) fn fits(rig: &RigFile, model: &Model) -> Result<(), String> {
-    if !model.is_sampled_at(rig.sample_period_s) {
-        return Err(format!(
-            "`sample_period_s`: the rig was measured at {} s and the model is for {} s; calibrate with the board at the \
-             model's period, or identify at the rig's",
-            rig.sample_period_s, model.sample_period_s
-        ));
-    }
+    same_period(rig, model)?;
     let sensor = &rig.sensor;
     let ends = [sensor.lower_rail_counts, sensor.upper_rail_counts].map(|c| rig.friction(c));
     let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
@@ -210,7 +220,8 @@ mod tests {
         for line in [
             "pub const ZERO: f32 = 800.0;",
             "pub const PER_COUNT: f32 = 0.0005;",
-            "pub const SHORTEST: [u32; 2] = [20, 20];",
+            "pub const STUCK_AFTER_S: f32 = 0.5;",
+            "pub const SHORTEST_S: [f32; 2] = [0.02, 0.02];",
             "pub const CHANNEL: Option<[f32; 4]> = None;",
         ] {
             assert!(text.contains(line), "{text}");

@@ -9,7 +9,7 @@ use host_fit::steps;
 
 use super::Console;
 
-/// Run a model free over a command sequence, and write t,u,y.
+/// Simulate a model in free run over a command sequence, and write t,u,y.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The model.

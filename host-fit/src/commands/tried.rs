@@ -1,19 +1,25 @@
 //! A designed law and what came of trying it in the loop.
 
-use host_fit::design::Proof;
-use host_fit::steps::Design;
+use host_fit::design::{Margin, Proof};
+use host_fit::picture::significant;
+use host_fit::steps::{Answer, Design, DesignOutcome, TargetVerdict, Tone};
 use serde::Serialize;
 
 use super::words::Words;
 
-/// A law and how it did on the simulated plants.
+/// A law and how it did in the loop.
 #[derive(Serialize)]
 pub(super) struct Tried {
     #[serde(flatten)]
     pub(super) design: Design,
     #[serde(flatten)]
-    pub(super) proof: Option<Proof>,
-    /// What the plants are without, one sentence each.
+    pub(super) proof: Proof,
+    /// How wrong the model may be; none for pulses.
+    pub(super) margin: Option<Margin>,
+    /// Which other targets pass, where this one does not.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) targets: Vec<TargetVerdict>,
+    /// What the trials are without, one sentence each.
     pub(super) not_tried: Vec<String>,
 }
 
@@ -23,20 +29,115 @@ impl Tried {
         let lost = self.design.law.lost();
         (!lost.is_empty()).then(|| {
             format!(
-                "the law was not written: it loses attachment with {}. Choose a target that is further inside of what can \
-                 be held, or find out whether the rig has that and `extend` the model; {switch} writes the law as it is, and \
-                 the file says so",
-                lost.join(", ")
+                "the law was not written: it loses attachment on plants that are consistent with the records: {}. {} {switch} \
+                 writes it anyway, with a note in the file",
+                few(lost),
+                self.next_step()
             )
         })
     }
+
+    /// What to do about a refusal.
+    fn next_step(&self) -> String {
+        let passing: Vec<String> = self
+            .targets
+            .iter()
+            .filter(|target| target.passes)
+            .map(|target| target.target.to_string())
+            .collect();
+        if self.targets.is_empty() {
+            "Record more varied commands, and identify again.".to_owned()
+        } else if passing.is_empty() {
+            "No target in the reachable interval passes: record more varied commands, and identify again."
+                .to_owned()
+        } else {
+            format!("Targets that pass: {}.", passing.join(", "))
+        }
+    }
+
+    /// The answer: whether the law keeps attachment, in which trials, within which margin.
+    pub(super) fn answer(&self) -> Answer {
+        let verdict = self.verdict();
+        let mut lines = verdict.lines();
+        let evidence = lines.next().unwrap_or_default();
+        // Of a law that holds a level: how it does on the model without noise.
+        let tracks = matches!(self.design.outcome, DesignOutcome::Track(_));
+        let model = self.proof.cases.first().filter(|_| tracks);
+        let settles = model.is_none_or(|case| case.figures.settling_s.is_some());
+        let (tone, said) = match (self.proof.lost().is_empty(), settles) {
+            (true, true) => (Tone::Good, "the law keeps attachment"),
+            (true, false) => (
+                Tone::Warning,
+                "the law keeps attachment, but does not settle at the target",
+            ),
+            (false, _) => (Tone::Warning, "the law loses attachment"),
+        };
+        let on_the_model = model.map_or_else(String::new, |case| {
+            let figures = &case.figures;
+            format!(
+                " On the model: mean y {}, rms error {}, {:.1} switches/s.",
+                significant(figures.mean, 3),
+                significant(figures.rms, 3),
+                figures.switches_per_s
+            )
+        });
+        let margin = self.margin.as_ref().map(Words::words);
+        let mut answer = Answer::new(tone, said)
+            .evidence(format!("{}.{on_the_model}", capitalised(evidence)))
+            .confidence(margin.map_or_else(String::new, |margin| {
+                format!("{}.", capitalised(margin.trim_end_matches('.')))
+            }))
+            .next("host-fit codegen controlled.toml -o identified.rs");
+        for line in lines.chain(self.not_tried.iter().map(String::as_str)) {
+            answer.note(line);
+        }
+        answer
+    }
+
+    /// What the trials come to, in two sentences.
+    pub(super) fn verdict(&self) -> String {
+        let decide = self.proof.cases.iter().filter(|case| case.group.decides());
+        let (decide, lost) = (decide.count(), self.proof.lost());
+        let mut text = if lost.is_empty() {
+            format!("attachment is kept in all {decide} deciding trials")
+        } else {
+            format!(
+                "attachment is lost in {} of {decide} deciding trials: {}",
+                lost.len(),
+                few(&lost)
+            )
+        };
+        let beyond = self.proof.lost_beyond_the_records();
+        if !beyond.is_empty() {
+            text.push_str(&format!(
+                "\nwarning: outside what is consistent with the records, attachment is lost with {}",
+                few(&beyond)
+            ));
+        }
+        text
+    }
+}
+
+/// A sentence with a capital letter.
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string());
+    first.unwrap_or_default() + letters.as_str()
+}
+
+/// The first of many names, and how many more there are.
+fn few(names: &[String]) -> String {
+    const SHOWN: usize = 4;
+    let mut text = names[..names.len().min(SHOWN)].join("; ");
+    if names.len() > SHOWN {
+        text.push_str(&format!("; and {} more", names.len() - SHOWN));
+    }
+    text
 }
 
 impl Words for Tried {
     fn words(&self) -> String {
-        let notes = self.not_tried.iter().map(|why| format!("note: {why}"));
-        let told = std::iter::once(self.design.words()).chain(notes);
-        let told = told.chain(self.proof.as_ref().map(Words::words));
-        told.collect::<Vec<_>>().join("\n")
+        let answer = format!("{}\n", self.answer().words());
+        [answer, self.design.words(), self.proof.words()].join("\n")
     }
 }

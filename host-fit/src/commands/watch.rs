@@ -15,16 +15,17 @@ use super::words::Words;
 use super::{Console, interrupt};
 use crate::rig_port::PortArgs;
 
-/// Watch the law at work: a live line, a log that `compare` and `diagnose` read, and whether the model is still true.
+/// Watch the law at work: a live line, a log that `compare` and `diagnose` read, and whether the model still fits.
 ///
 /// The residual (reading minus the model, which runs free beside the loop) is averaged over blocks, and each block
-/// judged against the first ones; the chance of any false alarm on a day of 8 hours is what is stated. The log begins
+/// judged against the first ones; the chance of any false alarm on a day of 8 hours is set by --false-alarms. The log begins
 /// at rest, and ends where a sample was lost: a record needs its whole history.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
     port: PortArgs,
-    /// Let the law have the valve after a second of rest, and shut it in the end; without it the loop is watched as it is.
+    /// Let the law switch the valve after a second of rest, and close it at the end; without this option the loop is only
+    /// observed.
     #[arg(long)]
     arm: bool,
     /// How long, in seconds; until Ctrl-C if not given.
@@ -36,11 +37,11 @@ pub(crate) struct Args {
     /// Longest log, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = positive)]
     log: f64,
-    /// Length of a block, in seconds; many times what the noise remembers.
-    #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = positive)]
+    /// Length of a block, in seconds; several correlation times of the noise.
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = block)]
     block: f64,
-    /// Blocks that say what is usual.
-    #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(3..))]
+    /// Blocks of the baseline.
+    #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(3..=10_000))]
     learn: u32,
     /// Chance of a false alarm on a day of 8 hours.
     #[arg(long, value_name = "CHANCE", default_value_t = 0.01, value_parser = positive)]
@@ -51,6 +52,14 @@ pub(crate) struct Args {
     /// Take note of a latched fault, or disarm the law, first.
     #[arg(long)]
     disarm: bool,
+}
+
+/// A block of at most a day, of which the false alarms are stated.
+fn block(text: &str) -> Result<f64, String> {
+    match positive(text)? {
+        seconds if (1e-6..=DAY_S).contains(&seconds) => Ok(seconds),
+        _ => Err(format!("a time from 1e-6 to {DAY_S} s is needed")),
+    }
 }
 
 impl Words for Watched {

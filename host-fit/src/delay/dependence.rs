@@ -8,22 +8,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::law::{DelayPoint, best_rate, rate_grid};
 use super::rules::RULES;
 use super::spread::{Spread, spread};
-
-/// Whether the data bear the law out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum DelayVerdict {
-    /// The delay depends on ỹ as the law says.
-    StateDependent,
-    /// No dependence on anything: a fixed delay is enough.
-    Fixed,
-    /// Rising and falling edges differ, and ỹ explains nothing beyond: see the effect `edge-dependent-delay`.
-    EdgeDependent,
-    /// Rising and falling edges differ, and within a direction the delay depends on ỹ too.
-    EdgeAndStateDependent,
-    /// Too few edges could be measured to say.
-    TooFewEdges,
-}
+use super::verdict::DelayVerdict;
 
 /// The three questions put to the points.
 #[derive(Debug, Clone, Copy, Default)]
@@ -206,7 +191,12 @@ fn permutation_test(points: &[DelayPoint], within: bool, seed: u64) -> Option<f6
     Some((as_good + 1) as f64 / (RULES.shuffles + 1) as f64)
 }
 
-pub(super) fn words(verdict: DelayVerdict, tests: &Tests, points: &[DelayPoint]) -> String {
+pub(super) fn words(
+    verdict: DelayVerdict,
+    tests: &Tests,
+    points: &[DelayPoint],
+    law_not_kept: Option<&str>,
+) -> String {
     let (_, up, down) = by_direction(points);
     let all: Vec<f64> = points.iter().map(|p| p.delay).collect();
     let all = spread(&all);
@@ -224,14 +214,22 @@ pub(super) fn words(verdict: DelayVerdict, tests: &Tests, points: &[DelayPoint])
     };
     match verdict {
         DelayVerdict::TooFewEdges => format!(
-            "Only {} edge(s) of the identify records could be measured; at least 8 are needed to say whether the delay depends on the flow. Record more switching, or use a fixed delay.",
-            all.count
+            "{} edge(s) of the identify records could be measured; at least {} are needed to say whether the delay depends on the flow. Use a fixed delay, or record more switching.",
+            all.count, RULES.tested_edges
         ),
         DelayVerdict::Fixed => format!(
-            "The law is not supported by these data: over the range of the averaged output the delay changes by {:.1} samples (p {}), no more than chance or rounding. A fixed delay of {:.1} samples (sd {:.1}) describes it.",
-            tests.change.abs(),
-            p(tests.law),
+            "The law is not supported by these data: {}. A fixed delay of {:.1} samples (scatter of {} edges {:.1}) describes it.",
+            match law_not_kept {
+                Some(reason) if tests.law.is_some_and(|p| p < RULES.significant) =>
+                    reason.to_owned(),
+                _ => format!(
+                    "over the range of the averaged output the delay changes by {:.1} samples (p {}), no more than chance or rounding",
+                    tests.change.abs(),
+                    p(tests.law)
+                ),
+            },
             all.mean,
+            all.count,
             all.sd
         ),
         DelayVerdict::EdgeDependent => format!(

@@ -73,7 +73,7 @@ mod tests {
         let set = DataSet::from_records(None, vec![empty]).unwrap();
         let study = study_delays(&set, &DelayOptions::default()).unwrap();
         assert!(draw_delays(&study, "none", 0.001).starts_with("<svg"));
-        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/ramp-cfd");
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/hidden-ramp");
         let set = DataSet::load(&folder).unwrap();
         let study = study_delays(&set, &DelayOptions::default()).unwrap();
         let svg = draw_delays(&study, "ramp", 0.001);

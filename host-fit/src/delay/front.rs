@@ -27,6 +27,8 @@ pub(crate) struct Expectation {
     gain_sign: f64,
     /// Samples of y used on either side of an arrival.
     pub(crate) reach: usize,
+    /// Longest delay that is looked for, samples.
+    pub(crate) max_delay: usize,
 }
 
 impl Expectation {
@@ -118,6 +120,7 @@ pub(crate) fn expect(
         falling: falling.or(rising)?,
         gain_sign,
         reach,
+        max_delay,
     })
 }
 

@@ -8,6 +8,7 @@
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::rules::RULES;
+use super::verdict::DelayVerdict;
 use crate::linalg;
 
 /// One point of the law: averaged output (1) at the response, delay in samples.
@@ -84,6 +85,71 @@ impl DelayLawFit {
             (middle - half, middle + half)
         } else {
             (f64::NEG_INFINITY, f64::INFINITY)
+        }
+    }
+}
+
+impl DelayLawFit {
+    /// h̃ at the lowest less h̃ at the highest ỹ of the fit, samples, with its standard error. ỹ below 0 counts as 0.
+    #[must_use]
+    pub fn change(&self) -> (f64, f64) {
+        let (low, high) = (self.range.0.max(0.0), self.range.1.max(0.0));
+        let ends = [low, high].map(|y| gradient(self.p1.value, self.p2.value, y));
+        let slope: Vec<f64> = ends[0].iter().zip(&ends[1]).map(|(a, b)| a - b).collect();
+        let variance: f64 = self
+            .covariance
+            .iter()
+            .zip(&slope)
+            .flat_map(|(row, a)| row.iter().zip(&slope).map(move |(c, b)| a * b * c))
+            .filter(|term| !term.is_nan())
+            .sum();
+        (self.at(low) - self.at(high), variance.max(0.0).sqrt())
+    }
+
+    /// Why the law is not to be used although it was fitted, if there is a reason. `data` are the smallest and the
+    /// largest ỹ of all samples, `longest` is the longest delay that was looked for.
+    pub(crate) fn objection(
+        &self,
+        verdict: DelayVerdict,
+        data: (f64, f64),
+        longest: f64,
+    ) -> Option<String> {
+        let ends = [self.at(data.0), self.at(data.1)];
+        let least = ends[0].min(ends[1]);
+        let most = ends[0].max(ends[1]);
+        let (change, standard_error) = self.change();
+        let range = format!("ỹ from {:.3} to {:.3}", self.range.0, self.range.1);
+        if least.is_nan() || least < 0.0 {
+            return Some(format!(
+                "it is {least:.1} samples at an ỹ of these data, and a delay cannot be below 0"
+            ));
+        }
+        if most > longest {
+            return Some(format!(
+                "it is {most:.3e} samples at an ỹ of these data, and delays up to {longest:.0} were looked for"
+            ));
+        }
+        let error = self.quantile * standard_error;
+        if error.is_nan() || change.abs() <= error {
+            let change = change.abs();
+            return Some(if standard_error.is_finite() {
+                format!("it changes by {change:.1} ± {standard_error:.1} samples over {range}")
+            } else {
+                format!("its change of {change:.1} samples over {range} is not determined")
+            });
+        }
+        match verdict {
+            DelayVerdict::StateDependent | DelayVerdict::EdgeAndStateDependent => None,
+            DelayVerdict::Fixed => Some(format!(
+                "a constant describes the delays as well over {range} (permutation test)"
+            )),
+            DelayVerdict::EdgeDependent => Some(
+                "one delay for each direction of the edge describes the delays as well".to_owned(),
+            ),
+            DelayVerdict::TooFewEdges => Some(format!(
+                "{} edges are too few to test it against a constant",
+                self.edges
+            )),
         }
     }
 }

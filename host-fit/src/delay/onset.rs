@@ -115,7 +115,9 @@ impl<'a> Neighbourhood<'a> {
             from,
             to,
             first_arrival: first.max((from + left) as f64).max(self.edge.sample as f64),
-            last_arrival: last.min(to as f64 - 1.0 - RULES.least_side as f64),
+            last_arrival: last
+                .min(to as f64 - 1.0 - RULES.least_side as f64)
+                .min((self.edge.sample + self.expected.max_delay) as f64),
         };
         let room =
             to >= from + 2 * RULES.least_side + 4 && stretch.last_arrival > stretch.first_arrival;
@@ -171,7 +173,13 @@ impl<'a> Neighbourhood<'a> {
         Ok(Onset {
             delay: best.arrival - edge,
             standard_error: best.standard_error,
-            half_response: half_response(self.y, &best, self.latest).map(|t| t - edge),
+            half_response: half_response(
+                self.y,
+                best.arrival,
+                best.level,
+                self.latest.min(near + RULES.response * reach),
+            )
+            .map(|t| t - edge),
         })
     }
 }
@@ -425,16 +433,16 @@ fn widening(residual: &[f64]) -> f64 {
 }
 
 /// Time at which y (mean of 5 samples) first passes half of its way from the level at the arrival to the level it has
-/// when the next response comes, or after [`Rules::response`](super::Rules).
-fn half_response(y: &[f64], at: &Located, latest: usize) -> Option<f64> {
-    let start = at.arrival.round().max(0.0) as usize;
-    let end = latest.min(start + RULES.response);
+/// before `end`.
+pub(crate) fn half_response(y: &[f64], arrival: f64, level: f64, end: usize) -> Option<f64> {
+    let start = arrival.round().max(0.0) as usize;
+    let end = end.min(y.len());
     let tail = y.get(start + (end.saturating_sub(start)) * 2 / 3..end)?;
     if tail.len() < RULES.least_side {
         return None;
     }
-    let half = (at.level + mean(tail)) / 2.0;
-    let upward = mean(tail) > at.level;
+    let half = f64::midpoint(level, mean(tail));
+    let upward = mean(tail) > level;
     let smooth = |k: usize| y.get(k.saturating_sub(2)..k + 3).map(mean);
     let mut last = smooth(start)?;
     for k in start + 1..end {

@@ -10,6 +10,20 @@ rules! {
     detection: f64 = 25.0, "noise variances", "convention: five standard deviations";
     /// A delay with a larger standard error counts as not measured.
     worst_error: f64 = 5.0, "samples", "judgement: a tenth of the paper's delays";
+    /// Where the time constants are known, one with a standard error beyond this share of them counts as not measured.
+    worst_share: f64 = 0.25, "share of the sum of time constants", "judgement: a quarter of a response";
+    /// A change of a graded command by less than this is no edge.
+    smallest_edge: f64 = 0.05, "share of the range of u", "judgement: a twentieth of the largest response";
+    /// One plant describes the records when it leaves no more than this of the spread of y beyond the noise.
+    plant_fits: f64 = 0.06, "share of the spread of y", "calibrated on data/ (5 to 10 % are left where delays vary from edge to edge) and on the strangers' sets (at most 5 %)";
+    /// Noise counts as explained up to this many times what the second differences of y show.
+    noise_allowed: f64 = 1.5, "times the standard deviation", "judgement: noise need not be white";
+    /// An edge needs this many samples on either side for a search of its own; with fewer, the time constants are those
+    /// of all edges.
+    fewest_reach: usize = 12, "samples", "judgement: twice the fewest samples beside an arrival";
+    /// Samples on either side of an arrival: this many response times, or half the time between edges if that is less.
+    reach: f64 = 3.0, "response times", "judgement: 95 % of a response of first order";
+
     /// Fewest samples on either side of an arrival.
     least_side: usize = 6, "samples", "judgement";
     /// Arrivals are tried this far apart.
@@ -45,10 +59,10 @@ rules! {
     /// Edges further from the robust fit than this are set aside.
     outlier: f64 = 5.0, "robust standard deviations", "convention; held by the tests of `law.rs`";
 
-    /// Probability that an interval of the law's parameters holds the true one.
+    /// Probability that an interval of a dead time, or of the law's parameters, holds the true one.
     confidence: f64 = 0.95, "", "convention; held by the tests of `law.rs`";
     /// A response has its level at the latest after this.
-    response: usize = 150, "samples", "judgement";
+    response: usize = 5, "times the reach", "judgement: 99 % of a response of first order";
 
     /// Fewest measured edges of the tests.
     tested_edges: usize = 8, "edges", "judgement";
@@ -65,4 +79,14 @@ rules! {
     shape_bias: f64 = 0.1, "share of the mean delay", "judgement";
     /// A constant per direction replaces the law when its criterion (BIC) is better by this.
     clearly_better: f64 = 10.0, "BIC", "convention: very strong evidence (Kass & Raftery 1995)";
+
+    /// The autocorrelation of neighbouring residuals of a fit to whole records counts up to this value.
+    slowest_disturbance: f64 = 0.98, "", "widens a variance by 99 at most: a disturbance over 50 samples";
+    /// No standard error of a delay is smaller: loggers and simulations differ by up to a sample in what "the same
+    /// sample" of u and y means.
+    clock: f64 = 0.5, "samples", "judgement: an interval of ± 1 sample at least; held by the test of `dead_time.rs` on strangers";
+    /// How much the choice of the reach matters is measured on so many edges of each record.
+    settings_edges: usize = 12, "edges", "judgement: long records would take three times as long";
+    /// Ratios of the time constants that are averaged over on either side of the best.
+    ratios: usize = 10, "", "steps of at most 30 %";
 }

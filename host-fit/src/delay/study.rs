@@ -1,24 +1,32 @@
 //! All delays of a data set, the law through them, their statistics, and whether the data bear the law out.
 
-use super::dependence::{DelayVerdict, Tests, words};
+use super::dead_time::DeadTime;
+use super::dependence::{Tests, words};
 use super::edge::{Edge, edges};
 use super::law::{DelayLawFit, DelayPoint, fit_delay_law};
-use super::onset::{Onset, Unmeasured, measure_all};
+use super::linear::Series;
+use super::local::{EdgeDelayed, by_trajectory, by_window};
+use super::onset::{Onset, Unmeasured, half_response, measure_all};
+use super::plant::Switching;
+use super::pooled::{Pooled, longest_delay, spacing};
+use super::rules::RULES;
 use super::spread::{Spread, correlation, spread};
+use super::verdict::DelayVerdict;
 use crate::averages::averaged_past;
-use crate::data::{DataError, DataSet, Use};
+use crate::data::{DataError, DataSet, Record, Use};
 use model_core::average::WINDOW;
 
-/// How delays are measured.
+/// How delays are measured. What is `None` follows from the time scales of the data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DelayOptions {
-    /// W of the averaged output (1), samples; 250 in the paper.
+    /// W of the averaged output (1), samples; 250 in the paper and in every model that is fitted.
     pub window: u32,
-    /// Longest delay that is looked for, samples.
-    pub max_delay: usize,
-    /// Samples of y used on either side of the start of a response: more average away more noise, fewer cope with
-    /// faster responses.
-    pub reach: usize,
+    /// Longest delay that is looked for, samples. Otherwise as long as the records can show.
+    pub max_delay: Option<usize>,
+    /// Samples of y used on either side of the start of a response where each edge is measured by itself: more average
+    /// away more noise, fewer cope with faster responses. Otherwise three response times, or half the time between
+    /// edges if that is less.
+    pub reach: Option<usize>,
     /// Seed of the permutation tests.
     pub seed: u64,
 }
@@ -27,11 +35,48 @@ impl Default for DelayOptions {
     fn default() -> Self {
         Self {
             window: WINDOW,
-            max_delay: 250,
-            reach: 30,
+            max_delay: None,
+            reach: None,
             seed: 0,
         }
     }
+}
+
+/// How the delays of the edges were measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DelayMethod {
+    /// One plant describes the records; each edge is moved on its trajectory.
+    Trajectory,
+    /// The kink where y starts to head elsewhere, for each edge by itself.
+    Kink,
+    /// Each edge in its window with the time constants of all: for records with few samples between edges.
+    Window,
+}
+
+impl DelayMethod {
+    /// In words.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Trajectory => "one plant fitted to whole records",
+            Self::Kink => "the start of each response alone",
+            Self::Window => "each response alone, with time constants common to all",
+        }
+    }
+}
+
+/// The plant that describes the responses best, as far as one does.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct ResponsePlant {
+    /// 1 or 2.
+    pub order: u8,
+    /// T₁ + T₂ with the command on, samples.
+    pub time_constants_on: f64,
+    /// T₁ + T₂ with the command off, samples.
+    pub time_constants_off: f64,
+    /// T₁·T₂/(T₁ + T₂)²: 0 first order, 0.25 two equal time constants, above 0.25 a plant that rings.
+    pub ratio: f64,
 }
 
 /// One edge with the delay of its response.
@@ -84,8 +129,25 @@ pub struct SequenceStatistics {
 pub struct DelayStudy {
     /// Every edge of every record.
     pub edges: Vec<EdgeDelay>,
-    /// The law through the measured edges of the identify records.
+    /// How they were measured.
+    pub method: DelayMethod,
+    /// Longest delay that was looked for, samples.
+    pub max_delay: usize,
+    /// Samples of y on either side of a response, where each edge was measured by itself.
+    pub reach: usize,
+    /// The plant that describes the responses; `None` where none does.
+    pub plant: Option<ResponsePlant>,
+    /// The dead time over all measured edges of the identify records. Its interval covers the order of the plant, or
+    /// the choice of `reach`.
+    pub dead_time: Option<DeadTime>,
+    /// The same of rising edges alone.
+    pub rising: Option<DeadTime>,
+    /// The same of falling edges alone.
+    pub falling: Option<DeadTime>,
+    /// The law through the measured edges of the identify records, where it holds.
     pub law: Option<DelayLawFit>,
+    /// Why there is no law, in words.
+    pub law_not_kept: Option<String>,
     /// Their statistics.
     pub statistics: Option<DelayStatistics>,
     /// What the tests say.
@@ -102,22 +164,213 @@ pub struct DelayStudy {
     pub direction_offset: Option<f64>,
 }
 
+/// The edges of one record with what was measured.
+type Measured = Vec<(Edge, Result<Onset, Unmeasured>)>;
+
+/// All edges of a data set, and what they have in common.
+struct Measurement {
+    edges: Vec<Measured>,
+    method: DelayMethod,
+    max_delay: usize,
+    reach: usize,
+    plant: Option<ResponsePlant>,
+    /// The dead time of a plant that describes the records.
+    dead_time: Option<DeadTime>,
+    /// Standard error that all edges share, samples.
+    common: f64,
+}
+
+impl Measurement {
+    fn of(set: &DataSet, options: &DelayOptions) -> Self {
+        let learning: Vec<&Record> = set.identify().collect();
+        let records: Vec<&Record> = set.records.iter().collect();
+        let fitted = if learning.is_empty() {
+            &records
+        } else {
+            &learning
+        };
+        let spacing = spacing(fitted);
+        let Some(pooled) = Pooled::of(fitted, options.max_delay) else {
+            return Self::without_response(&records, options, spacing);
+        };
+        let response = pooled.plant.mean_sum();
+        let reach = options.reach.unwrap_or_else(|| {
+            let times = (RULES.reach * response).ceil().max(1.0) as usize;
+            times.min(spacing / 2).clamp(4, 10_000)
+        });
+        let max_delay = options.max_delay.unwrap_or_else(|| {
+            // A plant that does not describe the records has no response time to go by.
+            let seen = if pooled.describes {
+                2.0 * (pooled.dead_time.samples + response)
+            } else {
+                0.0
+            };
+            (seen.ceil() as usize)
+                .max(4 * spacing)
+                .min(longest_delay(fitted))
+        });
+        let series: Vec<Series> = records.iter().map(|r| pooled.series(r)).collect();
+        let range = pooled.range.1 - pooled.range.0;
+        let counted: Vec<Vec<(usize, Edge)>> =
+            series.iter().map(|s| edges(&s.switching, range)).collect();
+        let by_itself = |reach: usize, most: usize| -> Vec<Vec<Result<Onset, Unmeasured>>> {
+            let cut: Vec<(&[f64], Vec<Edge>)> = records
+                .iter()
+                .zip(&counted)
+                .map(|(record, edges)| {
+                    let end = edges.get(most).map_or(record.y.len(), |(_, e)| e.sample);
+                    let edges = edges.iter().take(most).map(|(_, edge)| *edge).collect();
+                    (record.y.get(..end).unwrap_or_default(), edges)
+                })
+                .collect();
+            measure_all(&cut, max_delay, reach)
+        };
+        let method = if pooled.describes {
+            DelayMethod::Trajectory
+        } else if reach >= RULES.fewest_reach || options.reach.is_some() {
+            DelayMethod::Kink
+        } else {
+            DelayMethod::Window
+        };
+        let (mut found, common) = match method {
+            DelayMethod::Trajectory => {
+                let found = series.iter().map(|s| by_trajectory(s, &pooled)).collect();
+                let found = pooled.onsets(&records, &counted, found);
+                (found, pooled.dead_time.standard_error)
+            }
+            DelayMethod::Window => {
+                let found = pooled.onsets(&records, &counted, by_window(&series, &pooled));
+                (found, RULES.clock)
+            }
+            DelayMethod::Kink => {
+                let found = by_itself(reach, usize::MAX);
+                let others = [0.7, 1.4].map(|factor| {
+                    let reach = (reach as f64 * factor).round().max(4.0) as usize;
+                    by_itself(reach, RULES.settings_edges)
+                });
+                let apart = others.iter().map(|other| apart(&found, other));
+                let apart = apart.fold(0.0, f64::max);
+                (found, apart.hypot(RULES.clock))
+            }
+        };
+        for onset in found.iter_mut().flatten().flatten() {
+            onset.standard_error = onset.standard_error.hypot(common);
+        }
+        let one = pooled.describes.then_some(());
+        Self {
+            edges: counted
+                .iter()
+                .zip(found)
+                .map(|(edges, found)| edges.iter().map(|e| e.1).zip(found).collect())
+                .collect(),
+            method,
+            max_delay,
+            reach,
+            plant: one.map(|()| ResponsePlant {
+                order: if pooled.plant.is_first_order() { 1 } else { 2 },
+                time_constants_on: pooled.plant.sum[0],
+                time_constants_off: pooled.plant.sum[1],
+                ratio: pooled.plant.ratio,
+            }),
+            dead_time: (method == DelayMethod::Trajectory).then_some(pooled.dead_time),
+            common,
+        }
+    }
+
+    /// The edges of records whose response no plant can be fitted to: y does not move, or u never does.
+    fn without_response(records: &[&Record], options: &DelayOptions, spacing: usize) -> Self {
+        let levels = records.iter().flat_map(|r| r.u.iter());
+        let (low, high) = levels.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &u| {
+            (l.min(u), h.max(u))
+        });
+        let each = records.iter().map(|record| {
+            let before = record.u.first().copied().unwrap_or(0.0);
+            let switching = Switching::of(&record.u, before, f64::midpoint(low, high));
+            let edges = edges(&switching, high - low).into_iter();
+            edges
+                .map(|(_, e)| (e, Err(Unmeasured::BelowNoise)))
+                .collect()
+        });
+        Self {
+            edges: each.collect(),
+            method: DelayMethod::Trajectory,
+            max_delay: options.max_delay.unwrap_or(spacing),
+            reach: options.reach.unwrap_or(spacing),
+            plant: None,
+            dead_time: None,
+            common: 0.0,
+        }
+    }
+}
+
+/// Typical difference (median) between two measurements of the same edges, samples.
+fn apart(
+    found: &[Vec<Result<Onset, Unmeasured>>],
+    other: &[Vec<Result<Onset, Unmeasured>>],
+) -> f64 {
+    let pairs = found.iter().zip(other).flat_map(|(a, b)| a.iter().zip(b));
+    let mut differences: Vec<f64> = pairs
+        .filter_map(|(a, b)| Some((a.ok()?.delay - b.ok()?.delay).abs()))
+        .collect();
+    let middle = differences.len() / 2;
+    if differences.is_empty() {
+        return 0.0;
+    }
+    *differences.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+impl Pooled {
+    /// The measured changes that count as edges, with half of their responses.
+    fn onsets(
+        &self,
+        records: &[&Record],
+        counted: &[Vec<(usize, Edge)>],
+        found: Vec<Vec<Result<EdgeDelayed, Unmeasured>>>,
+    ) -> Vec<Vec<Result<Onset, Unmeasured>>> {
+        let settled = (RULES.response as f64 * self.plant.mean_sum()).ceil() as usize;
+        let worst = RULES
+            .worst_error
+            .max(RULES.worst_share * self.plant.mean_sum());
+        let each = records.iter().zip(counted).zip(&found);
+        each.map(|((record, edges), found)| {
+            let at = |place: usize| found.get(place).copied().unwrap_or(Err(Unmeasured::CutOff));
+            (0..edges.len())
+                .filter_map(|i| {
+                    let (place, edge) = *edges.get(i)?;
+                    let next = edges.get(i + 1).map(|(_, e)| e.sample);
+                    Some(at(place).and_then(|measured| {
+                        if measured.standard_error > worst {
+                            return Err(Unmeasured::Blurred);
+                        }
+                        let arrival = edge.sample as f64 + measured.delay;
+                        let start = arrival.round() as usize;
+                        let next = next.map_or(usize::MAX, |n| n + measured.delay as usize);
+                        let level = record.y.get(start).copied().unwrap_or(0.0);
+                        let end = next.min(start.saturating_add(settled));
+                        let half = half_response(&record.y, arrival, level, end);
+                        Ok(Onset {
+                            delay: measured.delay,
+                            standard_error: measured.standard_error,
+                            half_response: half.map(|t| t - edge.sample as f64),
+                        })
+                    }))
+                })
+                .collect()
+        })
+        .collect()
+    }
+}
+
 /// Measures the delay of every edge and fits law (2) to those of the identify records.
 ///
 /// # Errors
-/// [`DataError`] when the command is not on/off.
+/// [`DataError`] when an on/off command has values that are neither 0 nor 1.
 pub fn study_delays(set: &DataSet, options: &DelayOptions) -> Result<DelayStudy, DataError> {
-    set.require_on_off()?;
-    let series: Vec<(&[f64], Vec<Edge>)> = set
-        .records
-        .iter()
-        .map(|r| (r.y.as_slice(), edges(r)))
-        .collect();
-    let onsets = measure_all(&series, options.max_delay, options.reach.max(4));
+    let measurement = Measurement::of(set, options);
     let mut found = Vec::new();
-    for ((record, (y, edges)), onsets) in set.records.iter().zip(&series).zip(onsets) {
-        let averaged = averaged_past(y, options.window);
-        for (&edge, onset) in edges.iter().zip(onsets) {
+    for (record, edges) in set.records.iter().zip(&measurement.edges) {
+        let averaged = averaged_past(&record.y, options.window);
+        for &(edge, onset) in edges {
             let mean_output = onset.ok().and_then(|o| {
                 let arrival = (edge.sample as f64 + o.delay).round().max(0.0) as usize;
                 averaged.get(arrival).copied()
@@ -132,34 +385,77 @@ pub fn study_delays(set: &DataSet, options: &DelayOptions) -> Result<DelayStudy,
             });
         }
     }
-    let points: Vec<DelayPoint> = found
+    let learned: Vec<(&EdgeDelay, Onset)> = found
         .iter()
         .filter(|e| e.role == Use::Identify)
-        .filter_map(|e| {
+        .filter_map(|e| Some((e, e.onset.ok()?)))
+        .collect();
+    let points: Vec<DelayPoint> = learned
+        .iter()
+        .filter_map(|(e, onset)| {
             Some(DelayPoint {
                 mean_output: e.mean_output?,
-                delay: e.onset.ok()?.delay,
+                delay: onset.delay,
                 rising: e.edge.rising,
             })
         })
         .collect();
-    let law = fit_delay_law(&points);
-    let statistics = statistics(&points, law.as_ref(), set, options.window);
-    let kept: Vec<DelayPoint> = match &law {
+    let of = |keep: &dyn Fn(&EdgeDelay) -> bool| -> Option<DeadTime> {
+        let own = |o: &Onset| (o.standard_error.powi(2) - measurement.common.powi(2)).max(0.0);
+        let kept: Vec<(f64, f64)> = learned
+            .iter()
+            .filter(|(e, _)| keep(e))
+            .map(|(_, o)| (o.delay, own(o).sqrt()))
+            .collect();
+        DeadTime::of_edges(&kept, measurement.common)
+    };
+    let fitted = fit_delay_law(&points);
+    let kept: Vec<DelayPoint> = match &fitted {
         Some(law) => points
             .iter()
             .enumerate()
             .filter(|(i, _)| !law.outliers.contains(i))
             .map(|(_, p)| *p)
             .collect(),
-        None => points,
+        None => points.clone(),
     };
     let tests = Tests::of(&kept, options.seed);
     let verdict = tests.verdict(&kept);
-    let words = words(verdict, &tests, &kept);
+    let (law, law_not_kept) = match fitted {
+        None => (
+            None,
+            Some(format!(
+                "{} edges were measured, {} are needed",
+                points.len(),
+                RULES.law_edges
+            )),
+        ),
+        Some(law) => {
+            let data = mean_output_range(set, options.window);
+            match law.objection(verdict, data, measurement.max_delay as f64) {
+                None => (Some(law), None),
+                Some(reason) => (None, Some(reason)),
+            }
+        }
+    };
+    let verdict = verdict.without_law(law.is_some());
+    let statistics = statistics(&points, law.as_ref(), set, options.window);
+    let dead_time = measurement
+        .dead_time
+        .filter(|_| !learned.is_empty())
+        .or_else(|| of(&|_| true));
+    let words = words(verdict, &tests, &kept, law_not_kept.as_deref());
+    let (rising, falling) = (of(&|e| e.edge.rising), of(&|e| !e.edge.rising));
     Ok(DelayStudy {
-        edges: found,
+        method: measurement.method,
+        max_delay: measurement.max_delay,
+        reach: measurement.reach,
+        plant: measurement.plant,
+        dead_time,
+        rising,
+        falling,
         law,
+        law_not_kept,
         statistics,
         verdict,
         words,
@@ -167,6 +463,15 @@ pub fn study_delays(set: &DataSet, options: &DelayOptions) -> Result<DelayStudy,
         p_law_within_direction: tests.law_within,
         p_direction: tests.direction,
         direction_offset: tests.offset,
+        edges: found,
+    })
+}
+
+/// Smallest and largest ỹ of the identify records; ỹ below 0 counts as 0.
+fn mean_output_range(set: &DataSet, window: u32) -> (f64, f64) {
+    let values = set.identify().flat_map(|r| averaged_past(&r.y, window));
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+        (l.min(v.max(0.0)), h.max(v.max(0.0)))
     })
 }
 
@@ -321,10 +626,25 @@ mod tests {
     }
 
     #[test]
-    fn a_command_that_is_not_on_off_is_refused() {
-        let record = Record::new("r", Use::Identify, 0.001, vec![0.0, 0.5, 1.0], vec![0.0; 3]);
+    fn a_graded_command_is_measured_at_every_level_change() {
+        let levels = [0.2, 0.7, 0.5, 0.9, 0.1];
+        let u: Vec<f64> = levels.iter().flat_map(|l| vec![*l; 200]).collect();
+        let mut value = 0.2;
+        let y: Vec<f64> = (0..u.len())
+            .map(|k| {
+                let now = 3.0 + 5.0 * value;
+                let arrived = if k < 12 { 0.2 } else { u[k - 12] };
+                value += (arrived - value) / 25.0;
+                now
+            })
+            .collect();
+        let record = Record::new("r", Use::Identify, 0.1, u, y);
         let set = DataSet::from_records(None, vec![record]).unwrap();
-        assert!(study_delays(&set, &DelayOptions::default()).is_err());
+        let study = study_delays(&set, &DelayOptions::default()).unwrap();
+        assert_eq!(study.edges.len(), 4);
+        for edge in &study.edges {
+            assert!((edge.onset.unwrap().delay - 12.0).abs() < 1.0, "{edge:?}");
+        }
     }
 
     #[test]

@@ -2,17 +2,25 @@
 
 use crate::model::{Footprint, Model, Prepared};
 use crate::simulate::HostState;
+use closed_loop::span;
+use model_core::control::HoldTimes;
+use model_core::control::period::samples_at_least;
 use model_core::{Input, Output, Parts, Real, step};
 
-/// Seconds to samples at 1 kHz, rounded up, at least 1.
-pub(super) fn samples(seconds: f64) -> u32 {
-    (seconds * 1000.0 - 1e-6).ceil().clamp(1.0, 1e7) as u32
+/// A valve's shortest times in samples of `period_s`: rounded up, and at least 1.
+pub(super) fn hold_times(on_s: f64, off_s: f64, period_s: f64) -> HoldTimes {
+    HoldTimes {
+        on: samples_at_least(on_s, period_s),
+        off: samples_at_least(off_s, period_s),
+    }
 }
 
 /// A prepared model with memories that fit it and channels at their references.
 pub(super) struct Player<T: Real> {
     pub(super) prepared: Prepared<T>,
     pub(super) channels: Vec<T>,
+    /// s.
+    pub(super) period_s: f64,
     memory: Footprint,
 }
 
@@ -22,12 +30,18 @@ impl<T: Real> Player<T> {
         Self {
             prepared: model.prepare(),
             channels: memory.references(),
+            period_s: model.sample_period_s,
             memory,
         }
     }
 
     pub(super) fn at_rest(&self) -> HostState<T> {
         self.memory.at_rest(&self.prepared)
+    }
+
+    /// How long a run of so many samples is at this period, [`span`].
+    pub(super) fn span(&self, samples: usize) -> usize {
+        span(samples, self.period_s)
     }
 
     /// One sample of a free run.
@@ -63,8 +77,9 @@ impl<T: Real> Player<T> {
     pub(super) fn valve(&self) -> (u16, u16) {
         use model_core::delay::DelayLaw;
         use model_core::effect::{Effect, Instant};
-        /// Longer than any valve (s ≈ samples/1000).
-        const LONGEST: u16 = 1000;
+        /// Longer than any valve, samples.
+        const LONGEST: usize = 1000;
+        let most = u16::try_from(span(LONGEST, self.period_s)).unwrap_or(u16::MAX);
         let (law, effects) = (self.prepared.delay(), self.prepared.effects());
         let (mut run, mut state) = (law.start(), effects.start());
         let mut jet = |command: T| {
@@ -78,9 +93,10 @@ impl<T: Real> Player<T> {
             let command = law.command(&mut run, command);
             effects.jet(&mut state, command, &at).value()
         };
-        let opening = (0..LONGEST).find(|_| jet(T::ONE) >= 0.5).unwrap_or(LONGEST);
-        let open = (0..2 * LONGEST).map(|_| jet(T::ONE)).last().unwrap_or(1.0);
-        let closing = (0..LONGEST).find(|_| jet(T::ZERO) <= 0.5 * open);
-        (opening, closing.unwrap_or(LONGEST))
+        let opening = (0..most).find(|_| jet(T::ONE) >= 0.5).unwrap_or(most);
+        let open = (0..2 * u32::from(most)).map(|_| jet(T::ONE)).last();
+        let open = open.unwrap_or(1.0);
+        let closing = (0..most).find(|_| jet(T::ZERO) <= 0.5 * open);
+        (opening, closing.unwrap_or(most))
     }
 }

@@ -1,9 +1,10 @@
 //! What laws can be designed from, and why none was.
 
 use crate::model::{Model, Start};
-use closed_loop::SAMPLE_PERIOD_S;
-use model_core::control::Unreachable;
+use crate::terms::Units;
 use model_core::control::Unusable;
+use model_core::control::period::{LONGEST_US, SHORTEST_US, loop_period_us};
+use model_core::control::{Reachable, Unreachable};
 use thiserror::Error;
 
 /// Why no law was designed.
@@ -25,9 +26,11 @@ pub enum DesignError {
          identify it on records that start at rest"
     )]
     NotFromRest,
-    /// The loop is not at 1 kHz.
+    /// The model's sample period, s, is no loop's.
     #[error(
-        "the loop runs at 1 kHz, but the model's sample period is {0} s; identify on data sampled at 1 ms"
+        "key `sample_period_s`: a loop takes a sample every {} to {} ms, and the model is for one every {} ms; \
+         identify on records with a sample period within that range",
+        f64::from(SHORTEST_US) * 1e-3, f64::from(LONGEST_US) * 1e-3, milliseconds(*.0)
     )]
     SamplePeriod(f64),
     /// The model does not settle under a constant command.
@@ -81,13 +84,83 @@ pub enum DesignError {
     },
 }
 
+impl DesignError {
+    /// The same with levels in outer units, the sensor's zero in them.
+    pub(crate) fn outward(self, units: &Units) -> Self {
+        let level = |y: f64| y * units.y + units.zero;
+        match self {
+            Self::Unreachable(error) => Self::Unreachable(Unreachable {
+                reference: level(error.reference),
+                reachable: Reachable {
+                    low: level(error.reachable.low),
+                    high: level(error.reachable.high),
+                },
+            }),
+            Self::NoEffect { low, high } => Self::NoEffect {
+                low: level(low),
+                high: level(high),
+            },
+            Self::Air {
+                reference,
+                needed,
+                allowed,
+            } => Self::Air {
+                reference: level(reference),
+                needed,
+                allowed,
+            },
+            other => other,
+        }
+    }
+}
+
+/// A period as it is printed, ms: without the digits that a product of decimals adds.
+fn milliseconds(period_s: f64) -> f64 {
+    (period_s * 1e9).round() / 1e6
+}
+
+/// Refuses a sample period that is no loop's: the first thing that is asked of a model, before any work.
+///
+/// # Errors
+/// [`DesignError::SamplePeriod`].
+pub fn check_period(model: &Model) -> Result<(), DesignError> {
+    match loop_period_us(model.sample_period_s) {
+        Some(_) => Ok(()),
+        None => Err(DesignError::SamplePeriod(model.sample_period_s)),
+    }
+}
+
 /// Refuses models that no law can be designed from.
 pub(super) fn check(model: &Model) -> Result<(), DesignError> {
-    if !model.is_sampled_at(SAMPLE_PERIOD_S) {
-        return Err(DesignError::SamplePeriod(model.sample_period_s));
-    }
+    check_period(model)?;
     if model.start == Start::Measured {
         return Err(DesignError::NotFromRest);
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_period_is_refused_with_its_key_and_the_range() {
+        let at = |sample_period_s| Model {
+            sample_period_s,
+            ..Model::default()
+        };
+        for period in [2e-4, 1e-3, 0.0123, 0.1, 0.1 + 1e-9] {
+            assert_eq!(check_period(&at(period)), Ok(()), "{period}");
+        }
+        for (period, said) in [
+            (1e-4, "every 0.1 ms"),
+            (0.25, "every 250 ms"),
+            (60.0, "every 60000 ms"),
+        ] {
+            let error = check_period(&at(period)).unwrap_err().to_string();
+            for word in ["`sample_period_s`", "0.2 to 100 ms", said, "identify"] {
+                assert!(error.contains(word), "{error}");
+            }
+        }
+    }
 }

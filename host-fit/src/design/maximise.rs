@@ -6,14 +6,14 @@
 //! commands: period, lengths and phases of the pulses. A search of free commands
 //! over a finite horizon ([`super::horizon`]) can propose further ones.
 
-use super::bench::{Player, samples};
+use super::bench::{Player, hold_times};
 use super::error::{DesignError, check};
 use super::horizon::{self, FlowState, Horizon};
 use super::rules::RULES;
 use super::train::{JudgedTrain, Played, Train, distinct};
 use crate::model::{Maximise, Model};
-use closed_loop::SAMPLE_PERIOD_S;
 use model_core::control::HoldTimes;
+use model_core::control::period::samples_at_least;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -28,8 +28,8 @@ pub struct MaximiseRequest {
     pub air_price: f64,
     /// Most pulses in a period, 1–4.
     pub pulses: usize,
-    /// Longest period, s.
-    pub longest_period_s: f64,
+    /// Longest period, s; `None`: 3000 samples, at least 3 s.
+    pub longest_period_s: Option<f64>,
     /// Horizon over which free on/off commands are searched as well, s.
     pub horizon_s: Option<f64>,
 }
@@ -62,11 +62,11 @@ pub struct Optimum {
     /// The law.
     #[serde(skip)]
     pub law: Maximise,
-    /// Mean friction of the model from 20 s to 40 s.
+    /// Mean friction of the model from 20 000 samples to 40 000 samples (20 s to 40 s at 1 kHz).
     pub mean: f64,
-    /// The same over the last 20 s of four minutes.
+    /// The same over the last 20 000 of 240 000 samples (of four minutes at 1 kHz).
     pub mean_after_minutes: f64,
-    /// Lowest and highest friction from 20 s to 40 s.
+    /// Lowest and highest friction in the same time as `mean`.
     pub range: [f64; 2],
     /// Share of time with the valve open.
     pub duty: f64,
@@ -145,14 +145,17 @@ impl Outside {
 /// long run; [`DesignError::NotFromRest`], [`DesignError::SamplePeriod`].
 pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, DesignError> {
     check(model)?;
+    let period_s = model.sample_period_s;
+    let bench = Player::of(model);
+    let longest = match request.longest_period_s {
+        Some(time_s) => samples_at_least(time_s, period_s),
+        None => u32::try_from(bench.span(RULES.longest_period)).unwrap_or(u32::MAX),
+    };
     let search = TrainSearch {
-        bench: Player::of(model),
-        hold: HoldTimes {
-            on: samples(request.min_on_s),
-            off: samples(request.min_off_s),
-        },
+        bench,
+        hold: hold_times(request.min_on_s, request.min_off_s, period_s),
         price: request.air_price,
-        longest: samples(request.longest_period_s),
+        longest,
     };
     let steady = Train::steady();
     let moduli = [model.largest_pole(false)?, model.largest_pole(true)?];
@@ -169,7 +172,7 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
     refined.extend(distinct(&candidates, RULES.long_runs));
     refined.push(search.judge(&steady));
     let planned = request.horizon_s.map(|horizon_s| {
-        let (planned, train) = search.planned(samples(horizon_s));
+        let (planned, train) = search.planned(samples_at_least(horizon_s, period_s));
         if let Some(train) = train {
             refined.push(search.descend(search.judge(&train)));
         }
@@ -262,8 +265,8 @@ impl TrainSearch {
             return JudgedTrain::worthless(train);
         }
         let mut played = Played::new(&self.bench, train);
-        played.pass(RULES.train_from);
-        let judged = played.judge(RULES.train_judged, self.price);
+        played.pass(self.bench.span(RULES.train_from));
+        let judged = played.judge(self.bench.span(RULES.train_judged), self.price);
         judged.unwrap_or_else(|| JudgedTrain::worthless(train))
     }
 
@@ -307,8 +310,8 @@ impl TrainSearch {
         let blown = FlowState::at_rest(&self.bench).play(&self.bench, true, length, self.price);
         let open = plan.command.iter().filter(|on| **on).count();
         let mut planned = Planned {
-            horizon_s: f64::from(length) * SAMPLE_PERIOD_S,
-            block_s: f64::from(block) * SAMPLE_PERIOD_S,
+            horizon_s: f64::from(length) * self.bench.period_s,
+            block_s: f64::from(block) * self.bench.period_s,
             value: plan.value,
             steady_value: blown / f64::from(length),
             duty: open as f64 / plan.command.len() as f64,
@@ -316,12 +319,12 @@ impl TrainSearch {
             cycle_s: None,
             irregular: 0.0,
         };
-        let played = search.recede(length / RULES.plans, RULES.receding);
+        let played = search.recede(length / RULES.plans, self.bench.span(RULES.receding));
         let shortest = self.hold.on + self.hold.off;
         let train = played.and_then(|command| {
             let (period, irregular) = horizon::cycle(&command, shortest as usize)?;
             let pulses = horizon::pulses(&command, period)?;
-            planned.cycle_s = Some(period as f64 * SAMPLE_PERIOD_S);
+            planned.cycle_s = Some(period as f64 * self.bench.period_s);
             planned.irregular = irregular;
             Some(Train {
                 period: period as u32,
@@ -443,14 +446,15 @@ impl TrainSearch {
         })
     }
 
-    /// What the train gives from 20 s to 40 s, and its mean at the end of four
+    /// What the train gives from 20 s to 40 s (at 1 kHz), and its mean at the end of four
     /// minutes; `None` if the motion has grown by then.
     fn long_run(&self, train: &Train) -> Option<(JudgedTrain, f64)> {
         let mut played = Played::new(&self.bench, train);
-        played.pass(RULES.long_from);
-        let judged = played.judge(RULES.long_from, self.price)?;
-        played.pass(RULES.long_until - 3 * RULES.long_from);
-        let late = played.judge(RULES.long_from, self.price)?;
+        let [from, until] = [RULES.long_from, RULES.long_until].map(|n| self.bench.span(n));
+        played.pass(from);
+        let judged = played.judge(from, self.price)?;
+        played.pass(until.saturating_sub(3 * from));
+        let late = played.judge(from, self.price)?;
         let span = (0.5 * (judged.range[1] - judged.range[0])).max(RULES.same_range);
         let grown =
             late.range[0] < judged.range[0] - span || late.range[1] > judged.range[1] + span;
@@ -472,7 +476,7 @@ mod tests {
             min_off_s: 0.010,
             air_price,
             pulses: 1,
-            longest_period_s: 3.0,
+            longest_period_s: None,
             horizon_s: None,
         }
     }

@@ -3,16 +3,22 @@
 mod bench;
 mod error;
 mod horizon;
+mod margin;
 mod maximise;
+mod noise;
+mod possible;
 mod proof;
+mod record_judge;
 mod rules;
 mod steady;
 mod tracking;
 mod train;
 
-pub use error::DesignError;
+pub use error::{DesignError, check_period};
+pub use margin::{ERRORS, ErrorInterval, Margin, MarginPlane, margin};
 pub use maximise::{MaximiseRequest, Optimum, Outside, Planned, maximise};
-pub use proof::{Case, CaseGroup, Proof, Trial, prove, prove_pulses, run_law};
+pub use possible::{PossibleFlow, possible_flows};
+pub use proof::{Case, CaseGroup, Proof, Trial, Trials, judged, prove, prove_pulses, run_law};
 pub use rules::{RULES, Rules};
 pub use steady::{Steady, steady, time_constants};
 pub use tracking::{TrackDesign, TrackRequest, track};

@@ -1,13 +1,18 @@
-//! A law tried in the loop: on its own model, and on whatever flows the caller has.
-//! The program brings the nearest physical plant, with effects that the law does not
-//! know of and under worse conditions than designed for.
+//! A law tried in the loop: on its own model, on the flows that the records leave possible, and under stress.
+//!
+//! The model and the possible flows decide: a law that loses attachment on one of them is refused. Stress is
+//! reported and never refuses a law: the program brings the nearest physical plant, with every effect of the catalogue at its worst and
+//! under worse conditions than designed for.
 
 use super::bench::Player;
+use super::noise::Noisy;
+use super::possible::PossibleFlow;
 use super::rules::RULES;
 use crate::model::{Maximise, Model, Track};
 use crate::simulate::HostState;
 use closed_loop::{
     Controlled, Controller, Figures, ModelFlow, OpenLoop, Relay, Trace, TrackingController, run,
+    span,
 };
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
@@ -18,12 +23,24 @@ use serde::{Serialize, Serializer};
 pub enum CaseGroup {
     /// The model in place of the flow.
     Model,
+    /// A flow that the records leave possible.
+    Possible,
+    /// A flow that the records exclude, though a diagnosis need not have named what is different.
+    Unseen,
     /// The nearest physical plant, noisy.
     Plant,
     /// The plant with an effect that the law does not know of.
     Effect,
     /// The plant otherwise than designed for.
     Disturbance,
+}
+
+impl CaseGroup {
+    /// Whether a law that loses attachment in such a case is refused; of other cases it warns.
+    #[must_use]
+    pub fn decides(self) -> bool {
+        matches!(self, Self::Model | Self::Possible)
+    }
 }
 
 /// A flow that a law is tried on, at the start of the trial.
@@ -44,13 +61,15 @@ pub struct Case {
     pub group: CaseGroup,
     /// What is different, in words.
     pub name: String,
-    /// What came of it, from 4 s on.
+    /// How likely the records are if this is the flow: one-sided p-value; `None` where they do not say.
+    pub p_value: Option<f64>,
+    /// What came of it, from 4000 samples on (4 s at 1 kHz).
     #[serde(flatten)]
     pub figures: Figures,
     /// Mean friction of the same flow under steady blowing.
     #[serde(rename = "steady_mean")]
     pub steady: f64,
-    /// Lowest 250 ms mean of the friction.
+    /// Lowest mean of the friction over 250 samples (250 ms at 1 kHz).
     #[serde(rename = "lowest_mean")]
     pub lowest: f64,
     /// Whether the flow stays attached wherever steady blowing keeps it so: the
@@ -63,10 +82,10 @@ pub struct Case {
 pub struct Proof {
     /// The trials.
     pub cases: Vec<Case>,
-    /// The run on the plant as it is.
+    /// The run on the model, through a noisy sensor.
     #[serde(skip)]
     pub trace: Trace,
-    /// Something simpler on the same plant: a relay with the same hold times, or
+    /// Something simpler on the same flow: a relay with the same hold times, or
     /// steady blowing; here its figures.
     #[serde(rename = "relay", serialize_with = "figures")]
     pub compared: Trace,
@@ -76,33 +95,84 @@ pub struct Proof {
 }
 
 impl Proof {
-    /// The trials in which attachment was lost, by name.
+    /// The deciding trials in which attachment was lost, by name.
     #[must_use]
     pub fn lost(&self) -> Vec<String> {
-        let lost = self.cases.iter().filter(|case| !case.kept);
+        self.lost_where(CaseGroup::decides)
+    }
+
+    /// The other trials in which attachment was lost, by name: unseen effects and stress.
+    #[must_use]
+    pub fn lost_beyond_the_records(&self) -> Vec<String> {
+        self.lost_where(|group| !group.decides())
+    }
+
+    /// The same with levels as a sensor shows them whose zero is at `zero`.
+    #[must_use]
+    pub fn shown_by(mut self, zero: f64) -> Self {
+        if zero == 0.0 {
+            return self;
+        }
+        for case in &mut self.cases {
+            case.figures.mean += zero;
+            case.steady += zero;
+            case.lowest += zero;
+        }
+        for trace in [&mut self.trace, &mut self.compared] {
+            for sample in &mut trace.samples {
+                sample.friction += zero;
+                sample.reference += zero;
+            }
+        }
+        self
+    }
+
+    fn lost_where(&self, of: impl Fn(CaseGroup) -> bool) -> Vec<String> {
+        let lost = self
+            .cases
+            .iter()
+            .filter(|case| !case.kept && of(case.group));
         lost.map(|case| case.name.clone()).collect()
     }
 }
 
-fn figures<S: Serializer>(trace: &Trace, to: S) -> Result<S::Ok, S::Error> {
-    Figures::of(trace, RULES.trial_from).serialize(to)
+/// What a law is tried on beside its model.
+#[derive(Clone, Copy, Debug)]
+pub struct Trials<'a, F> {
+    /// Flows that the records leave possible.
+    pub possible: &'a [PossibleFlow],
+    /// Flows under stress.
+    pub stress: &'a [Trial<F>],
+    /// Noise of the sensor on model and possible flows, in units of a usual hot film's at friction of order one.
+    pub noise: f64,
+    /// Seed of that noise.
+    pub seed: u64,
 }
 
-fn steadily(reference: f64) -> impl Iterator<Item = f64> {
-    std::iter::repeat_n(reference, RULES.trial)
+fn figures<S: Serializer>(trace: &Trace, to: S) -> Result<S::Ok, S::Error> {
+    judged(trace).serialize(to)
+}
+
+/// Figures of a trial, after its start.
+#[must_use]
+pub fn judged(trace: &Trace) -> Figures {
+    Figures::of(trace, span(RULES.trial_from, trace.sample_period_s))
 }
 
 impl<F: Controlled + Clone> Trial<F> {
     fn run(&self, controller: &mut impl Controller, reference: f64) -> (Case, Trace) {
-        let trace = run(controller, &mut self.flow.clone(), steadily(reference));
+        let length = span(RULES.trial, self.flow.sample_period_s());
+        let steadily = || std::iter::repeat_n(reference, length);
+        let trace = run(controller, &mut self.flow.clone(), steadily());
         let mut blowing = OpenLoop::steady();
-        let blown = run(&mut blowing, &mut self.flow.clone(), steadily(reference));
+        let blown = run(&mut blowing, &mut self.flow.clone(), steadily());
         let lowest = lowest_mean(&trace);
         let case = Case {
             group: self.group,
             name: self.name.clone(),
-            figures: Figures::of(&trace, RULES.trial_from),
-            steady: Figures::of(&blown, RULES.trial_from).mean,
+            p_value: None,
+            figures: judged(&trace),
+            steady: judged(&blown).mean,
             lowest,
             kept: lowest >= RULES.attached * reference.min(lowest_mean(&blown)),
         };
@@ -111,56 +181,170 @@ impl<F: Controlled + Clone> Trial<F> {
 }
 
 fn lowest_mean(trace: &Trace) -> f64 {
-    let judged = trace.samples.get(RULES.trial_from..).unwrap_or_default();
+    lowest_mean_from(trace, RULES.trial_from)
+}
+
+/// The lowest mean of the friction over the window of [`RULES`], from so many samples on.
+fn lowest_mean_from(trace: &Trace, from: usize) -> f64 {
+    let [from, window] = [from, RULES.attached_mean].map(|n| span(n, trace.sample_period_s));
+    let judged = trace.samples.get(from..).unwrap_or_default();
     let means = judged
-        .windows(RULES.attached_mean)
+        .windows(window)
         .step_by(10)
-        .map(|w| w.iter().map(|s| s.friction).sum::<f64>() / RULES.attached_mean as f64);
+        .map(|w| w.iter().map(|s| s.friction).sum::<f64>() / window as f64);
     means.fold(f64::INFINITY, f64::min)
 }
 
-/// Tries the tracking `law` of `model` on its own model, on the flow as it is expected (`plant`) and on others.
-pub fn prove<F>(model: &Model, law: &Track, plant: &Trial<F>, others: &[Trial<F>]) -> Proof
+/// A short run of a law on a flow, for its margin.
+pub(super) struct Attempt {
+    /// Root mean square of friction minus reference, y.
+    pub(super) rms: f64,
+    /// Whether attachment is kept.
+    pub(super) kept: bool,
+}
+
+impl Attempt {
+    pub(super) fn of<F: Controlled + Clone>(bench: &Player<f32>, law: &Track, flow: &F) -> Self {
+        let references = std::iter::repeat_n(law.reference, bench.span(RULES.margin_run));
+        let trace = run(&mut host_law(bench, law), &mut flow.clone(), references);
+        let lowest = lowest_mean_from(&trace, RULES.margin_from);
+        Self {
+            rms: Figures::of(&trace, bench.span(RULES.margin_from)).rms,
+            kept: lowest >= RULES.attached * law.reference,
+        }
+    }
+}
+
+/// A law ready for a run.
+trait Ready: Sync {
+    fn run<F: Controlled + Clone>(&self, trial: &Trial<F>) -> (Case, Trace);
+}
+
+struct Tracks<'a> {
+    bench: &'a Player<f32>,
+    law: &'a Track,
+}
+
+impl Ready for Tracks<'_> {
+    fn run<F: Controlled + Clone>(&self, trial: &Trial<F>) -> (Case, Trace) {
+        trial.run(&mut host_law(self.bench, self.law), self.law.reference)
+    }
+}
+
+struct Pulses<'a> {
+    law: &'a Maximise,
+    /// Friction under steady blowing, y: the reference.
+    blown: f64,
+}
+
+impl Ready for Pulses<'_> {
+    fn run<F: Controlled + Clone>(&self, trial: &Trial<F>) -> (Case, Trace) {
+        let mut pulses = OpenLoop::train(self.law.train(), self.law.hold);
+        trial.run(&mut pulses, self.blown)
+    }
+}
+
+/// The model in the place of the flow, through a noisy sensor.
+fn on_bench<'a>(
+    bench: &'a Player<f64>,
+    group: CaseGroup,
+    name: &str,
+    noise: f64,
+    seed: u64,
+) -> Trial<Noisy<impl Controlled + Clone + 'a>> {
+    let flow = ModelFlow::new(
+        &bench.prepared,
+        bench.at_rest(),
+        bench.channels.clone(),
+        bench.period_s,
+    );
+    Trial {
+        group,
+        name: name.to_owned(),
+        flow: Noisy::new(flow, noise, seed),
+    }
+}
+
+/// The case of a possible flow.
+fn on_possible(law: &impl Ready, flow: &PossibleFlow, noise: f64, seed: u64) -> Case {
+    let bench = Player::<f64>::of(&flow.model);
+    let group = if flow.is_possible() {
+        CaseGroup::Possible
+    } else {
+        CaseGroup::Unseen
+    };
+    let trial = on_bench(&bench, group, &flow.name, noise, seed);
+    let (case, _) = law.run(&trial);
+    Case {
+        p_value: Some(flow.p_value),
+        ..case
+    }
+}
+
+/// All cases of a law, and the run on its noisy model.
+fn cases<F>(law: &impl Ready, model: &Model, trials: &Trials<'_, F>) -> (Vec<Case>, Trace)
+where
+    F: Controlled + Clone + Sync,
+{
+    let bench = Player::<f64>::of(model);
+    let noisy = on_bench(
+        &bench,
+        CaseGroup::Model,
+        "the model, noisy sensor",
+        trials.noise,
+        trials.seed,
+    );
+    let (on_model, trace) = law.run(&noisy);
+    let mut cases = vec![on_model];
+    let possible = trials.possible.par_iter();
+    cases.par_extend(possible.map(|flow| on_possible(law, flow, trials.noise, trials.seed)));
+    cases.par_extend(trials.stress.par_iter().map(|trial| law.run(trial).0));
+    (cases, trace)
+}
+
+/// Tries the tracking `law` of `model` on its own model and in all `trials`.
+pub fn prove<F>(model: &Model, law: &Track, trials: &Trials<'_, F>) -> Proof
 where
     F: Controlled + Clone + Sync,
 {
     let bench = Player::<f32>::of(model);
-    let (as_it_is, trace) = plant.run(&mut host_law(&bench, law), law.reference);
-    let mut cases = vec![on_model(law, &bench), as_it_is];
-    cases.par_extend(others.par_iter().map(|trial| {
-        let (case, _) = trial.run(&mut host_law(&bench, law), law.reference);
-        case
-    }));
-    let mut relay = Relay::new(law.hold, 0.0);
-    let (_, compared) = plant.run(&mut relay, law.reference);
+    let ready = Tracks { bench: &bench, law };
+    let (others, trace) = cases(&ready, model, trials);
+    let mut cases = vec![on_model(law, &bench)];
+    cases.extend(others);
     Proof {
         cases,
         trace,
-        compared,
+        compared: compared(&mut Relay::new(law.hold, 0.0), law.reference, model, trials),
         compared_name: "plain relay, same hold times",
     }
 }
 
-/// Tries the pulses of a maximising law on the flow as it is expected (`plant`) and on others; `blown`, the friction
-/// under steady blowing, is the reference.
-pub fn prove_pulses<F>(law: &Maximise, blown: f64, plant: &Trial<F>, others: &[Trial<F>]) -> Proof
+/// Tries the pulses of a maximising law of `model` in all `trials`; `blown`, the friction under steady blowing, is the
+/// reference.
+pub fn prove_pulses<F>(model: &Model, law: &Maximise, blown: f64, trials: &Trials<'_, F>) -> Proof
 where
     F: Controlled + Clone + Sync,
 {
-    let pulses = || OpenLoop::train(law.train(), law.hold);
-    let (as_it_is, trace) = plant.run(&mut pulses(), blown);
-    let mut cases = vec![as_it_is];
-    cases.par_extend(others.par_iter().map(|trial| {
-        let (case, _) = trial.run(&mut pulses(), blown);
-        case
-    }));
-    let (_, compared) = plant.run(&mut OpenLoop::steady(), blown);
+    let (cases, trace) = cases(&Pulses { law, blown }, model, trials);
     Proof {
         cases,
         trace,
-        compared,
+        compared: compared(&mut OpenLoop::steady(), blown, model, trials),
         compared_name: "steady blowing",
     }
+}
+
+/// The run of something simpler on the model, through the same noisy sensor.
+fn compared<F>(
+    controller: &mut impl Controller,
+    reference: f64,
+    model: &Model,
+    trials: &Trials<'_, F>,
+) -> Trace {
+    let bench = Player::<f64>::of(model);
+    let noisy = on_bench(&bench, CaseGroup::Model, "", trials.noise, trials.seed);
+    noisy.run(controller, reference).1
 }
 
 /// Runs the tracking `law` of `model` on `flow`, in single precision as on a
@@ -197,7 +381,12 @@ fn on_model(law: &Track, bench: &Player<f32>) -> Case {
     let itself = Trial {
         group: CaseGroup::Model,
         name: "the model itself, no noise".to_owned(),
-        flow: ModelFlow::new(&bench.prepared, bench.at_rest(), bench.channels.clone()),
+        flow: ModelFlow::new(
+            &bench.prepared,
+            bench.at_rest(),
+            bench.channels.clone(),
+            bench.period_s,
+        ),
     };
     let (case, _) = itself.run(&mut host_law(bench, law), law.reference);
     // On a model steady blowing may grow; what was asked for is the measure.

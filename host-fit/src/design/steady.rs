@@ -6,6 +6,9 @@ use super::rules::RULES;
 use crate::model::Model;
 use serde::Serialize;
 
+/// Time constants are no longer than this, samples.
+const LONGEST_CONSTANT: usize = 10_000;
+
 /// What constant blowing leads to.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Steady {
@@ -18,34 +21,34 @@ pub struct Steady {
 }
 
 /// The value `model` settles at with the valve open or closed throughout; closed
-/// means after two seconds of blowing.
+/// means after two thousand samples ([`closed_loop::span`]) of blowing.
 ///
 /// # Errors
-/// [`DesignError::Unsettled`] when it does not within a minute,
+/// [`DesignError::Unsettled`] when it does not within [`RULES`]' longest wait,
 /// [`DesignError::NotConverged`] when the poles cannot be found.
 pub fn steady(model: &Model, on: bool) -> Result<Steady, DesignError> {
     let bench = Player::<f64>::of(model);
     let mut state = bench.at_rest();
-    let per_second = (1.0 / model.sample_period_s).round().max(1.0) as usize;
-    for _ in 0..2 * per_second {
+    let each = bench.span(RULES.settled_mean);
+    for _ in 0..each {
         bench.step(&mut state, true);
     }
-    let mut mean_of_two_seconds = || {
+    let mut mean = || {
         let (mut friction, mut reading) = (0.0, 0.0);
-        for _ in 0..2 * per_second {
+        for _ in 0..each {
             let output = bench.step(&mut state, on);
             friction += output.flow;
             reading += output.measured;
         }
-        let count = (2 * per_second) as f64;
+        let count = each as f64;
         (friction / count, reading / count)
     };
     let modulus = model.largest_pole(on)?;
-    let mut before = mean_of_two_seconds();
-    let mut waited = 4.0;
-    while waited < RULES.longest_wait_s {
-        let now = mean_of_two_seconds();
-        waited += 2.0;
+    let mut before = mean();
+    let (mut waited, longest) = (2 * each, bench.span(RULES.longest_wait));
+    while waited < longest {
+        let now = mean();
+        waited += each;
         let moved = (now.0 - before.0).abs().max((now.1 - before.1).abs());
         if moved < RULES.settled * now.0.abs().max(RULES.least_mean) {
             return Ok(Steady {
@@ -58,23 +61,24 @@ pub fn steady(model: &Model, on: bool) -> Result<Steady, DesignError> {
     }
     Err(DesignError::Unsettled {
         on,
-        seconds: RULES.longest_wait_s,
+        seconds: longest as f64 * model.sample_period_s,
         modulus,
     })
 }
 
 /// From the arrival of an edge to 1 − 1/e of the way between the levels `low` and
-/// `high`, opening and closing, s (0.001–10).
+/// `high`, opening and closing, s: from a sample to ten thousand ([`closed_loop::span`]).
 #[must_use]
 pub fn time_constants(model: &Model, low: f64, high: f64) -> [f64; 2] {
     let bench = Player::<f64>::of(model);
     let mut state = bench.at_rest();
-    let per_second = (1.0 / model.sample_period_s).round() as usize;
+    let period_s = model.sample_period_s;
+    let most = bench.span(LONGEST_CONSTANT);
     [true, false].map(|on| {
         let (from, to) = if on { (low, high) } else { (high, low) };
         let goal = from + (to - from) * (1.0 - (-1.0_f64).exp());
         let mut arrived = None;
-        for k in 0..30 * per_second {
+        for k in 0..3 * most {
             let output = bench.step(&mut state, on);
             if (output.arrived > 0.5) == on && arrived.is_none() {
                 arrived = Some(k);
@@ -85,15 +89,15 @@ pub fn time_constants(model: &Model, low: f64, high: f64) -> [f64; 2] {
                 output.next <= goal
             };
             if let (Some(arrived), true) = (arrived, there) {
-                let time = (k + 1 - arrived) as f64 * model.sample_period_s;
+                let samples = k + 1 - arrived;
                 // Settle before the next edge.
-                for _ in 0..10 * per_second {
+                for _ in 0..most {
                     bench.step(&mut state, on);
                 }
-                return time.clamp(0.001, 10.0);
+                return samples.clamp(1, most) as f64 * period_s;
             }
         }
-        10.0
+        most as f64 * period_s
     })
 }
 

@@ -1,21 +1,22 @@
 //! The constants of the tracking law, from the model and the valve's limits.
 
-use super::bench::{Player, samples};
+use super::bench::{Player, hold_times};
 use super::error::{DesignError, check};
 use super::rules::RULES;
 use super::steady::{Steady, steady, time_constants};
 use crate::model::{Delay, Model, Track};
-use closed_loop::{AHEAD, Figures, ModelFlow, SAMPLE_PERIOD_S, TrackingController, run};
+use closed_loop::{AHEAD, Figures, ModelFlow, TrackingController, run};
 use model_core::control::Unusable;
 use model_core::control::budget::Budget;
 use model_core::control::{HoldTimes, Reachable, Tracking};
 use model_core::delay::Transport;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 /// What is wanted of a tracking law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackRequest {
-    /// The friction to hold, y of the flow.
+    /// The friction to hold: y of the flow for [`track`]; what the sensor shows, its zero included, for
+    /// [`steps::design`](crate::steps::design).
     pub target: f64,
     /// Shortest on time of the valve, s.
     pub min_on_s: f64,
@@ -35,7 +36,7 @@ pub struct TrackRequest {
 }
 
 impl TrackRequest {
-    /// Holds `target` with a valve that needs 10 ms either way, without further limits.
+    /// Holds `target` with a valve that needs 10 ms either way, or a sample where that is longer, without further limits.
     #[must_use]
     pub fn holding(target: f64) -> Self {
         Self {
@@ -54,9 +55,13 @@ impl TrackRequest {
 /// A tracking law and what the design rests on. Serialises to the keys under `track` of `design --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrackDesign {
-    /// The law; here only its interval.
-    #[serde(rename = "reachable", serialize_with = "reachable")]
+    /// The law.
+    #[serde(skip)]
     pub law: Track,
+    /// The friction that is held, y.
+    pub target: f64,
+    /// What on/off blowing can hold: the open interval, y.
+    pub reachable: [f64; 2],
     /// The flow with the valve closed.
     pub natural: Steady,
     /// The flow under steady blowing.
@@ -69,10 +74,6 @@ pub struct TrackDesign {
     pub duty: f64,
     /// What deserves to be said.
     pub remarks: Vec<String>,
-}
-
-fn reachable<S: Serializer>(law: &Track, to: S) -> Result<S::Ok, S::Error> {
-    law.reachable.serialize(to)
 }
 
 /// Designs the law that holds `request.target` on `model`.
@@ -116,10 +117,9 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     let (shortest, longest) = bench.first_arrival(RULES.swing * blown.friction);
     let (opening, closing) = bench.valve();
     let equivalent_duty = equivalent_duty(model, request.target);
-    let mut hold = HoldTimes {
-        on: samples(request.min_on_s),
-        off: samples(request.min_off_s),
-    };
+    let period_s = model.sample_period_s;
+    let asked = hold_times(request.min_on_s, request.min_off_s, period_s);
+    let mut hold = asked;
     if let Delay::Law(law) = &model.delay
         && let Some(transport) = law.transport(model.sample_period_s)
     {
@@ -132,10 +132,11 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
             hold.off = hold.off.max(sure(falling));
         }
     }
-    if hold.on > samples(request.min_on_s) || hold.off > samples(request.min_off_s) {
+    if hold.on > asked.on || hold.off > asked.off {
+        let [on, off] =
+            [hold.on, hold.off].map(|samples| (1e6 * f64::from(samples) * period_s).round() / 1e3);
         remarks.push(format!(
-            "shortest times are {} ms on and {} ms off: what is shorter need not arrive whole",
-            hold.on, hold.off
+            "shortest times are {on} ms on and {off} ms off: what is shorter need not arrive whole"
         ));
     }
     let air = request
@@ -155,11 +156,12 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     let range = reachable.high - reachable.low;
     // The noise's density where it is slow, y²·s.
     let slow_noise = request.slow_noise.unwrap_or(RULES.usual_slow_noise);
-    let density = 64.0 * SAMPLE_PERIOD_S * slow_noise.powi(2);
+    let density = 64.0 * period_s * slow_noise.powi(2);
     let observer = observer(
         time_constants(model, natural.friction, blown.friction),
         density,
         range,
+        period_s,
     );
     let bias_rate = RULES.bias_in_a_delay / f64::from(lead.max(RULES.bias_delay));
     let mut law = Track {
@@ -181,7 +183,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         observer,
         bias_rate,
         integral_rate: RULES.integral_in_a_delay / f64::from(lead.max(RULES.integral_delay)),
-        play: RULES.play * passed(bias_rate, density),
+        play: RULES.play * passed(bias_rate, density, period_s),
         settled: 1.0,
         correction_limit: RULES.correction * range,
         // A wild reading moves the estimate by the observer's share of the whole range.
@@ -196,12 +198,15 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     let figures = duty_of(&law)?;
     let mut duty = figures.air;
     if let Some(rate) = request.switches_per_s {
-        law = paced(&law, rate, duty);
+        law = paced(&law, rate * period_s, duty);
         duty = duty_of(&law)?.air;
     }
     if request.least_air {
-        let fastest = request.switches_per_s.unwrap_or(f64::INFINITY);
-        for rate in RULES.paces.into_iter().filter(|rate| *rate < fastest) {
+        // Switches per sample.
+        let fastest = request.switches_per_s.unwrap_or(f64::INFINITY) * period_s;
+        let a_thousand = bench.span(1000) as f64;
+        let paces = RULES.paces.map(|pace| pace / a_thousand);
+        for rate in paces.into_iter().filter(|rate| *rate < fastest) {
             let slower = paced(&law, rate, duty);
             // What the look-ahead cannot hold or the model cannot follow is no choice.
             let Ok(figures) = duty_of(&slower) else { break };
@@ -212,8 +217,18 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
             }
         }
     }
-    let ripple = duty_of(&law)?.rms;
-    law.settled = settled(law.integral_rate, ripple, density);
+    let final_figures = duty_of(&law)?;
+    if final_figures.switches_per_s == 0.0 {
+        let ms = |samples: u32| (1e6 * f64::from(samples) * period_s).round() / 1e3;
+        remarks.push(format!(
+            "on the model the valve does not switch after the start: shortest times of {} ms open and {} ms closed \
+             are too long for its response; give shorter ones (`--min-on`, `--min-off`) if the valve can follow them",
+            ms(law.hold.on),
+            ms(law.hold.off)
+        ));
+    }
+    let ripple = final_figures.rms;
+    law.settled = settled(law.integral_rate, ripple, density, period_s);
     if let Some(allowed) = request.air
         && duty > allowed + RULES.air_margin
     {
@@ -225,6 +240,8 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     }
     Ok(TrackDesign {
         law,
+        target: request.target,
+        reachable: [reachable.low, reachable.high],
         natural,
         blown,
         equivalent_duty,
@@ -244,36 +261,36 @@ fn equivalent_duty(model: &Model, reference: f64) -> f64 {
 /// faster time constant τ and that the model misses by σ = `model_error` of the `range`. With
 /// q = 2σ²/τ, what pushes it away from the model, and S, the noise's `density`
 /// (y²·s), the estimate follows the sensor at √(1/τ² + q/S) − 1/τ per second.
-fn observer(time_constants_s: [f64; 2], density: f64, range: f64) -> f64 {
+fn observer(time_constants_s: [f64; 2], density: f64, range: f64, period_s: f64) -> f64 {
     let tau = time_constants_s[0].min(time_constants_s[1]);
     let pushed = 2.0 * (RULES.model_error * range).powi(2) / tau;
     let rate = (tau.powi(-2) + pushed / density).sqrt() - 1.0 / tau;
     // Without noise nothing is to be smoothed, and the rate is no number.
-    (rate * SAMPLE_PERIOD_S).min(RULES.observer_most)
+    (rate * period_s).min(RULES.observer_most)
 }
 
 /// What a first-order filter of `rate` (1 per sample) lets through of noise of `density` (y²·s): √(S·g/2), y rms.
-fn passed(rate: f64, density: f64) -> f64 {
-    (density * rate / SAMPLE_PERIOD_S / 2.0).sqrt()
+fn passed(rate: f64, density: f64, period_s: f64) -> f64 {
+    (density * rate / period_s / 2.0).sqrt()
 }
 
 /// What is left of an integral `rate` (1 per sample) in the long run: it lets through noise of a given share of the
 /// `ripple` (y rms) that the valve's times enforce anyway.
-fn settled(rate: f64, ripple: f64, density: f64) -> f64 {
+fn settled(rate: f64, ripple: f64, density: f64, period_s: f64) -> f64 {
     if density <= 0.0 {
         return 1.0;
     }
-    let share = RULES.noise_beside_ripple * ripple / passed(rate, density);
+    let share = RULES.noise_beside_ripple * ripple / passed(rate, density, period_s);
     share.powi(2).clamp(RULES.least_settled, 1.0)
 }
 
-/// `law` with no more than `rate` switches per second, for a flow that takes `duty`.
+/// `law` with no more than `rate` switches per sample, for a flow that takes `duty`.
 ///
 /// The time between two openings is kept by the budget, whatever duty the flow
 /// really takes. The shorter part of the cycle is held a little less long than its share, so
 /// that the law knows its swing and yet the budget binds.
 fn paced(law: &Track, rate: f64, duty: f64) -> Track {
-    let cycle = 2000.0 / rate;
+    let cycle = 2.0 / rate;
     let duty = duty.clamp(0.02, 0.98);
     let mut paced = law.clone();
     let share = |of: f64| (RULES.paced_hold * of * cycle).round() as u32;
@@ -285,7 +302,10 @@ fn paced(law: &Track, rate: f64, duty: f64) -> Track {
     paced.look_ahead = law
         .look_ahead
         .saturating_add(half(paced.hold) - half(law.hold));
-    paced.switches = Some([(1000.0 / rate).ceil() as u32, RULES.saved_switches]);
+    paced.switches = Some([
+        (1.0 / rate - 1e-6).ceil().max(1.0) as u32,
+        RULES.saved_switches,
+    ]);
     paced
 }
 
@@ -309,13 +329,18 @@ fn on_model(bench: &Player<f64>, tracking: Tracking<f64>) -> Figures {
         bench.at_rest(),
         bench.channels.clone(),
     );
-    let mut flow = ModelFlow::new(&bench.prepared, bench.at_rest(), bench.channels.clone());
+    let mut flow = ModelFlow::new(
+        &bench.prepared,
+        bench.at_rest(),
+        bench.channels.clone(),
+        bench.period_s,
+    );
     let trace = run(
         &mut law,
         &mut flow,
-        std::iter::repeat_n(tracking.reference, RULES.model_run),
+        std::iter::repeat_n(tracking.reference, bench.span(RULES.model_run)),
     );
-    Figures::of(&trace, RULES.model_run_from)
+    Figures::of(&trace, bench.span(RULES.model_run_from))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::ranking::{Rival, alike, rivals};
 use super::session::Session;
 use crate::experiment::Separation;
 use crate::model::Model;
-use crate::terms::{Hypothesis, Judged, Term, is_out, shares_won};
+use crate::terms::{Hypothesis, Judged, Likelihood, Term, is_out, shares_won};
 use model_core::effect::Spec;
 use std::sync::atomic::Ordering;
 
@@ -13,6 +13,23 @@ pub(super) struct Set {
     pub(super) names: Vec<String>,
     /// The models with the others in its place, inner units.
     pub(super) models: Vec<Model>,
+}
+
+impl Set {
+    /// The share of the evidence that each member has, the effect of `last` first; empty where no run stays within bounds.
+    pub(super) fn posterior(&self, likelihood: &Likelihood<'_>, last: &Judged) -> Vec<f64> {
+        let models = std::iter::once(last.model()).chain(&self.models);
+        let evidence: Vec<f64> = models
+            .map(|model| likelihood.evidence(model).unwrap_or(f64::NEG_INFINITY))
+            .collect();
+        let most = evidence.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if most == f64::NEG_INFINITY {
+            return Vec::new();
+        }
+        let weights: Vec<f64> = evidence.iter().map(|own| (own - most).exp()).collect();
+        let sum: f64 = weights.iter().sum();
+        weights.iter().map(|weight| weight / sum).collect()
+    }
 }
 
 impl Session<'_> {

@@ -5,6 +5,7 @@
 //! what it is called, what else it could be, and how sure that is.
 
 mod alternatives;
+mod certificate;
 mod estimate;
 mod memory;
 mod outcome;
@@ -15,6 +16,7 @@ mod session;
 mod verdict;
 
 pub use crate::terms::HeldOutBy;
+pub use certificate::{Certificate, Parsimony};
 pub use estimate::ParameterEstimate;
 pub(crate) use estimate::estimates;
 pub use memory::Memory;
@@ -44,14 +46,6 @@ pub enum DiagnoseError {
     /// The model cannot be run on the data.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
-    /// What was found reads the command as a share of a full jet, and the largest command of the records, in their
-    /// unit, is not 1.
-    #[error(
-        "the largest command of the records is {0:.3}, and what was found means something else there than for commands \
-         up to 1; nothing was written. Scale the command (`import --u-scale {scale:.4}`), identify and search again.",
-        scale = 1.0 / .0
-    )]
-    FullJet(f64),
     /// The user stopped it.
     #[error("the diagnosis was interrupted before it had a result; nothing was written.")]
     Interrupted,
@@ -112,6 +106,7 @@ fn chosen(
         given: given_inside,
         mid_run,
         restarted,
+        ..
     } = bench;
     let known = Known::of(&judge.learning(0));
     let search = Search {
@@ -140,7 +135,7 @@ fn chosen(
     if let Some(diagnosis) = session.nothing_at_once(given, &given_inside, &as_given, &first) {
         return Ok(diagnosis);
     }
-    progress("the leanest model");
+    progress("the model with the fewest lags");
     // Rigs that are no blown ramp: their dynamics is the user's choice of lags.
     let own_dynamics = mid_run && given.start == Start::Measured && !judge.on_off;
     let (root, step) = if own_dynamics {
@@ -172,6 +167,7 @@ fn chosen(
     }
     let restarted_s = restarted.map(|samples| samples as f64 * given.sample_period_s);
     let second = session.rung(&origin.judged, &[], step);
-    let concluded = session.conclude(found, [first.clone(), second], &as_given, restarted_s);
+    let rungs = [first.clone(), second];
+    let concluded = session.conclude(found, rungs, &given_inside, &as_given, restarted_s);
     Ok(concluded.no_worse_than(given, first))
 }

@@ -1,8 +1,10 @@
 //! What a diagnosis hands over.
 
 use super::memory::memory;
-use super::{Memory, ParameterEstimate, Quoted};
+use super::{Certificate, Memory, ParameterEstimate, Parsimony, Quoted};
+use crate::data::Record;
 use crate::experiment::Separation;
+use crate::indicators::score;
 use crate::model::Model;
 use crate::residual::NoiseSource;
 use crate::terms::{HeldOut, HeldOutBy, Hypothesis, Judge, Units};
@@ -73,9 +75,21 @@ impl Rung {
     /// The rung of the model as given at the end of a ladder that led to nothing better.
     pub(crate) fn once_more(self) -> Self {
         Self {
-            step: "the model as given, which does better".to_owned(),
+            step: "the model as given, which is better".to_owned(),
             ..self
         }
+    }
+
+    /// The same with the error of the model's free run over whole `records`, as `compare` has it; as it was where no model
+    /// stands here. A run that diverges errs without end.
+    pub(crate) fn as_compared(&mut self, records: &[Record]) {
+        let Some(model) = &self.model else { return };
+        let scores = score(model, records).map(|(scores, _)| scores);
+        let held_out = scores.ok().and_then(|scores| scores.held_out().cloned());
+        (self.validate_rmse, self.validate_fit_percent) = match held_out {
+            Some(all) => (all.rmse, all.fit_percent),
+            None => (f64::INFINITY, f64::NEG_INFINITY),
+        };
     }
 
     /// What was held out, in the user's units.
@@ -123,6 +137,8 @@ pub struct Ranked {
     /// Whether everything was refitted with it; otherwise its numbers are what the
     /// screening promises.
     pub refitted: bool,
+    /// ln of the evidence of the refitted model on the estimation records, nats; comparable within one diagnosis.
+    pub evidence_nats: Option<f64>,
 }
 
 /// A candidate that was not tried, and why.
@@ -177,6 +193,14 @@ pub struct Diagnosis {
     pub ranking: Vec<Ranked>,
     /// Parameters of the missing effects, or of the stand-ins, in the final model.
     pub parameters: BTreeMap<String, BTreeMap<String, ParameterEstimate>>,
+    /// ln of the evidence of the final model on the estimation records, nats; none where it was not searched for.
+    pub evidence_nats: Option<f64>,
+    /// How sure each effect of the best model is that was found, named or not.
+    pub certificates: BTreeMap<String, Certificate>,
+    /// What `missing` explains better with fewer parameters than the given model has.
+    pub parsimony: Option<Parsimony>,
+    /// The share of the evidence that each member of each of `sets` has.
+    pub posterior: Vec<Vec<f64>>,
     /// Candidates that could not be tried.
     pub not_tried: Vec<NotTried>,
     /// The experiment for effects that the data cannot tell apart.

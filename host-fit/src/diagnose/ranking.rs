@@ -4,8 +4,8 @@
 use super::{NotTried, RULES, Ranked, estimates};
 use crate::model::Model;
 use crate::terms::{
-    Candidate, Chance, HeldOut, Hypothesis, Judged, Noise, Screen, Search, Table, Term, Units,
-    p_value,
+    Candidate, Chance, HeldOut, Hypothesis, Judged, Likelihood, Noise, Screen, Search, Table, Term,
+    Units, p_value,
 };
 use model_core::effect::Spec;
 use rayon::prelude::*;
@@ -135,7 +135,11 @@ fn rated(
             Term::Effect { spec, .. } => spec.name.to_owned(),
             Term::Memory(_) | Term::Wake(_) => FLOW_MEMORY.to_owned(),
             Term::Inertia(_) => FLOW_LAG.to_owned(),
-            Term::State(_) | Term::Product(_) | Term::Offset | Term::LevelRate => {
+            Term::State(_)
+            | Term::Product(_)
+            | Term::Offset
+            | Term::LevelRate
+            | Term::Path { .. } => {
                 continue;
             }
         };
@@ -173,7 +177,13 @@ fn rated(
 
 /// The ranking as it is reported, in the user's units: `before` is the held-out error
 /// without them.
-pub(super) fn ranked(units: &Units, before: f64, rivals: &[Rival], chance: &Chance) -> Vec<Ranked> {
+pub(super) fn ranked(
+    units: &Units,
+    before: f64,
+    rivals: &[Rival],
+    chance: &Chance,
+    likelihood: Option<&Likelihood<'_>>,
+) -> Vec<Ranked> {
     let by_chance = 1.0 - (1.0 - chance.usual()).max(0.0).sqrt();
     let effects = || rivals.iter().filter_map(|r| Some((r, r.spec?)));
     effects()
@@ -203,6 +213,9 @@ pub(super) fn ranked(units: &Units, before: f64, rivals: &[Rival], chance: &Chan
                     && p <= RULES.level
                     && gain > RULES.worthwhile,
                 refitted: rival.refitted.is_some(),
+                evidence_nats: rival
+                    .judged()
+                    .and_then(|judged| likelihood?.evidence(judged.model())),
             }
         })
         .collect()

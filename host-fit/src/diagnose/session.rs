@@ -7,7 +7,7 @@ use super::ranking::{Rival, not_tried, ranked, rivals_and_chance};
 use super::{DiagnoseError, Diagnosis, Options, RULES, Rung, Verdict};
 use crate::model::Model;
 use crate::terms::{
-    Chance, Found, HeldOut, Hypothesis, Judge, Judged, Search, Term, Units, p_value,
+    Chance, Found, HeldOut, Hypothesis, Judge, Judged, Likelihood, Search, Term, Units, p_value,
 };
 use model_core::effect::Spec;
 use rayon::prelude::*;
@@ -95,6 +95,7 @@ impl Session<'_> {
         &self,
         found: Found,
         first: [Rung; 2],
+        given: &Model,
         as_given: &HeldOut,
         restarted_s: Option<f64>,
     ) -> Diagnosis {
@@ -105,8 +106,7 @@ impl Session<'_> {
         // One effect may do better than all that were found together.
         let alone = compared.best_alone();
         let alone = alone.filter(|alone| alone.score() < named.score());
-        let concluded =
-            |best: &Hypothesis| self.concluded(best, &found.bare, &found.root, as_given);
+        let concluded = |best: &Hypothesis| self.concluded(best, &found, as_given);
         let Conclusion {
             verdict,
             model: last,
@@ -151,7 +151,23 @@ impl Session<'_> {
                 (spec.name.to_owned(), estimates)
             })
             .collect();
-        let mut ranking = ranked(units, context.judged.rmse(), &others, &chance);
+        (search.progress)("the evidence of the models");
+        let likelihood = Likelihood::of(judge, last.judged.model());
+        let likelihood = likelihood.as_ref();
+        let posterior = sets
+            .iter()
+            .take(if claims { way.proven } else { 0 })
+            .map(|set| likelihood.map_or_else(Vec::new, |all| set.posterior(all, &last.judged)))
+            .collect();
+        let subject = if !order.is_empty() {
+            &last
+        } else if !named.is_bare() {
+            &named
+        } else {
+            &found.best
+        };
+        let certificates = self.certificates(subject, &sets, &others, &found);
+        let mut ranking = ranked(units, context.judged.rmse(), &others, &chance, likelihood);
         for entry in &mut ranking {
             // The ranking shows what the effects are in the final model, and only what
             // still cannot be told apart there.
@@ -179,6 +195,7 @@ impl Session<'_> {
         let proven = if claims { way.proven } else { 0 };
         let stand_ins = missing.split_off(proven);
         sets.truncate(proven);
+        let parsimony = self.parsimony(given, &last, &missing);
         Diagnosis {
             verdict,
             sets: sets.into_iter().map(|set| set.names).collect(),
@@ -197,6 +214,10 @@ impl Session<'_> {
             ladder,
             ranking,
             parameters,
+            evidence_nats: likelihood.and_then(|all| all.evidence(last.judged.model())),
+            certificates,
+            parsimony,
+            posterior,
             not_tried: not_tried(search, found.root.judged.model()),
             separation,
             p_value,

@@ -9,7 +9,8 @@ use super::{Diagnosis, RULES, Rung, Verdict};
 use crate::model::Model;
 use crate::residual::{FailureCoordinate, NoiseSource, examine};
 use crate::terms::{
-    Found, HeldOut, Hypothesis, Judged, Noise, RULES as TERMS, Screen, Search, Table, Term, p_value,
+    Found, HeldOut, Hypothesis, Judged, Likelihood, Noise, RULES as TERMS, Screen, Search, Table,
+    Term, p_value,
 };
 use model_core::effect::Spec;
 use rayon::prelude::*;
@@ -60,8 +61,13 @@ impl Session<'_> {
             noise_estimate: judge.measured_noise_rmse() * self.units.y,
             level_scatter: judge.level_scatter(),
             ladder: vec![first.clone()],
-            ranking: ranked(&self.units, before, &rivals, &table.chance),
+            ranking: ranked(&self.units, before, &rivals, &table.chance, None),
             parameters: BTreeMap::new(),
+            evidence_nats: Likelihood::of(judge, given_inside)
+                .and_then(|likelihood| likelihood.evidence(given_inside)),
+            certificates: BTreeMap::new(),
+            parsimony: None,
+            posterior: Vec::new(),
             not_tried: not_tried(self.search, given_inside),
             separation: None,
             p_value: None,
@@ -155,7 +161,7 @@ impl Session<'_> {
             }
         }
         let model = judged.model();
-        let failures = examine(&records, runs, model.warm_up(), model.longest_delay());
+        let failures = examine(&records, runs, model.longest_delay());
         failures
             .by
             .iter()
@@ -165,7 +171,8 @@ impl Session<'_> {
 
     /// How effects have earned to be named or to stand in: they beat what lags can
     /// do, or do as well with fewer parameters. `None` if they have not.
-    fn earned(&self, best: &Hypothesis, bare: &Hypothesis, root: &Hypothesis) -> Option<Earned> {
+    fn earned(&self, best: &Hypothesis, found: &Found) -> Option<Earned> {
+        let (bare, root) = (&found.bare, &found.root);
         let (with, without) = (best.judged.rmse(), bare.judged.rmse());
         let worthwhile = if self.in_the_dark(bare) {
             RULES.worthwhile_in_the_dark
@@ -177,13 +184,16 @@ impl Session<'_> {
         if self.judge().drifts_more(&best.judged, &bare.judged) {
             return None;
         }
+        let is_worthwhile = with < (1.0 - worthwhile) * without;
         if open
-            && with < (1.0 - worthwhile) * without
+            && with < without
             && let Some(p) = self.more_than_chance(best, bare)
         {
-            // Beside a base that fits, what the records do not tell the size of is a curve through its errors.
-            let told = !self.is_enough(bare) || self.is_known(best);
-            return told.then_some(Earned { p_value: Some(p) });
+            // Beside a base that fits, parameters that are not identified have to be certified.
+            let is_sure = is_worthwhile && (!self.is_enough(bare) || self.is_known(best));
+            if is_sure || (self.is_enough(bare) && self.is_certified(best, found)) {
+                return Some(Earned { p_value: Some(p) });
+            }
         }
         // Who makes do with less than a base that fits has to be known, and needed: without it, what is left does not.
         let needed = || {
@@ -351,10 +361,10 @@ impl Session<'_> {
     pub(super) fn concluded(
         &self,
         best: &Hypothesis,
-        bare: &Hypothesis,
-        root: &Hypothesis,
+        found: &Found,
         as_given: &HeldOut,
     ) -> Conclusion {
+        let bare = &found.bare;
         let effects: Vec<&'static Spec> = best.terms.iter().filter_map(Term::effect).collect();
         let judge = self.judge();
         let of_bare = || Conclusion {
@@ -372,7 +382,7 @@ impl Session<'_> {
         if effects.is_empty() || no_better {
             return of_bare();
         }
-        let Some(earned) = self.earned(best, bare, root) else {
+        let Some(earned) = self.earned(best, found) else {
             return of_bare();
         };
         let left = judge.excess(&best.judged.held_out)

@@ -111,10 +111,10 @@ impl Coordinate {
     /// What an inner unit of it is in the user's.
     pub(super) fn scale(&self, units: &Units) -> f64 {
         match self {
-            Self::MemoryOfU(_) => units.u,
+            Self::MemoryOfU(_) => 1.0,
             Self::MemoryOfRate(_) => units.y / units.time,
             Self::Blowing(_) => units.time,
-            _ => self.unit().scale(units.y, units.time, units.u),
+            _ => self.unit().scale(units.y, units.time, 1.0),
         }
     }
 

@@ -30,7 +30,7 @@ pub use trace::{Signal, TRACED, Trace, TracedRecord};
 use crate::data::Record;
 use crate::diagnose::{DiagnoseError, Rung};
 use crate::model::Model;
-use crate::terms::{Bench, Found as Searched, Hypothesis, Known, MovingZero, Search};
+use crate::terms::{Bench, Found as Searched, Hypothesis, Known, Search};
 use finder::Finder;
 use outcome::Found;
 use serde::Serialize;
@@ -121,7 +121,7 @@ pub fn discover(
         interrupt,
         progress,
     };
-    let moving_zero = MovingZero::of(records);
+    let moving_zero = bench.moving_zero.clone();
     let finder = Finder {
         search: &search,
         units,
@@ -136,7 +136,7 @@ pub fn discover(
     let as_given = judge.held_out(|_| &bench.given)?;
     let given_rung = Rung::of(judge, units, &as_given, &[], "the model as given", None);
     let mut ladder = vec![given_rung.clone()];
-    progress("the base");
+    progress("the base model");
     let root = search.root(&bench.given, bench.mid_run)?;
     if interrupt.load(Ordering::Relaxed) {
         return Err(DiagnoseError::Interrupted);
@@ -156,7 +156,7 @@ pub fn discover(
     let bases = leanest.iter().cloned().chain(given).chain([found.best]);
     let by_size = |a: &Hypothesis, b: &Hypothesis| a.judged.size().total_cmp(&b.judged.size());
     let base = bases.chain(last).min_by(by_size).unwrap_or(root);
-    ladder.push(rung(&base, &[], "the best base without a new term"));
+    ladder.push(rung(&base, &[], "base model, no new term"));
     let mut current = base.clone();
     let mut contexts = vec![current.clone()];
     let leaner = half.into_iter().chain(leanest);
@@ -193,21 +193,18 @@ pub fn discover(
     let lacking = found.first().map_or(&base.judged, |found| &found.without);
     let trace = missing(lacking.rmse())
         .then(|| {
-            progress("the trace of what is missing");
+            progress("the trace of the unexplained error");
             trace::trace(judge, lacking, units)
         })
         .flatten();
     progress("formulas");
     let (terms, end) = finder.formulas(found, current);
     if !terms.is_empty() {
-        ladder.push(rung(&end, &names, "with formulas where one does as well"));
+        ladder.push(rung(&end, &names, "with formulas that fit equally well"));
     }
     let fitted = judge.final_fit(&end.judged);
     let own: Vec<&Term> = terms.iter().map(|found| &found.term).collect();
     let (mut model, written) = finder.outer(&fitted.model, &own);
-    if !judge.full_is_one && !own.is_empty() && !units.keep(&fitted.model, &model, records) {
-        return Err(DiagnoseError::FullJet(units.u));
-    }
     if own.is_empty() && as_given.rmse() <= end.judged.rmse() {
         model = handed_in.clone();
         if as_given.rmse() < end.judged.rmse() {

@@ -8,8 +8,9 @@ use crate::diagnose::{ParameterEstimate, Rung};
 use crate::experiment::Separation;
 use crate::fit::Fit;
 use crate::model::Model;
+use crate::preparation::MovingZero;
 use crate::residual::NoiseSource;
-use crate::terms::{HeldOutBy, Hypothesis, Judged, MovingZero, Units};
+use crate::terms::{HeldOutBy, Hypothesis, Judged, Units};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -177,7 +178,7 @@ pub(super) fn told(found: &Found, written: &Term, fitted: &Fit, units: &Units) -
     let place = entry.place();
     let share = |share: f64| 100.0 * share;
     let mut comment = format!(
-        "Found by `host-fit discover`: {} by {}.\nIt takes {:.0} % of the excess error on held-out records; p = {:.1e}.",
+        "Found by `host-fit discover`: {} by {}.\nIt explains {:.0} % of the model error above the noise on the validation records; p = {:.1e}.",
         entry.words(),
         written.coordinate.words(),
         share(found.formula_taken),
@@ -189,7 +190,7 @@ pub(super) fn told(found: &Found, written: &Term, fitted: &Fit, units: &Units) -
     for other in &found.alike {
         let place = other.place.word();
         comment += &format!(
-            "\nThe records cannot tell it from one at the {place} by {}.",
+            "\nNot distinguishable on the records from a term at the {place} by {}.",
             other.coordinate
         );
     }

@@ -95,7 +95,7 @@ impl Entry {
 
     /// What an inner unit of g is in the user's.
     pub(super) fn scale(self, units: &Units) -> f64 {
-        self.unit().scale(units.y, units.time, units.u)
+        self.unit().scale(units.y, units.time, 1.0)
     }
 
     /// Whether the base takes a constant g as well.

@@ -39,18 +39,18 @@ rules! {
     /// The best of a place is compared as a formula too where it is no further than this behind the best of all.
     contends: f64 = 1.5, "times the best error", "straight lines through a square of y left 1.066, the wrong place 1.025";
     /// A term that leaves no more than this leaves nothing for another one.
-    at_the_floor: f64 = 1.02, "times the noise floor", "a sensor that stood in for a hot jet left 1.09, the jet 1.05 as a curve";
+    at_the_floor: f64 = 1.02, "times the noise level", "a sensor that stood in for a hot jet left 1.09, the jet 1.05 as a curve";
     /// Curves at one place whose errors differ by less than this are the same curve.
     twins: f64 = 0.001, "share of the rms error", "two names of one signal differ by rounding";
     /// A term must lower the held-out error of the best base without it by this fraction.
     worthwhile: f64 = 0.015, "share of the rms error", "as for effects of the catalogue";
     /// … and, where the noise floor is known, take this share of its excess at least.
-    least_share: f64 = 0.25, "share of the excess", "as for the stand-ins of `diagnose`; a rig that drifted as a whole had 19 % taken by a delay";
+    least_share: f64 = 0.25, "share of the model error above the noise", "as for the stand-ins of `diagnose`; a rig that drifted as a whole had 19 % taken by a delay";
     /// A base that leaves less than this is near the floor: a term has to take `most_of_it` there, and neither the sensor's sensitivity nor
     /// time in the record is told, as levels that scatter and zeros that drift look like them.
-    near_the_floor: f64 = 1.10, "times the noise floor", "`floor_margin` of `diagnose`: nulls of nine families stay below it";
+    near_the_floor: f64 = 1.10, "times the noise level", "`floor_margin` of `diagnose`: nulls of nine families stay below it";
     /// Share of the best base's excess that a term has to take there, and wherever the sensor's zero moves from record to record.
-    most_of_it: f64 = 0.75, "share of the excess", "curves through zeros that drift or wander took 50 to 70 %, terms that were there 80 % and more in 16 of 17";
+    most_of_it: f64 = 0.75, "share of the model error above the noise", "curves through zeros that drift or wander took 50 to 70 %, terms that were there 80 % and more in 16 of 17";
     /// Level of the whole search, with all curves that were looked at.
     level_of_search: f64 = 0.02, "p-value", "as for effects of the catalogue: three false terms in a hundred are too many";
     /// Level of comparisons of two curves.

@@ -138,7 +138,6 @@ impl Term {
             shape,
             coordinate: self.coordinate.out(units),
             fading: self.fading.map(|range| range.map(|t| t * units.time)),
-            on: self.on * units.u,
             shift: self.shift * units.time,
             time: self.time * units.time,
             ..self.clone()

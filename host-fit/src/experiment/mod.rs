@@ -68,7 +68,7 @@ pub struct Experiment {
 pub enum ExperimentError {
     /// Nothing to separate.
     #[error(
-        "{0} model given; a separating experiment needs at least two. Give the models that the data cannot tell apart."
+        "{0} model given; a separating experiment needs at least two. Give the models that fit the data equally well."
     )]
     TooFewModels(usize),
     /// The models run at different rates.
@@ -196,9 +196,8 @@ fn run(model: &Model, u: &[f64]) -> Option<Vec<f64>> {
         .map(|reference| vec![reference; u.len()])
         .collect();
     let signals = Signals {
-        u,
-        y: None,
         channels: references.iter().map(Vec::as_slice).collect(),
+        ..Signals::commanded(model, u)
     };
     let simulator = Simulator::with_values(model, &model.values(), Rounding::Samples);
     let mut y = Vec::with_capacity(u.len());

@@ -38,7 +38,7 @@ impl Separation {
     #[must_use]
     pub fn words(&self) -> String {
         format!(
-            "To tell {} apart, play this: {} (`--experiment command.csv` writes it).",
+            "Experiment that distinguishes {}: {} (`--experiment command.csv` writes it).",
             self.effects.join(" and "),
             self.experiment.words().trim_end_matches('.')
         )

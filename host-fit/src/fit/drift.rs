@@ -12,10 +12,11 @@ use crate::model::{Model, Start};
 #[must_use]
 pub fn restart_after(model: &Model, records: &[Record]) -> Option<usize> {
     let shortest = records.iter().map(Record::len).min()?;
-    if model.start != Start::Measured || !remembers(model, shortest / 10) {
+    if model.start != Start::Measured || !remembers(model, shortest) {
         return None;
     }
-    let samples = (shortest / RULES.pieces).max(RULES.warm_ups * model.warm_up());
+    let memory = model.longest_lag().max(model.longest_delay()) + 1;
+    let samples = (shortest / RULES.pieces).max(RULES.memories * memory);
     (samples < shortest / 2).then_some(samples)
 }
 
@@ -27,8 +28,8 @@ fn remembers(model: &Model, samples: usize) -> bool {
         .is_ok_and(|pole| left(pole) > RULES.drifts)
 }
 
-/// A record cut into pieces of so many samples; what is left over after the last
-/// whole one belongs to it.
+/// A record cut into pieces of so many scored samples, each of which follows the measurement through the samples before
+/// them; what is left over after the last whole one belongs to it.
 pub(crate) fn pieces(record: &Record, samples: usize) -> Vec<Record> {
     let count = (record.len() / samples.max(1)).max(1);
     let end = |piece: usize| {
@@ -38,9 +39,17 @@ pub(crate) fn pieces(record: &Record, samples: usize) -> Vec<Record> {
             (piece + 1) * samples
         }
     };
-    (0..count)
-        .map(|piece| record.part(piece * samples, end(piece)))
-        .collect()
+    let follow = samples / RULES.memories;
+    let piece = |piece: usize| {
+        let from = piece * samples;
+        let before = from.saturating_sub(follow);
+        let mut part = record.part(before, end(piece));
+        if from > 0 {
+            (part.follow, part.lead) = (from - before, from - before);
+        }
+        part
+    };
+    (0..count).map(piece).collect()
 }
 
 #[cfg(test)]

@@ -165,7 +165,8 @@ struct FreeRunProblem<'a> {
     signals: Vec<Signals<'a>>,
     measured: Vec<&'a [f64]>,
     axes: Vec<Searched>,
-    warm_up: usize,
+    /// First samples that are not scored, per record.
+    lead: Vec<usize>,
     rounding: Rounding,
     level_scatter: Option<LevelScatter>,
 }
@@ -184,7 +185,7 @@ impl<'a> FreeRunProblem<'a> {
             signals: signals?,
             measured: records.iter().map(|record| record.y.as_slice()).collect(),
             axes,
-            warm_up: model.warm_up(),
+            lead: records.iter().map(|record| record.lead).collect(),
             rounding,
             level_scatter,
         })
@@ -192,8 +193,8 @@ impl<'a> FreeRunProblem<'a> {
 
     /// Samples that are judged.
     fn samples(&self) -> usize {
-        let each = self.measured.iter();
-        each.map(|y| y.len().saturating_sub(self.warm_up)).sum()
+        let each = self.measured.iter().zip(&self.lead);
+        each.map(|(y, lead)| y.len().saturating_sub(*lead)).sum()
     }
 
     /// y_sim of a record; `None` if it diverges.
@@ -234,13 +235,9 @@ impl<'a> FreeRunProblem<'a> {
             Some(run) => run,
             None => self.run(values, record)?,
         };
-        let measured = self.measured[record];
+        let (measured, lead) = (self.measured[record], self.lead[record]);
         let residual = |(k, sim): (usize, &f64)| {
-            if k < self.warm_up {
-                0.0
-            } else {
-                measured[k] - sim
-            }
+            if k < lead { 0.0 } else { measured[k] - sim }
         };
         let mut residual: Vec<f64> = simulated.iter().enumerate().map(residual).collect();
         for (axis, column) in self.axes.iter().zip(&mut jacobian) {
@@ -256,19 +253,17 @@ impl<'a> FreeRunProblem<'a> {
             let scale = axis.slope(values[axis.index]) / width;
             let slopes = high.iter().zip(&low).enumerate();
             *column = slopes
-                .map(|(k, (high, low))| {
-                    if k < self.warm_up {
-                        0.0
-                    } else {
-                        (high - low) * scale
-                    }
-                })
+                .map(
+                    |(k, (high, low))| {
+                        if k < lead { 0.0 } else { (high - low) * scale }
+                    },
+                )
                 .collect();
         }
         if let Some(scatter) = &self.level_scatter {
-            let y = measured.get(self.warm_up..).unwrap_or(&[]);
+            let y = measured.get(lead..).unwrap_or(&[]);
             for series in jacobian.iter_mut().chain([&mut residual]) {
-                let judged = series.get_mut(self.warm_up..).unwrap_or(&mut []);
+                let judged = series.get_mut(lead..).unwrap_or(&mut []);
                 scatter.shrink(judged, y, 1);
             }
         }
@@ -283,7 +278,7 @@ impl<'a> FreeRunProblem<'a> {
         record: usize,
         axes: &[usize],
     ) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
-        let signals = &self.signals[record];
+        let (signals, lead) = (&self.signals[record], self.lead[record]);
         let mut duals: Vec<Dual<P>> = values.iter().map(|v| Dual::constant(*v)).collect();
         for (slot, axis) in axes.iter().enumerate() {
             let axis = &self.axes[*axis];
@@ -301,7 +296,7 @@ impl<'a> FreeRunProblem<'a> {
             |k, output: &Output<Dual<P>>| {
                 y.push(output.measured.value);
                 for (column, slope) in columns.iter_mut().zip(output.measured.partials) {
-                    column.push(if k < self.warm_up { 0.0 } else { slope });
+                    column.push(if k < lead { 0.0 } else { slope });
                 }
                 ControlFlow::Continue(())
             },
@@ -318,7 +313,7 @@ impl LeastSquares for FreeRunProblem<'_> {
     fn cost(&self, values: &[f64], enough: f64) -> f64 {
         let simulator = Simulator::with_values(self.model, values, self.rounding);
         let each = |record: usize| {
-            let measured = self.measured[record];
+            let (measured, lead) = (self.measured[record], self.lead[record]);
             let (mut sum, mut product, mut square) = (0.0, 0.0, 0.0);
             // What lies along y is known at the end only.
             let enough = match self.level_scatter {
@@ -326,7 +321,7 @@ impl LeastSquares for FreeRunProblem<'_> {
                 None => enough,
             };
             let left = simulator.run(&self.signals[record], |k, output: &Output<f64>| {
-                if k >= self.warm_up {
+                if k >= lead {
                     let error = measured[k] - output.measured;
                     sum += error * error;
                     if self.level_scatter.is_some() {

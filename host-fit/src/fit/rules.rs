@@ -66,8 +66,9 @@ rules! {
 
     /// Runs that a record of a drifting rig is cut into.
     pieces: usize = 20, "", "judgement; EMPS in docs/hidden-effects.md";
-    /// A piece is at least so many times what a run takes from the measurement to start.
-    warm_ups: usize = 8, "", "judgement";
-    /// A rig drifts when more than this of what happened is left after a tenth of a record.
-    drifts: f64 = 0.1, "share", "judgement; held by `an_integrator_drifts_and_a_damped_rig_does_not`";
+    /// A piece is at least so many times the longest lag or delay, and follows the measurement for one part in so many
+    /// before it is scored.
+    memories: usize = 8, "", "judgement";
+    /// A rig drifts when more than this of what happened is left after a whole record.
+    drifts: f64 = 0.37, "share", "judgement; held by `an_integrator_drifts_and_a_damped_rig_does_not`";
 }

@@ -4,6 +4,7 @@ use thiserror::Error;
 
 use super::structure::{InputDelay, Structure};
 use crate::data::Record;
+use crate::data::memory::TooMuch;
 use crate::linalg;
 use crate::search::StopReason;
 
@@ -11,6 +12,9 @@ use crate::search::StopReason;
 #[derive(Debug, Clone, Error, PartialEq)]
 #[non_exhaustive]
 pub enum IdentifyError {
+    /// The tables of lagged products do not fit into memory.
+    #[error(transparent)]
+    Memory(#[from] TooMuch),
     /// Nothing to fit.
     #[error(
         "the data set has no record with use \"identify\". Mark at least one record so in dataset.toml."

@@ -8,10 +8,6 @@ use super::linearised::Linearised;
 use super::regression::Regression;
 use crate::search::{Evaluation, Point, Problem, Variable};
 
-/// Value of a candidate that diverges at once; one that diverges at the very
-/// end gets half of it, so that a search can leave the unstable region.
-pub(crate) const DIVERGED_VALUE: f64 = 1e9;
-
 /// ε of the free run as a function of the delays.
 pub(crate) struct FreeRun {
     pub(crate) regression: Regression,
@@ -30,7 +26,10 @@ impl FreeRun {
         {
             RunOutcome::Squared(sum) => Evaluation::Value(sum.sqrt()),
             RunOutcome::AtLeast(_) => Evaluation::AtLeast(give_up_at),
-            RunOutcome::Diverged(done) => Evaluation::Value(DIVERGED_VALUE * (1.0 - 0.5 * done)),
+            // One that diverges at the very end gets half, so that a search can leave the unstable region.
+            RunOutcome::Diverged(done) => {
+                Evaluation::Value(self.runner.diverged * (1.0 - 0.5 * done))
+            }
         }
     }
 

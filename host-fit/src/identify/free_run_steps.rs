@@ -3,7 +3,7 @@
 use rand::RngExt;
 
 use super::exchange::{Exchange, List, Slot, set};
-use super::free_run::{DIVERGED_VALUE, FreeRun};
+use super::free_run::FreeRun;
 use super::layout::Delays;
 use super::linearised::Linearised;
 use super::rules::RULES;
@@ -291,7 +291,7 @@ impl SearchStep<FreeRun> for FreeKickStep {
             return Ok(None);
         };
         let value = evaluator.value(&point)?;
-        if value >= 0.5 * DIVERGED_VALUE {
+        if value >= 0.5 * evaluator.problem().runner.diverged {
             return Ok(None);
         }
         let start = Success { point, value };

@@ -45,6 +45,8 @@ pub(crate) struct Trajectory {
 pub(crate) struct FreeRunner {
     structure: Structure,
     bound: f64,
+    /// [`diverged_value`].
+    pub(crate) diverged: f64,
     samples: usize,
 }
 
@@ -200,16 +202,25 @@ fn undecided(edges: &[usize], arrivals: &[Arrival]) -> Vec<(usize, usize)> {
     all
 }
 
+/// Largest |y| of the records, whatever its unit.
+fn largest_output(signals: &FitSignals) -> f64 {
+    let outputs = signals.y.iter().flatten();
+    let largest = outputs.fold(0.0f64, |m, y| m.max(y.abs()));
+    largest.max(f64::MIN_POSITIVE)
+}
+
+/// ε of a candidate that diverges at once: beyond that of any that does not.
+pub(crate) fn diverged_value(signals: &FitSignals) -> f64 {
+    1e9 * largest_output(signals)
+}
+
 impl FreeRunner {
     pub(crate) fn new(signals: &FitSignals, structure: &Structure) -> Self {
-        let largest = signals
-            .y
-            .iter()
-            .flatten()
-            .fold(0.0f64, |m, y| m.max(y.abs()));
+        let largest = largest_output(signals);
         Self {
             structure: structure.clone(),
-            bound: RULES.hopeless * largest.max(1e-9),
+            bound: RULES.hopeless * largest,
+            diverged: diverged_value(signals),
             samples: signals.y.iter().map(Vec::len).sum(),
         }
     }
@@ -283,6 +294,7 @@ impl pulp::NullaryFnOnce for BlockRun<'_> {
             structure,
             bound,
             samples: all_samples,
+            ..
         } = self.runner;
         let inputs = self.arrivals.len();
         // Zeros before a record, for the longest lag and the average.

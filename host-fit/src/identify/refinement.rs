@@ -15,7 +15,7 @@ pub struct Refinement {
     #[serde(rename = "validate_epsilon")]
     pub validate: Option<(f64, f64)>,
     /// Whether the refined coefficients are those of the returned model: the
-    /// held-out ε fell or, without held-out records, the one fitted.
+    /// held-out ε fell or, without validation records, the one fitted.
     pub kept: bool,
 }
 
@@ -54,7 +54,6 @@ pub(crate) fn refine(model: &mut Model, data: &[Record]) -> Option<Refinement> {
 
 /// ε over records, eq. (9); `None` if a run diverges.
 pub(crate) fn epsilon(model: &Model, records: &[&Record]) -> Option<f64> {
-    let warm_up = model.warm_up();
     let mut sum = 0.0;
     for record in records {
         let simulated = model.free_run(record).ok()?;
@@ -62,7 +61,7 @@ pub(crate) fn epsilon(model: &Model, records: &[&Record]) -> Option<f64> {
             .y
             .iter()
             .zip(simulated)
-            .skip(warm_up)
+            .skip(record.lead)
             .map(|(y, s)| (y - s).powi(2))
             .sum::<f64>();
     }

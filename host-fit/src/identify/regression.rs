@@ -6,10 +6,34 @@ use super::arrival::{FitSignals, Weights, difference};
 use super::lagged_products::{LaggedOutputs, TARGET, Table};
 use super::layout::{Column, Delays, Layout};
 use super::structure::{Series, Structure};
+use crate::data::memory::{self, TooMuch};
 use crate::linalg::{self, Cholesky};
 
 /// Tables kept; the longest unused goes first. One of 500 lags takes 2 MB.
 const TABLES_KEPT: usize = 48;
+/// Tables that are in memory beside those that are kept: the plain one, and two matrices that a new one is made of.
+const TABLES_BESIDE: u64 = 3;
+
+/// Bytes of one table.
+fn table_bytes(longest: usize) -> u64 {
+    (longest as u64 + 3).pow(2) * 8
+}
+
+/// Tables that a candidate of `inputs` inputs needs.
+fn tables_needed(inputs: usize) -> usize {
+    (inputs * (inputs + 3) / 2).max(1)
+}
+
+/// Whether there is memory for the tables that candidates of `structure` need.
+///
+/// # Errors
+/// [`TooMuch`] with what they take.
+pub(crate) fn fits_in_memory(structure: &Structure) -> Result<(), TooMuch> {
+    let tables = tables_needed(structure.inputs) as u64 + TABLES_BESIDE;
+    let needed = tables * table_bytes(structure.longest_lag.into());
+    let what = format!("a search over lags up to {} samples", structure.longest_lag);
+    memory::allow(needed, &what, "give a smaller --max-lag or --n3")
+}
 
 /// A table serves a neighbouring input delay if about this many samples differ.
 const SAMPLES_PATCHED: usize = 3000;
@@ -80,6 +104,8 @@ pub(crate) struct Regression {
     pub(crate) lagged: LaggedOutputs,
     plain: Table,
     kept: BTreeMap<Which, Kept>,
+    /// Most tables that are kept.
+    most: usize,
     clock: u64,
     /// Ticks of input delay that move about [`SAMPLES_PATCHED`] samples.
     reach: u64,
@@ -91,6 +117,13 @@ impl Regression {
         let layout = Layout::new(structure);
         let signals = FitSignals::new(records, structure);
         let longest = structure.convention.behind_newest(structure.longest_lag);
+        // No more than half of the memory, but what a candidate needs.
+        let fitting =
+            usize::try_from(memory::limit() / 2 / table_bytes(longest)).unwrap_or(TABLES_KEPT);
+        let most = fitting.clamp(
+            tables_needed(structure.inputs).min(TABLES_KEPT),
+            TABLES_KEPT,
+        );
         let lagged = LaggedOutputs::new(&signals.y, longest);
         let plain = lagged.table(&signals.everywhere());
         let at_zero = signals.arrived(0);
@@ -106,6 +139,7 @@ impl Regression {
             lagged,
             plain,
             kept: BTreeMap::new(),
+            most,
             clock: 0,
             reach,
             binary: at_zero.is_binary(),
@@ -186,7 +220,7 @@ impl Regression {
             kept.last_used = self.clock;
             return;
         }
-        if self.kept.len() >= TABLES_KEPT {
+        if self.kept.len() >= self.most {
             let oldest = self
                 .kept
                 .iter()

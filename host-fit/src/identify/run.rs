@@ -11,11 +11,11 @@ use super::arrival::factor;
 use super::coefficients::Coefficients;
 use super::delay_search::search;
 use super::error::{IdentifyError, check};
-use super::free_run::DIVERGED_VALUE;
+use super::free_runner::diverged_value;
 use super::layout::Delays;
 use super::options::{IdentifyOptions, Objective};
 use super::refinement::{Refinement, refine};
-use super::regression::Regression;
+use super::regression::{Regression, fits_in_memory};
 use super::structure::{InputDelay, Series};
 use crate::data::{Record, Use};
 use crate::model::{Delay, Model, Training};
@@ -101,6 +101,7 @@ pub fn identify(
     let started = Instant::now();
     let records: Vec<&Record> = data.iter().filter(|r| r.role == Use::Identify).collect();
     check(&records, &options.structure)?;
+    fits_in_memory(&options.structure)?;
     let series: Vec<Series<'_>> = records
         .iter()
         .map(|r| Series { u: &r.u, y: &r.y })
@@ -117,7 +118,9 @@ pub fn identify(
     let Some(best) = report.best else {
         return Err(IdentifyError::NoResult { stop: report.stop });
     };
-    if options.objective == Objective::FreeRun && best.value >= 0.5 * DIVERGED_VALUE {
+    if options.objective == Objective::FreeRun
+        && best.value >= 0.5 * diverged_value(&regression.signals)
+    {
         return Err(IdentifyError::NoStableModel { stop: report.stop });
     }
     let delays = regression.layout.delays(&best.point);

@@ -1,8 +1,9 @@
 //! `[delay]` of a model file: the law, its parameters by name, the factors of
 //! the inputs and whether the input is interpolated.
 
+use super::bounds::{self, Fault};
 use super::{Delay, TransportLaw};
-use model_core::effect::{Spec, Unit};
+use model_core::effect::Spec;
 use model_core::effects::LAWS;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -29,9 +30,6 @@ impl<'de> Deserialize<'de> for DelayTable {
 pub(super) fn name_of(spec: &Spec) -> &'static str {
     spec.name.strip_suffix("-delay").unwrap_or(spec.name)
 }
-
-/// A key and what is wrong with it.
-type Fault = (String, String);
 
 impl DelayTable {
     pub(super) fn of(delay: &Delay) -> Self {
@@ -80,9 +78,7 @@ impl DelayTable {
                 let problem = format!("({}) is missing or no finite number", parameter.unit);
                 return Err(fault(parameter.name, &problem));
             };
-            if parameter.unit == Unit::Second && value < 0.0 {
-                return Err(fault(parameter.name, "a delay cannot be negative"));
-            }
+            bounds::parameter(&format!("delay.{}", parameter.name), parameter, value)?;
             parameters.push(value);
         }
         let factors = self.array("factors", inputs, number)?;
@@ -200,7 +196,7 @@ mod tests {
             ),
             (
                 "law = \"edge-dependent\"\nrise_delay = -0.1\nfall_delay = 0.1",
-                "delay.rise_delay: a delay cannot be negative",
+                "delay.rise_delay: -0.1 is negative",
             ),
         ] {
             let error = read(text, 1).expect_err(text);

@@ -21,17 +21,19 @@ impl Training {
             }
         };
         let on_off = records.iter().all(|record| record.is_on_off());
-        let mut times = Vec::new();
+        let (mut times, mut gaps) = (Vec::new(), Vec::new());
         if on_off {
             for record in records {
-                let runs = runs_on(&record.u);
-                times.extend(runs.map(|n| n as f64 * record.sample_period_s));
+                let seconds = |n: usize| n as f64 * record.sample_period_s;
+                times.extend(runs_on(&record.u).map(seconds));
+                gaps.extend(gaps_between(&record.u).map(seconds));
             }
         }
         Self {
             y_range: known(span(&mut records.iter().flat_map(|r| r.y.iter().copied()))),
             duty_range: known(span(&mut records.iter().map(|r| duty(&r.u)))),
             on_time_range_s: known(span(&mut times.into_iter())),
+            off_time_range_s: known(span(&mut gaps.into_iter())),
             ..Self::default()
         }
     }
@@ -46,6 +48,26 @@ fn runs_on(u: &[f64]) -> impl Iterator<Item = usize> {
     u.chunk_by(|a, b| a == b)
         .filter(|run| run.first() == Some(&1.0))
         .map(<[f64]>::len)
+}
+
+/// Lengths of the stretches of `u` below 1 between two at 1, samples.
+fn gaps_between(u: &[f64]) -> impl Iterator<Item = usize> {
+    let first = u.iter().position(|u| *u == 1.0).unwrap_or(u.len());
+    let last = u.iter().rposition(|u| *u == 1.0).unwrap_or(first);
+    let inside = u.get(first..last).unwrap_or_default();
+    let runs = inside.chunk_by(|a, b| (*a == 1.0) == (*b == 1.0));
+    runs.filter(|run| run.first() != Some(&1.0))
+        .map(<[f64]>::len)
+}
+
+impl Training {
+    /// The shortest time between two switches of the valve in the records, s; `None` where they tell nothing of it.
+    #[must_use]
+    pub fn shortest_time_s(&self) -> Option<f64> {
+        let times = [self.on_time_range_s, self.off_time_range_s];
+        let known = times.iter().map(|[low, _]| *low).filter(|low| *low > 0.0);
+        known.reduce(f64::min)
+    }
 }
 
 impl Model {
@@ -108,5 +130,12 @@ mod tests {
         assert_eq!(training.duty_range, [0.625, 0.625]);
         assert!((training.on_time_range_s[0] - 0.2).abs() < 1e-12);
         assert!((training.on_time_range_s[1] - 0.3).abs() < 1e-12);
+        // The rest before the first pulse and after the last is no gap.
+        assert!((training.off_time_range_s[0] - 0.1).abs() < 1e-12);
+        assert_eq!(training.off_time_range_s[0], training.off_time_range_s[1]);
+        assert_eq!(
+            training.shortest_time_s(),
+            Some(training.off_time_range_s[0])
+        );
     }
 }

@@ -1,7 +1,7 @@
 //! The model file `model.toml`.
 
 use super::delay_table::{self, DelayTable};
-use super::{Added, Law, Model, Start, Training};
+use super::{Added, CommandRange, Law, Model, Start, Training, bounds};
 use crate::output::{self, OutputError};
 use crate::user_effect::{Definition, DefinitionError, Source};
 use model_core::effect::{Place, Spec};
@@ -72,6 +72,9 @@ struct File {
     lag_convention: LagConvention,
     #[serde(default)]
     start: Start,
+    /// The commands of no jet and of a full one; left out where they are 0 and 1.
+    #[serde(default, skip_serializing_if = "CommandRange::is_unit")]
+    command: CommandRange,
     structure: StructureTable,
     coefficients: CoefficientTable,
     delay: DelayTable,
@@ -227,6 +230,7 @@ impl File {
             sample_period_s: model.sample_period_s,
             lag_convention: model.convention,
             start: model.start,
+            command: model.command,
             structure: StructureTable {
                 averaged: model.averaging.averaged_model,
                 window: model.averaging.window,
@@ -268,16 +272,12 @@ impl File {
             None => Ok(()),
         };
         let (structure, coefficients) = (&self.structure, &self.coefficients);
-        if !(self.sample_period_s.is_finite() && self.sample_period_s > 0.0) {
+        bounds::period(self.sample_period_s)?;
+        bounds::window(structure.window)?;
+        if !self.command.is_valid() {
             return wrong(
-                "sample_period_s",
-                "the sample period must be above 0".into(),
-            );
-        }
-        if structure.window < 2 {
-            return wrong(
-                "structure.window",
-                "the averaging window is at least 2".into(),
+                "command",
+                "`off` and `full` must be finite and differ".into(),
             );
         }
         let pairs = [
@@ -335,9 +335,19 @@ impl File {
                 );
             }
         }
-        if let Some(fault) = self.law.as_ref().and_then(Law::fault) {
-            return Err(fault);
+        if let Some(law) = &self.law {
+            bounds::law(law)?;
+            law.fault().map_or(Ok(()), Err)?;
         }
+        for (key, range) in [
+            ("y_range", &self.training.y_range),
+            ("duty_range", &self.training.duty_range),
+            ("on_time_range_s", &self.training.on_time_range_s),
+        ] {
+            finite(&format!("training.{key}"), range)?;
+        }
+        let delay = self.delay.into_delay(self.coefficients.b.len())?;
+        bounds::delay(&delay, self.sample_period_s)?;
         let mut model = Model {
             sample_period_s: self.sample_period_s,
             convention: self.lag_convention,
@@ -346,12 +356,13 @@ impl File {
                 averaged_model: self.structure.averaged,
             },
             start: self.start,
+            command: self.command,
             grading: self.structure.jet_response,
             constant: self.coefficients.constant,
             state_lags: self.structure.state_lags,
             a: self.coefficients.a,
             product_lags: self.structure.product_lags,
-            delay: self.delay.into_delay(self.coefficients.b.len())?,
+            delay,
             b: self.coefficients.b,
             c,
             effects: Vec::new(),
@@ -369,6 +380,10 @@ impl File {
         }
         for table in self.effect {
             let added = table.into_added(&model)?;
+            if model.has_effect(&added.name) {
+                let key = format!("effect.{}", added.name);
+                return wrong(&key, "it is there twice; an effect acts once".into());
+            }
             model.effects.push(added);
         }
         model.order_effects();
@@ -413,6 +428,9 @@ impl EffectTable {
                     .to_owned();
             return Err((key, problem));
         }
+        if self.reference.is_some_and(|r| !r.is_finite()) {
+            return Err((key, "`reference` is no finite number".to_owned()));
+        }
         let known = |name: &String| spec.parameters.iter().any(|p| p.name == name);
         if let Some(name) = self.parameters.keys().find(|name| !known(name)) {
             return Err((key, format!("it has no parameter `{name}`")));
@@ -423,13 +441,15 @@ impl EffectTable {
         };
         let parameters = spec.parameters.iter().map(|parameter| {
             let value = self.parameters.get(parameter.name).and_then(number);
-            value.ok_or_else(|| {
+            let value = value.ok_or_else(|| {
                 let problem = format!(
                     "parameter `{}` ({}) is missing or no finite number",
                     parameter.name, parameter.unit
                 );
                 (key.clone(), problem)
-            })
+            })?;
+            bounds::parameter(&format!("{key}.{}", parameter.name), parameter, value)?;
+            Ok::<f64, bounds::Fault>(value)
         });
         Ok(Added {
             parameters: parameters.collect::<Result<_, _>>()?,
@@ -487,6 +507,17 @@ mod tests {
             let text = text.replace("reference = 5.0", &format!("reference = {wrong}"));
             let error = Model::from_toml(&text, "m").expect_err("no calibration");
             assert!(error.to_string().contains("`reference`"), "{error}");
+        }
+    }
+
+    /// A seed is a whole 64-bit number, and TOML's integers end before.
+    #[test]
+    fn every_seed_survives_its_file() {
+        for seed in [0, 7, 1 << 53, (1 << 63) - 1, 1 << 63, u64::MAX] {
+            let mut model = example();
+            model.training.seed = seed;
+            let read = Model::from_toml(&model.to_toml(), "m").expect("own file");
+            assert_eq!(read, model, "{seed}");
         }
     }
 

@@ -1,6 +1,8 @@
 //! An identified model with sizes known at run time.
 
+mod bounds;
 mod chain;
+mod command;
 mod delay;
 mod delay_table;
 mod envelope;
@@ -11,8 +13,10 @@ mod parameters;
 mod poles;
 mod prepared;
 mod rules;
+mod seed;
 
 pub use chain::{Chain, HostEffect, HostState};
+pub use command::CommandRange;
 pub use delay::{Delay, TransportLaw};
 pub use file::{FORMAT_VERSION, ModelError};
 pub use law::{Law, Maximise, Track};
@@ -42,6 +46,8 @@ pub struct Model {
     pub averaging: Averaging,
     /// How a free run begins.
     pub start: Start,
+    /// The commands of no jet and of a full one.
+    pub command: CommandRange,
     /// The response to jets of part strength.
     pub grading: Grading,
     /// d, what drives the flow without jets; 0 in the paper.
@@ -88,8 +94,8 @@ pub enum Start {
     /// Everything was 0 before the record (the paper).
     #[default]
     Rest,
-    /// The record begins in mid-run: its first values are held before it, and
-    /// the first samples, as many as the longest lag, follow the measurement.
+    /// What was before the record is its first values, or what is known of them. The first samples of a record that
+    /// begins in mid-run follow the measurement (see [`preparation`](crate::preparation)).
     Measured,
 }
 
@@ -131,11 +137,14 @@ pub struct Training {
     pub duty_range: [f64; 2],
     /// Shortest and longest on-time, s; zeros if the input is not on/off.
     pub on_time_range_s: [f64; 2],
+    /// Shortest and longest off-time between two on-times, s; zeros if there is none.
+    pub off_time_range_s: [f64; 2],
     /// Hash of the data set.
     pub data_hash: String,
     /// Version of the tool.
     pub tool_version: String,
-    /// The seed.
+    /// The seed; one that TOML's integers cannot hold (above 2⁶³ − 1) stands in a file as text.
+    #[serde(with = "seed")]
     pub seed: u64,
     /// Objective the delays were searched with, and its value.
     pub objective: String,
@@ -162,6 +171,7 @@ impl Default for Model {
                 averaged_model: false,
             },
             start: Start::Rest,
+            command: CommandRange::UNIT,
             grading: Grading::Proportional,
             constant: 0.0,
             state_lags: vec![1],
@@ -284,8 +294,8 @@ impl Model {
     #[must_use]
     pub fn longest_delay(&self) -> usize {
         let longest = self.delay.longest(self.sample_period_s);
-        // A delay of more than 2²⁰ samples is a mistake that clamping reports.
-        longest.clamp(0.0, 1_048_576.0).round() as usize
+        // Files with longer ones are refused; a search may stray there.
+        longest.clamp(0.0, bounds::LONGEST.into()).round() as usize
     }
 
     /// Takes delays between samples, so that a fit can move them: y moves by several

@@ -1,7 +1,7 @@
 //! How long a model remembers.
 
 use super::Model;
-use crate::linalg::{NotConverged, pole_magnitudes};
+use crate::linalg::{NotConverged, largest_pole};
 
 impl Model {
     /// The largest pole magnitude of the recursion with all jets off, or all on:
@@ -11,6 +11,11 @@ impl Model {
     /// # Errors
     /// [`NotConverged`] when the eigenvalue iteration fails.
     pub(crate) fn largest_pole(&self, on: bool) -> Result<f64, NotConverged> {
+        largest_pole(&self.recursion(on))
+    }
+
+    /// The weights w_i of y_{k+1} = Σ_i w_i y_{k+1−i} with all jets off, or all on.
+    pub(crate) fn recursion(&self, on: bool) -> Vec<f64> {
         let mut weights = vec![0.0; self.longest_lag() + 1];
         let mut add = |lag: &u16, weight: &f64| {
             if let Some(place) = weights.get_mut(self.convention.behind_newest(*lag)) {
@@ -23,7 +28,7 @@ impl Model {
             let products = self.product_lags.iter().cycle().zip(&self.c);
             products.for_each(|(lag, c)| add(lag, c));
         }
-        Ok(pole_magnitudes(&weights)?.first().copied().unwrap_or(0.0))
+        weights
     }
 
     /// How long the flow takes without jets to forget all but 1/e, s: what one

@@ -11,6 +11,8 @@ const LARGEST: f64 = 1e150;
 pub(super) struct Axis {
     lo: f64,
     hi: f64,
+    /// Values are logarithms to base 10; ticks are labelled with what they are the logarithms of.
+    decades: bool,
 }
 
 /// One tick: where it is and what it says.
@@ -51,12 +53,24 @@ impl Axis {
             };
             (lo - half, hi + half)
         };
-        Self { lo, hi }
+        Self {
+            lo,
+            hi,
+            decades: false,
+        }
+    }
+
+    /// Logarithmic axis over `range`, whose ends are logarithms to base 10.
+    pub(super) fn decades(range: Option<(f64, f64)>) -> Self {
+        Self {
+            decades: true,
+            ..Self::linear(range)
+        }
     }
 
     /// Linear axis with a margin of `share` of the range at both ends.
     pub(super) fn padded(range: Option<(f64, f64)>, share: f64) -> Self {
-        let Self { lo, hi } = Self::linear(range);
+        let Self { lo, hi, .. } = Self::linear(range);
         let margin = (hi - lo) * share;
         Self::linear(Some((lo - margin, hi + margin)))
     }
@@ -79,6 +93,9 @@ impl Axis {
 
     /// About `count` ticks at round values.
     pub(super) fn ticks(&self, count: usize) -> Vec<Tick> {
+        if self.decades {
+            return self.decade_ticks(count);
+        }
         let rough = (self.hi - self.lo) / count.clamp(1, 50) as f64;
         let decade = 10f64.powi(rough.log10().floor() as i32);
         let step = [1.0, 2.0, 5.0, 10.0]
@@ -113,6 +130,29 @@ impl Axis {
             })
             .collect()
     }
+
+    /// Ticks at 1, 2 and 5 times powers of ten, or at the powers alone where those are enough.
+    fn decade_ticks(&self, count: usize) -> Vec<Tick> {
+        let (first, last) = (self.lo.floor() as i32, self.hi.ceil() as i32);
+        let at = |multiples: &[f64]| -> Vec<Tick> {
+            let powers = (first..=last).take(60);
+            powers
+                .flat_map(|power| multiples.iter().map(move |m| (power, *m)))
+                .map(|(power, m)| (m.log10() + f64::from(power), m * 10f64.powi(power)))
+                .filter(|(place, _)| (self.lo..=self.hi).contains(place))
+                .map(|(value, number)| Tick {
+                    value,
+                    label: super::format::significant(number, 2),
+                })
+                .collect()
+        };
+        let fine = at(&[1.0, 2.0, 5.0]);
+        if fine.len() <= count.max(2) {
+            fine
+        } else {
+            at(&[1.0])
+        }
+    }
 }
 
 #[cfg(test)]
@@ -137,6 +177,18 @@ mod tests {
         assert_eq!(
             labels(Axis::linear(Some((0.0, 4e-5))), 4),
             ["0", "10⁻⁵", "2×10⁻⁵", "3×10⁻⁵", "4×10⁻⁵"]
+        );
+    }
+
+    #[test]
+    fn a_logarithmic_axis_is_labelled_in_its_unit() {
+        assert_eq!(
+            labels(Axis::decades(Some((0.0, 1.0))), 6),
+            ["1", "2", "5", "10"]
+        );
+        assert_eq!(
+            labels(Axis::decades(Some((-1.2, 2.5))), 5),
+            ["0.1", "1", "10", "100"]
         );
     }
 

@@ -1,4 +1,4 @@
-//! The ladder: held-out error falling, effect by effect, to the noise floor.
+//! The ladder: validation error falling, effect by effect, to the noise level.
 
 use super::axis::{Axis, extent};
 use super::canvas::{Anchor, Canvas, Ink, MARGIN, WIDTH, Words, draw, text_width, wrap};
@@ -11,7 +11,7 @@ use super::panel::{LABEL_SIZE, Panel, TICK_SIZE, left_edge};
 pub struct LadderStep<'a> {
     /// Name of the rung, for example `"model as given"` or `"+ plenum-droop"`.
     pub label: &'a str,
-    /// Held-out free-run RMSE of all records together, in the unit of y.
+    /// Validation RMSE, free run of all records together, in the unit of y.
     pub rmse: f64,
 }
 
@@ -33,7 +33,7 @@ pub struct Ladder<'a> {
     pub y_unit: &'a str,
     /// The steps in the order taken, the model as given first.
     pub steps: &'a [LadderStep<'a>],
-    /// The held-out records; empty to show them together only.
+    /// The validation records; empty to show them together only.
     pub records: &'a [LadderRecord<'a>],
     /// RMSE that the noise alone causes, all records together.
     pub noise_rmse: Option<f64>,
@@ -41,22 +41,22 @@ pub struct Ladder<'a> {
 
 const HEIGHT: f64 = 300.0;
 
-/// Draws the held-out error step by step against the noise floor. Returns SVG.
+/// Draws the validation error step by step against the noise level. Returns SVG.
 #[must_use]
 pub fn ladder(plot: &Ladder<'_>) -> String {
-    let description = format!("{}: held-out error step by step", plot.title);
+    let description = format!("{}: validation error step by step", plot.title);
     draw(&description, |canvas| {
         let noise = plot.noise_rmse.filter(|n| n.is_finite() && *n > 0.0);
         let together = extent(plot.steps.iter().map(|s| s.rmse));
         let Some((_, highest)) = together else {
             return nothing(canvas, plot.title, "No step has an error to draw.");
         };
-        let mut entries = vec![(Swatch::Bar(BLUE), "all held-out records".to_owned())];
+        let mut entries = vec![(Swatch::Bar(BLUE), "all validation records".to_owned())];
         for (index, record) in plot.records.iter().enumerate() {
             entries.push((Swatch::Dot(record_colour(index)), record.name.to_owned()));
         }
         if let Some(noise) = noise {
-            let text = format!("noise floor {}", super::significant(noise, 3));
+            let text = format!("noise level {}", super::significant(noise, 3));
             entries.push((Swatch::Dashes(INK), text));
         }
         let top = heading(canvas, plot.title, &entries);
@@ -82,7 +82,7 @@ pub fn ladder(plot: &Ladder<'_>) -> String {
             "" => String::new(),
             unit => format!(" ({unit})"),
         };
-        panel.frame(canvas, &format!("Held-out free-run RMSE{unit}"));
+        panel.frame(canvas, &format!("Validation RMSE, free run{unit}"));
         let slot = panel.width / plot.steps.len() as f64;
         let half = (slot * 0.34).min(75.0);
         let rungs: Vec<(f64, &LadderStep<'_>)> = plot
@@ -255,7 +255,7 @@ mod tests {
         check(&svg);
         let words = words(&svg);
         assert!(words.contains("0.1\n") && words.contains("0.025") && words.contains("−75 %"));
-        assert!(words.contains("noise floor"));
+        assert!(words.contains("noise level"));
     }
 
     #[test]

@@ -45,6 +45,9 @@ pub struct Living {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     off: Vec<usize>,
     coordinates: Vec<Coordinate>,
+    /// What is in view at first, from and to, s since a record's start; everything if left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    view: Option<[f64; 2]>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -116,7 +119,14 @@ impl Living {
             runs: runs.iter().map(|(name, _)| (*name).to_owned()).collect(),
             off: Vec::new(),
             coordinates: Vec::new(),
+            view: None,
         }
+    }
+
+    /// Shows this stretch at first, s since a record's start.
+    pub fn view(&mut self, from: f64, to: f64) -> &mut Self {
+        self.view = (from < to).then_some([from, to]);
+        self
     }
 
     /// These runs are not shown until they are asked for.

@@ -1,4 +1,4 @@
-//! Measured output, model free-runs, their difference against the noise floor, and the command.
+//! Measured output, model free-runs, their difference against the noise level, and the command.
 
 use std::ops::Range;
 
@@ -33,7 +33,7 @@ pub struct Overlay<'a> {
     pub u: &'a [f64],
     /// Measured output.
     pub y: &'a [f64],
-    /// Standard error of the measured output: the noise floor, drawn as ±2 of it.
+    /// Standard error of the measured output: the noise level, drawn as ±2 of it.
     pub y_sd: Option<&'a [f64]>,
     /// Smallest value over the repeats, with `y_max` the band around y (instead of ±2 `y_sd`).
     pub y_min: Option<&'a [f64]>,
@@ -49,7 +49,7 @@ const MAIN: f64 = 290.0;
 const RESIDUAL: f64 = 120.0;
 
 /// Draws one record: the output with its scatter and the models' free-runs, the command,
-/// and the residual (measured − model) against the noise floor. Returns SVG.
+/// and the residual (measured − model) against the noise level. Returns SVG.
 ///
 /// The scale follows the measurement; a model that leaves it by more than the range of
 /// the data runs along the edge of the panel.

@@ -18,7 +18,7 @@ impl fmt::Display for Colour {
 pub(super) const PAPER: Colour = Colour(255, 255, 255);
 /// Text and measured data.
 pub(super) const INK: Colour = Colour(31, 35, 40);
-/// Secondary text, scatter bands, noise floor, chance.
+/// Secondary text, scatter bands, noise level, chance.
 pub(super) const MUTED: Colour = Colour(101, 109, 118);
 /// Grid lines.
 pub(super) const GRID: Colour = Colour(230, 234, 238);

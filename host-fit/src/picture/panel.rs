@@ -110,9 +110,12 @@ impl Panel {
             ],
             Ink::new(RULE, 1.25),
         );
+        // Beside the ticks: at the picture's edge, or where a panel of a row begins.
+        let begins = self.left - left_edge([&self.y]);
+        let begins = if begins > 60.0 { begins } else { 0.0 };
         canvas.upright(
             Words::new(LABEL_SIZE, INK),
-            (18.0, self.top + self.height / 2.0),
+            (begins + 18.0, self.top + self.height / 2.0),
             y_label,
         );
     }

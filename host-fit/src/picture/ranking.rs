@@ -1,4 +1,4 @@
-//! Candidate effects ranked by the held-out error they leave.
+//! Candidate effects ranked by the validation error they leave.
 
 use super::axis::{Axis, extent};
 use super::canvas::{Anchor, Ink, MARGIN, WIDTH, Words, draw, fit, text_width};
@@ -12,7 +12,7 @@ use super::panel::{FOOT, Panel};
 pub struct Candidate<'a> {
     /// Name of the effect, or of the group that cannot be told apart.
     pub name: &'a str,
-    /// Held-out free-run RMSE with the candidate added and everything refitted, unit of y.
+    /// Validation RMSE, free run with the candidate added and everything refitted, unit of y.
     pub rmse: f64,
     /// Lower end of the interval of `rmse`; NaN for none.
     pub low: f64,
@@ -46,11 +46,11 @@ const BOLD: f64 = 1.12;
 /// Rows drawn; a longer list is cut at the bad end.
 const MOST: usize = 60;
 
-/// Draws candidates as dots with intervals, the best on top, between the noise floor and
+/// Draws candidates as dots with intervals, the best on top, between the noise level and
 /// the model without an effect. Returns SVG.
 #[must_use]
 pub fn ranking(plot: &Ranking<'_>) -> String {
-    let description = format!("{}: candidate effects by held-out error", plot.title);
+    let description = format!("{}: candidate effects by validation error", plot.title);
     draw(&description, |canvas| {
         let mut order: Vec<&Candidate<'_>> = plot.candidates.iter().collect();
         order.sort_by(|a, b| a.rmse.total_cmp(&b.rmse));
@@ -68,7 +68,7 @@ pub fn ranking(plot: &Ranking<'_>) -> String {
             entries.push((Swatch::Dot(BLUE), "candidate".to_owned()));
         }
         if noise.is_some() {
-            entries.push((Swatch::Dashes(INK), "noise floor".to_owned()));
+            entries.push((Swatch::Dashes(INK), "noise level".to_owned()));
         }
         if base.is_some() {
             entries.push((Swatch::Line(MUTED), "without an effect".to_owned()));
@@ -160,7 +160,7 @@ pub fn ranking(plot: &Ranking<'_>) -> String {
         };
         panel.foot(
             canvas,
-            &format!("Held-out free-run RMSE after refitting{unit}"),
+            &format!("Validation RMSE, free run after refitting{unit}"),
         );
         panel.bottom() + FOOT
     })

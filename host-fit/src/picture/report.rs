@@ -59,7 +59,7 @@ pub enum Column<'a> {
 /// use host_fit::picture::{Report, Tone};
 /// let mut report = Report::new("Diagnosis", "ramp, U = 10 m/s");
 /// report
-///     .verdict(Tone::Finding, "plenum-droop is missing", "It removes 71 % of the error.")
+///     .answer(Tone::Finding, "plenum-droop is missing", &[("Evidence", "RMSE 0.027 → 0.010")], &[""; 0])
 ///     .section("What was tried")
 ///     .paragraph("Every effect of `host-fit effects` was refitted.");
 /// let html = report.html();
@@ -71,6 +71,9 @@ pub struct Report {
     subtitle: String,
     body: String,
     sections: Vec<String>,
+    /// Those of the sections that the contents list: what is folded away is not.
+    listed: Vec<usize>,
+    folds: usize,
     open: bool,
     groups: usize,
     provenance: Vec<(String, String)>,
@@ -87,28 +90,87 @@ impl Report {
         }
     }
 
-    /// The outcome, in a box: a headline and what it means in plain words.
-    pub fn verdict(&mut self, tone: Tone, headline: &str, meaning: &str) -> &mut Self {
+    /// The answer, in a box: the verdict, its labelled parts (evidence, confidence, next), and notes that open on a click. A
+    /// part called "Next" is a command and is set as code.
+    pub fn answer<S: AsRef<str>>(
+        &mut self,
+        tone: Tone,
+        verdict: &str,
+        parts: &[(&str, &str)],
+        notes: &[S],
+    ) -> &mut Self {
         let class = match tone {
             Tone::Good => "good",
             Tone::Finding => "finding",
             Tone::Warning => "warning",
         };
         self.push(format_args!(
-            "<div class=\"verdict {class}\"><p class=\"headline\">{}</p><p>{}</p></div>\n",
-            inline(headline),
-            inline(meaning)
+            "<div class=\"verdict {class}\"><p class=\"headline\">{}</p><dl>",
+            inline(verdict)
+        ));
+        for (label, text) in parts {
+            let text = match *label {
+                "Next" => format!("<code>{}</code>", escape(text)),
+                _ => inline(text),
+            };
+            self.push(format_args!("<dt>{}</dt><dd>{text}</dd>", inline(label)));
+        }
+        self.push(format_args!("</dl>"));
+        if !notes.is_empty() {
+            let count = notes.len();
+            let plural = if count == 1 { "" } else { "s" };
+            self.push(format_args!(
+                "<details><summary>{count} note{plural}</summary>"
+            ));
+            self.list(notes);
+            self.push(format_args!("</details>"));
+        }
+        self.push(format_args!("</div>\n"))
+    }
+
+    /// What follows until [`Report::end_columns`] stands side by side where the page is wide enough.
+    pub fn columns(&mut self) -> &mut Self {
+        self.push(format_args!("<div class=\"columns\">"))
+    }
+
+    /// Ends what [`Report::columns`] began.
+    pub fn end_columns(&mut self) -> &mut Self {
+        self.push(format_args!("</div>\n"))
+    }
+
+    /// One cell of [`Report::columns`] that holds several things; ends with [`Report::end_columns`].
+    pub fn cell(&mut self) -> &mut Self {
+        self.push(format_args!("<div class=\"cell\">"))
+    }
+
+    /// What follows until [`Report::end_fold`] opens on a click; printing opens it.
+    pub fn fold(&mut self, summary: &str) -> &mut Self {
+        self.close_section();
+        self.folds += 1;
+        self.push(format_args!(
+            "<details class=\"fold\"><summary>{}</summary>\n",
+            inline(summary)
         ))
+    }
+
+    /// Ends what [`Report::fold`] began.
+    pub fn end_fold(&mut self) -> &mut Self {
+        self.close_section();
+        self.folds = self.folds.saturating_sub(1);
+        self.push(format_args!("</details>\n"))
     }
 
     /// Starts a section; the page lists them when there are several.
     pub fn section(&mut self, heading: &str) -> &mut Self {
-        let close = if self.open { "</section>\n" } else { "" };
+        self.close_section();
         self.open = true;
         self.sections.push(heading.to_owned());
         let number = self.sections.len();
+        if self.folds == 0 {
+            self.listed.push(number);
+        }
         self.push(format_args!(
-            "{close}<section id=\"s{number}\"><h2>{}</h2>\n",
+            "<section id=\"s{number}\"><h2>{}</h2>\n",
             inline(heading)
         ))
     }
@@ -196,7 +258,9 @@ impl Report {
         if !svg.trim_start().starts_with("<svg") {
             return self.code(svg);
         }
-        self.push(format_args!("<figure>{svg}"));
+        self.push(format_args!(
+            "<figure><div class=\"pan\" tabindex=\"0\">{svg}</div>"
+        ));
         if !caption.is_empty() {
             self.push(format_args!("<figcaption>{}</figcaption>", inline(caption)));
         }
@@ -249,21 +313,25 @@ impl Report {
             let _ = write!(body, "<p class=\"subtitle\">{}</p>", inline(&self.subtitle));
         }
         body.push_str("</header>\n");
-        if self.sections.len() > 3 {
-            body.push_str("<nav><ul>");
-            for (index, heading) in self.sections.iter().enumerate() {
+        let listed = self.listed.len() > 2;
+        if listed {
+            body.push_str("<div class=\"listed\"><nav aria-label=\"Contents\"><ul>");
+            for number in &self.listed {
+                let heading = self.sections.get(number - 1).map_or("", String::as_str);
                 let _ = write!(
                     body,
-                    "<li><a href=\"#s{}\">{}</a></li>",
-                    index + 1,
+                    "<li><a href=\"#s{number}\">{}</a></li>",
                     inline(heading)
                 );
             }
-            body.push_str("</ul></nav>\n");
+            body.push_str("</ul></nav>\n<div class=\"content\">");
         }
         body.push_str(&self.body);
         if self.open {
             body.push_str("</section>\n");
+        }
+        if listed {
+            body.push_str("</div></div>\n");
         }
         if !self.provenance.is_empty() {
             body.push_str("<footer><dl>");
@@ -272,7 +340,14 @@ impl Report {
             }
             body.push_str("</dl></footer>\n");
         }
-        page(&self.title, &living::REPORT, "", &body)
+        page(&self.title, &living::REPORT, "", "report", &body)
+    }
+
+    fn close_section(&mut self) {
+        if self.open {
+            self.push(format_args!("</section>\n"));
+        }
+        self.open = false;
     }
 
     fn push(&mut self, text: std::fmt::Arguments<'_>) -> &mut Self {
@@ -286,10 +361,10 @@ impl Report {
 #[must_use]
 pub fn workbench_page(title: &str, body: &str) -> String {
     let policy = "; connect-src 'self'; base-uri 'none'; form-action 'none'";
-    page(title, &living::WORKBENCH, policy, body)
+    page(title, &living::WORKBENCH, policy, "bench", body)
 }
 
-fn page(title: &str, bundle: &Bundle, policy: &str, body: &str) -> String {
+fn page(title: &str, bundle: &Bundle, policy: &str, class: &str, body: &str) -> String {
     let title = escape(title);
     format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n\
@@ -301,7 +376,7 @@ fn page(title: &str, bundle: &Bundle, policy: &str, body: &str) -> String {
          <title>{title}</title>\n<style>{style}{STYLE}:root,:root.on-paper{{{LIGHT}{light}}}\
          @media screen and (prefers-color-scheme:dark){{:root{{{DARK}{dark}}}{rules}}}</style>\n\
          <script type=\"module\">{script}</script></head>\n\
-         <body><main>\n{body}</main></body></html>\n",
+         <body><main class=\"{class}\">\n{body}</main></body></html>\n",
         hash = bundle.hash.trim(),
         style = bundle.style,
         light = palette::variables(false),
@@ -364,7 +439,22 @@ code,pre{font-family:ui-monospace,'SF Mono',Menlo,Consolas,monospace;font-size:.
 code{background:var(--soft);padding:.1em .3em;border-radius:4px}\
 pre{background:var(--soft);border:1px solid var(--rule);border-radius:6px;padding:12px 14px;overflow-x:auto;line-height:1.4}\
 .verdict{border:1px solid var(--rule);border-left:5px solid var(--tone);border-radius:6px;background:var(--soft);padding:12px 18px;margin:20px 0}\
-.verdict p{margin:.25em 0}.verdict .headline{font-size:1.15rem;font-weight:600;color:var(--tone)}\
+.verdict p{margin:.25em 0}.verdict .headline{font-size:1.3rem;line-height:1.3;font-weight:600;color:var(--tone)}\
+.verdict dl{display:grid;grid-template-columns:max-content minmax(0,1fr);gap:4px 14px;margin:.6em 0 .2em}\
+.verdict dt{color:var(--muted)}.verdict dd{margin:0}\
+.verdict code{overflow-wrap:anywhere}\
+summary{cursor:pointer;color:var(--link);min-height:28px;padding:3px 0}\
+.fold>summary{font-weight:600;margin:14px 0;padding:6px 12px;border:1px solid var(--rule);border-radius:6px;background:var(--soft)}\
+.report{max-width:1760px}\
+.listed{display:grid;grid-template-columns:200px minmax(0,1fr);gap:36px}\
+.listed>nav{position:sticky;top:0;align-self:start;max-height:100vh;overflow-y:auto;padding:14px 0}\
+.listed>nav ul{flex-direction:column;gap:.35em;margin:0}\
+section{scroll-margin-top:8px}\
+.columns{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,540px),1fr));gap:6px 32px;align-items:start}\
+.columns>*,.cell>*{min-width:0}\
+.columns>.verdict,.cell>.verdict{margin-top:12px}\
+.columns>figure,.cell>figure{margin:8px 0}\
+@media(max-width:1050px){.listed{display:block}.listed>nav{position:static;padding:0}.listed>nav ul{flex-direction:row;margin:1em 0}}\
 .good{--tone:var(--good)}.finding{--tone:var(--finding)}.warning{--tone:var(--warning)}\
 .numbers{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:10px;margin:18px 0}\
 .numbers div{border:1px solid var(--rule);border-radius:6px;padding:10px 14px}\
@@ -378,12 +468,14 @@ th,td{padding:5px 14px 5px 0;text-align:left;border-bottom:1px solid var(--rule)
 th{font-weight:600;border-bottom-width:2px}\
 .n{text-align:right;padding:5px 8px 5px 14px;white-space:nowrap}\
 figure{margin:18px 0}\
-figure svg{display:block;width:100%;max-width:900px;height:auto}\
+figure svg{display:block;width:100%;max-width:1100px;height:auto}\
 figcaption{color:var(--muted);font-size:.92rem;max-width:48em;margin-top:4px}\
 footer{margin-top:3em;border-top:1px solid var(--rule);padding-top:10px;color:var(--muted);font-size:.85rem}\
 footer dl{display:grid;grid-template-columns:max-content 1fr;gap:2px 14px;margin:0}\
 footer dd{margin:0;overflow-wrap:anywhere}\
-@media print{main{max-width:none;padding:0}body{font-size:11pt}nav{display:none}\
+@media(max-width:600px){main{padding:16px 12px 40px}.pan{overflow-x:auto}.pan svg{width:640px;max-width:none}\
+.verdict{padding:10px 12px}.verdict dl{display:block}.verdict dd{margin:0 0 .5em}}\
+@media print{main,.report{max-width:none;padding:0}.listed,.columns{display:block}.fold>summary{border:0;padding:0}body{font-size:11pt}nav{display:none}\
 figure,.verdict,.numbers,tr{break-inside:avoid}h2,h3{break-after:avoid}.table,pre{overflow:visible}pre{white-space:pre-wrap}}\
 ";
 
@@ -402,7 +494,18 @@ mod tests {
     fn sample() -> String {
         let mut report = Report::new("A <b> & \"c\"", "of `data.csv`");
         report
-            .verdict(Tone::Warning, "x < y", "because & so")
+            .answer(
+                Tone::Warning,
+                "x < y",
+                &[("Evidence", "because & so"), ("Next", "a <b>")],
+                &["n <i>"],
+            )
+            .columns()
+            .cell()
+            .end_columns()
+            .end_columns()
+            .fold("more <b>")
+            .end_fold()
             .section("One")
             .paragraph("`host-fit <x>` and a lone ` tick \u{0}")
             .key_numbers(&[KeyNumber::new("FIT", "<97 %>", "")])

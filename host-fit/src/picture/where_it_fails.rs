@@ -52,7 +52,7 @@ const PANEL: f64 = 118.0;
 const HEAD: f64 = 30.0;
 const TICKS: f64 = 26.0;
 
-/// Draws one small panel per coordinate on a common scale, with the noise floor and the
+/// Draws one small panel per coordinate on a common scale, with the noise level and the
 /// bin that stands out most above it. Returns SVG.
 #[must_use]
 pub fn where_it_fails(plot: &WhereItFails<'_>) -> String {
@@ -67,7 +67,7 @@ pub fn where_it_fails(plot: &WhereItFails<'_>) -> String {
             (Swatch::Bar(VERMILLION), "worst bin".to_owned()),
         ];
         if bins().any(|b| b.noise_rmse.is_finite()) {
-            entries.push((Swatch::Line(INK), "noise floor".to_owned()));
+            entries.push((Swatch::Line(INK), "noise level".to_owned()));
         }
         let top = heading(canvas, plot.title, &entries);
         let upper = if highest > 0.0 { highest * 1.12 } else { 1.0 };

@@ -27,12 +27,11 @@ pub(super) struct Binned {
     pub(super) dwell: Option<Vec<Vec<f64>>>,
 }
 
-/// What the coordinates are made from; samples before `warm_up` are not judged.
+/// What the coordinates are made from; samples of a record's lead are not scored.
 pub(super) struct Source<'a> {
     pub(super) records: &'a [&'a Record],
     /// y_sim per record.
     pub(super) simulated: &'a [Vec<f64>],
-    pub(super) warm_up: usize,
     /// Samples from the command to the flow.
     pub(super) delay: usize,
 }
@@ -228,7 +227,7 @@ fn modulo(source: &Source<'_>, numbers: &[Vec<f64>], cycle: usize) -> Binned {
         .iter()
         .map(|record| record.iter().map(class).collect())
         .collect();
-    blank(&mut bin, source.warm_up);
+    blank(&mut bin, source.records);
     Binned {
         coordinate: FailureCoordinate::PulseInCycle { cycle },
         folds: Folds::Blocks,
@@ -238,9 +237,9 @@ fn modulo(source: &Source<'_>, numbers: &[Vec<f64>], cycle: usize) -> Binned {
     }
 }
 
-fn blank(bin: &mut [Vec<Option<u16>>], warm_up: usize) {
-    for record in bin {
-        record.iter_mut().take(warm_up).for_each(|b| *b = None);
+fn blank(bin: &mut [Vec<Option<u16>>], records: &[&Record]) {
+    for (bins, record) in bin.iter_mut().zip(records) {
+        bins.iter_mut().take(record.lead).for_each(|b| *b = None);
     }
 }
 
@@ -271,7 +270,8 @@ fn binned(
 ) -> Option<Binned> {
     let mut sorted: Vec<f64> = values
         .iter()
-        .flat_map(|record| record.iter().skip(source.warm_up))
+        .zip(source.records)
+        .flat_map(|(values, record)| values.iter().skip(record.lead))
         .copied()
         .filter(|v| v.is_finite())
         .collect();
@@ -300,7 +300,7 @@ fn binned(
         .iter()
         .map(|record| record.iter().map(place).collect())
         .collect();
-    blank(&mut bin, source.warm_up);
+    blank(&mut bin, source.records);
     if folds == Folds::Records {
         keep_shared(&mut bin, ranges.len());
     }
@@ -341,7 +341,6 @@ mod tests {
         let source = Source {
             records: &[&record],
             simulated: &[simulated],
-            warm_up: 0,
             delay: 3,
         };
         let all = coordinates(&source);

@@ -14,7 +14,8 @@ pub(super) struct Errors {
     pub(super) simulated: Vec<Vec<f64>>,
     /// σ² of the noise.
     pub(super) noise: Vec<Vec<f64>>,
-    pub(super) warm_up: usize,
+    /// First samples that are not scored, per record.
+    pub(super) lead: Vec<usize>,
     pub(super) period_s: f64,
 }
 
@@ -58,11 +59,11 @@ impl Errors {
 
     /// Σ (e² − σ²).
     pub(super) fn excess(&self) -> f64 {
-        let each = self.residual.iter().zip(&self.noise);
-        each.map(|(e, noise)| {
+        let each = self.residual.iter().zip(&self.noise).zip(&self.lead);
+        each.map(|((e, noise), lead)| {
             let (e, noise) = (
-                e.get(self.warm_up..).unwrap_or(&[]),
-                noise.get(self.warm_up..).unwrap_or(&[]),
+                e.get(*lead..).unwrap_or(&[]),
+                noise.get(*lead..).unwrap_or(&[]),
             );
             dot(e, e) - noise.iter().sum::<f64>()
         })
@@ -75,7 +76,7 @@ impl Errors {
         for record in 0..self.residual.len() {
             let block = self.block(record);
             let length = self.residual[record].len();
-            for k in self.warm_up..length {
+            for k in self.lead[record]..length {
                 let of_record = k / block;
                 let residual = self.residual[record][k];
                 samples.push(JudgedSample {

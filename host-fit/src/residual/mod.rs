@@ -1,4 +1,4 @@
-//! Where a model fails: its free-run error on held-out records, split along one
+//! Where a model fails: its free-run error on validation records, split along one
 //! coordinate after another and judged against the noise.
 
 mod binned;
@@ -80,7 +80,7 @@ pub struct Failures {
     pub rmse: f64,
     /// Root mean square of the noise, in y.
     pub noise_rmse: f64,
-    /// Where the noise floor comes from.
+    /// Where the noise level comes from.
     pub noise_source: NoiseSource,
     /// Mean error y − y_sim, in y.
     pub bias: f64,
@@ -108,7 +108,7 @@ impl Failures {
     }
 }
 
-/// Splits the free-run error of `model` on the held-out records (on all records
+/// Splits the free-run error of `model` on the validation records (on all records
 /// if none is held out).
 ///
 /// # Errors
@@ -122,12 +122,7 @@ pub fn where_it_fails(model: &Model, records: &[Record]) -> Result<Failures, Sim
     };
     let runs: Result<Vec<Vec<f64>>, SimulateError> =
         judged.iter().map(|r| model.free_run(r)).collect();
-    Ok(examine(
-        &judged,
-        runs?,
-        model.warm_up(),
-        model.longest_delay(),
-    ))
+    Ok(examine(&judged, runs?, model.longest_delay()))
 }
 
 /// σ² of the noise per record and sample, from `y_sd`, from repeats of the
@@ -136,36 +131,29 @@ pub(crate) fn noise_floor(
     records: &[&Record],
     series: &[Vec<f64>],
 ) -> (Vec<Vec<f64>>, NoiseSource) {
-    noise::floor(records, series, 0)
+    noise::floor(records, series)
 }
 
 /// As [`where_it_fails`], for free runs that were made already: y_sim per
-/// record, the samples at the start that are not judged, and the samples from
-/// the command to the flow.
+/// record, and the samples from the command to the flow.
 #[must_use]
-pub fn examine(
-    records: &[&Record],
-    simulated: Vec<Vec<f64>>,
-    warm_up: usize,
-    delay: usize,
-) -> Failures {
+pub fn examine(records: &[&Record], simulated: Vec<Vec<f64>>, delay: usize) -> Failures {
     let residual: Vec<Vec<f64>> = records
         .iter()
         .zip(&simulated)
         .map(|(record, run)| record.y.iter().zip(run).map(|(y, sim)| y - sim).collect())
         .collect();
-    let (noise, noise_source) = noise::floor(records, &residual, warm_up);
+    let (noise, noise_source) = noise::floor(records, &residual);
     let errors = Errors {
         residual,
         simulated,
         noise,
-        warm_up,
+        lead: records.iter().map(|record| record.lead).collect(),
         period_s: records.first().map_or(1.0, |r| r.sample_period_s),
     };
     let source = Source {
         records,
         simulated: &errors.simulated,
-        warm_up,
         delay,
     };
     let above_noise = is_above(&errors);
@@ -197,7 +185,8 @@ pub fn examine(
         found.trend = trend::from_edge_to_edge(&errors, records, found);
     }
     by.sort_by(|a, b| b.explained_fraction.total_cmp(&a.explained_fraction));
-    let judged = errors.residual.iter().flat_map(|e| e.iter().skip(warm_up));
+    let each = errors.residual.iter().zip(&errors.lead);
+    let judged = each.flat_map(|(e, lead)| e.iter().skip(*lead));
     let (n, sum, squares) =
         judged.fold((0.0, 0.0, 0.0), |(n, s, q), e| (n + 1.0, s + e, q + e * e));
     let n = f64::max(n, 1.0);
@@ -220,12 +209,12 @@ fn is_above(errors: &Errors) -> bool {
         let judged = errors.residual[record]
             .iter()
             .zip(&errors.noise[record])
-            .skip(errors.warm_up);
+            .skip(errors.lead[record]);
         let excess: Vec<f64> = judged.map(|(e, v)| e * e - v).collect();
         blocks.extend(excess.chunks(block).map(|c| c.iter().sum::<f64>()));
         noise += errors.noise[record]
             .iter()
-            .skip(errors.warm_up)
+            .skip(errors.lead[record])
             .sum::<f64>();
     }
     let excess: f64 = blocks.iter().sum();
@@ -285,7 +274,7 @@ fn along(errors: &Errors, binned: &Binned, excess: f64, above_noise: bool) -> Wh
     let mut tallies = vec![Tally::default(); binned.ranges.len()];
     let mut samples = 0.0;
     for (record, bins) in binned.bin.iter().enumerate() {
-        for (k, bin) in bins.iter().enumerate().skip(errors.warm_up) {
+        for (k, bin) in bins.iter().enumerate().skip(errors.lead[record]) {
             samples += 1.0;
             if let Some(bin) = bin {
                 let e = errors.residual[record][k];

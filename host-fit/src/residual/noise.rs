@@ -1,10 +1,10 @@
-//! The noise floor that a residual is judged against.
+//! the noise level that a residual is judged against.
 
 use super::explained::Errors;
 use super::rules::RULES;
 use crate::data::Record;
 
-/// Where the noise floor comes from.
+/// Where the noise level comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoiseSource {
@@ -18,11 +18,7 @@ pub enum NoiseSource {
 
 /// σ² of the noise, per record and sample, and where it comes from. Records
 /// without `y_sd` decide for all.
-pub(super) fn floor(
-    records: &[&Record],
-    residual: &[Vec<f64>],
-    warm_up: usize,
-) -> (Vec<Vec<f64>>, NoiseSource) {
+pub(super) fn floor(records: &[&Record], residual: &[Vec<f64>]) -> (Vec<Vec<f64>>, NoiseSource) {
     let measured: Option<Vec<Vec<f64>>> = records
         .iter()
         .map(|r| Some(r.y_sd.as_ref()?.iter().map(|sd| sd * sd).collect()))
@@ -34,7 +30,8 @@ pub(super) fn floor(
     let (variance, source) = if repeats.is_empty() {
         let each = residual
             .iter()
-            .map(|e| by_scatter(e.get(warm_up..).unwrap_or(&[])));
+            .zip(records)
+            .map(|(e, record)| by_scatter(e.get(record.lead..).unwrap_or(&[])));
         (
             each.sum::<f64>() / residual.len().max(1) as f64,
             NoiseSource::Scatter,
@@ -111,7 +108,8 @@ fn by_scatter(e: &[f64]) -> f64 {
 impl Errors {
     /// σ of the noise, root mean square over what is judged.
     pub(super) fn noise_rmse(&self) -> f64 {
-        let judged = self.noise.iter().flat_map(|n| n.iter().skip(self.warm_up));
+        let each = self.noise.iter().zip(&self.lead);
+        let judged = each.flat_map(|(n, lead)| n.iter().skip(*lead));
         let (sum, count) = judged.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
         f64::sqrt(sum / f64::max(count, 1.0))
     }

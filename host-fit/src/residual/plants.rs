@@ -54,7 +54,7 @@ fn faults_are_pointed_at() {
 fn a_perfect_model_has_nothing_to_explain() {
     let found = split(&[], &[], 100);
     assert!(!found.above_noise && found.by.iter().all(|w| w.explained_fraction == 0.0));
-    assert!(found.describe()[0].contains("no excess"));
+    assert!(found.describe()[0].contains("is at the noise level"));
     let json = serde_json::to_value(&found.by).expect("plain data");
     for key in [
         "coordinate",
@@ -96,7 +96,7 @@ fn pure_noise_explains_nothing() {
             })
             .collect();
         let noisy: Vec<&Record> = noisy.iter().collect();
-        let found = super::examine(&noisy, runs.clone(), 0, 40);
+        let found = super::examine(&noisy, runs.clone(), 40);
         assert!(found.above_noise, "four times the stated noise");
         // Coloured noise is in a band of its own: that much is true.
         let itself = FailureCoordinate::FrequencyBand;

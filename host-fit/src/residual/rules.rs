@@ -43,7 +43,7 @@ rules! {
     most_changes: f64 = 0.2, "share of the samples", "judgement: on/off commands change at far fewer samples, continuous ones at nearly all";
 
     /// The share of the excess that the smallest interval is sought for.
-    concentration: f64 = 0.75, "share of the excess", "judgement: three quarters reads well";
+    concentration: f64 = 0.75, "share of the model error above the noise", "judgement: three quarters reads well";
     /// A bin must hold this share of the samples to be called the worst.
     worst_holds: f64 = 0.004, "share of the samples", "judgement: 40 samples in a record of 10 s";
     /// Neighbours of the worst bin belong to it when their excess per sample is at least this share of its own.
@@ -79,7 +79,7 @@ rules! {
     alike_periods: f64 = 0.75, "share of the periods", "judgement";
 
     /// Coordinates that explain less are left out of the sentences.
-    worth_saying: f64 = 0.1, "share of the excess", "judgement";
+    worth_saying: f64 = 0.1, "share of the model error above the noise", "judgement";
     /// Most coordinates that are read out.
     most_said: usize = 3, "", "judgement";
     /// A mean error is told when it is at least this share of the error.

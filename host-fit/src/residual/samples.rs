@@ -71,7 +71,7 @@ mod tests {
             .collect();
         let mut record = Record::new("r", Use::Validate, 0.001, u, y);
         record.y_sd = Some(vec![0.001; n as usize]);
-        let failures = examine(&[&record], vec![run.clone()], 0, 0);
+        let failures = examine(&[&record], vec![run.clone()], 0);
         let records = [record];
         let samples = failures.samples(&records, std::slice::from_ref(&run), 0);
         let mut checked = 0;

@@ -29,7 +29,7 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
     let mut pieces = Vec::new();
     for (record, e) in errors.residual.iter().enumerate() {
         let (simulated, noise) = (&errors.simulated[record], &errors.noise[record]);
-        let mut from = errors.warm_up;
+        let mut from = errors.lead[record];
         while from + length <= e.len() {
             let span = from..from + length;
             pieces.push(Piece {

@@ -29,7 +29,7 @@ pub(super) fn from_edge_to_edge(
     let sample = |time: f64| (time / errors.period_s).round() as usize;
     let (from, to) = (sample(found.worst_from), sample(found.worst_to));
     let (mut dwells, mut sizes) = (Vec::new(), Vec::new());
-    for (record, e) in records.iter().zip(&errors.residual) {
+    for ((record, e), lead) in records.iter().zip(&errors.residual).zip(&errors.lead) {
         let edges = edges(&record.u);
         for (i, (at, up)) in edges.iter().enumerate() {
             // The dwell before the first edge is not known to have begun with the record.
@@ -38,7 +38,7 @@ pub(super) fn from_edge_to_edge(
             };
             let next = edges[i + 1..].iter().find(|(_, other)| other == up);
             let end = (at + to).min(next.map_or(e.len(), |n| n.0)).min(e.len());
-            let begin = (at + from).max(errors.warm_up);
+            let begin = (at + from).max(*lead);
             if *up == rising && end > begin {
                 let mean = e[begin..end].iter().sum::<f64>() / (end - begin) as f64;
                 dwells.push(((at - before) as f64).ln());

@@ -9,23 +9,23 @@ impl Failures {
     #[must_use]
     pub fn describe(&self) -> Vec<String> {
         let floor = match self.noise_source {
-            NoiseSource::Measured => "the noise floor (y_sd)",
+            NoiseSource::Measured => "the noise level (`y_sd`)",
             NoiseSource::Repeats => {
-                "a noise floor estimated from how y differs between periods of the same command (no y_sd)"
+                "a noise level estimated from repeats of the command (no `y_sd`)"
             }
             NoiseSource::Scatter => {
-                "a noise floor estimated from sample-to-sample scatter (no y_sd), which leaves out slow noise"
+                "a noise level estimated from sample-to-sample scatter (no `y_sd`), without slow noise"
             }
         };
         let (rmse, noise) = (number(self.rmse), number(self.noise_rmse));
         if !self.above_noise {
             return vec![format!(
-                "The held-out error, {rmse} in y rms, is at {floor}, {noise}: there is no excess to explain."
+                "The residual (RMSE {rmse}) is at {floor}, {noise}."
             )];
         }
         let excess = 1.0 - (self.noise_rmse / self.rmse).powi(2);
         let mut sentences = vec![format!(
-            "The held-out error is {rmse} in y rms against {floor} of {noise}: {} of its energy is excess.",
+            "RMSE {rmse} against {floor} of {noise}: {} of the squared error is model error above the noise.",
             percent(excess)
         )];
         let said: Vec<&Where> = self
@@ -36,14 +36,14 @@ impl Failures {
             .collect();
         if said.is_empty() {
             sentences.push(
-                "The excess is not concentrated along any coordinate that was tried.".to_owned(),
+                "The model error does not depend on any coordinate that was tried.".to_owned(),
             );
         }
         sentences.extend(said.into_iter().map(sentence));
         if self.bias.abs() > RULES.worth_saying_bias * self.rmse {
             let direction = if self.bias > 0.0 { "low" } else { "high" };
             sentences.push(format!(
-                "On the whole the model reads {} too {direction}.",
+                "On average the model is {} too {direction}.",
                 number(self.bias.abs())
             ));
         }
@@ -67,12 +67,12 @@ fn sentence(found: &Where) -> String {
                 format!("{} of the time", percent(held.of_samples))
             };
             format!(
-                "{} of the excess error lies {place} ({more})",
+                "{} of the model error lies {place} ({more})",
                 quarters(held.share)
             )
         }
         _ => format!(
-            "The error is worst {}, {} in y rms",
+            "The error is largest {} (RMSE {})",
             coordinate.stretch(found.worst_from, found.worst_to),
             number(found.worst_rmse)
         ),
@@ -93,7 +93,7 @@ fn sentence(found: &Where) -> String {
     if found.bias.abs() > RULES.worth_saying_worst_bias * found.worst_rmse {
         let direction = if found.bias > 0.0 { "low" } else { "high" };
         text.push_str(&format!(
-            "; at its worst the model reads {} too {direction}",
+            "; at its largest the model is {} too {direction}",
             number(found.bias.abs())
         ));
     }
@@ -103,7 +103,7 @@ fn sentence(found: &Where) -> String {
         Some(Dependence::Dwell) => ", together with the dwell before the edge",
         Some(Dependence::Mean) | None => "",
     };
-    format!("{text}. The {coordinate} explains {explained} of the excess{how}.")
+    format!("{text}. The {coordinate} explains {explained} of the model error{how}.")
 }
 
 fn percent(fraction: f64) -> String {

@@ -1,7 +1,8 @@
 //! The effects that can be missing, as data.
 
+use super::symptom::described;
 use model_core::effect::{Place, Spec};
-use model_core::effects::SPECS;
+use model_core::effects::{LAWS, NUISANCES, SPECS};
 use serde::Serialize;
 
 /// An effect of the catalogue. Serialises to the keys of `effects --json`.
@@ -19,6 +20,14 @@ pub struct EffectEntry {
     pub channel: Option<&'static str>,
     /// Where it is described.
     pub source: &'static str,
+    /// What records show where it is named.
+    pub shows: Option<String>,
+    /// The check at the bench that would confirm it.
+    pub check: Option<&'static str>,
+    /// Candidates with a similar residual, and what distinguishes them.
+    pub confused_with: Option<&'static str>,
+    /// Whether it belongs to base models, so that it is never reported as missing.
+    pub base: bool,
     /// Its parameters.
     pub parameters: Vec<ParameterEntry>,
 }
@@ -44,7 +53,12 @@ impl From<&'static Spec> for EffectEntry {
             low: p.low,
             high: p.high,
         });
+        let [shows, check, confused_with] = described(spec.name);
         Self {
+            shows: shows.map(|text| text.replace("{frequency}", "")),
+            check,
+            confused_with,
+            base: spec.base,
             name: spec.name,
             place: match spec.place {
                 Place::Jet => "jet",
@@ -65,4 +79,15 @@ impl From<&'static Spec> for EffectEntry {
 #[must_use]
 pub fn catalogue() -> Vec<EffectEntry> {
     SPECS.iter().map(EffectEntry::from).collect()
+}
+
+/// The terms of base models: what `identify` may give a model without naming an effect, and the delay laws of base models.
+#[must_use]
+pub fn base_terms() -> Vec<EffectEntry> {
+    let laws = LAWS.iter().filter(|law| law.base);
+    NUISANCES
+        .into_iter()
+        .chain(laws)
+        .map(EffectEntry::from)
+        .collect()
 }

@@ -2,7 +2,8 @@
 
 use serde::{Serialize, Serializer};
 
-use super::{StepError, check_period};
+use super::prepared::prepared;
+use super::{Answer, Beside, StepError, check_period, level};
 use crate::data::DataSet;
 use crate::indicators::{Scores, score};
 use crate::model::Model;
@@ -17,11 +18,65 @@ pub struct Comparison {
     /// Where the model fails.
     #[serde(rename = "where", serialize_with = "places")]
     pub failures: Failures,
-    /// The same in sentences.
+    /// Baselines on the same samples.
+    #[serde(flatten)]
+    pub beside: Beside,
+    /// The answer: verdict, evidence, confidence, next command.
+    pub answer: Answer,
+    /// Where the model fails, in sentences.
     pub words: Vec<String>,
     /// The free run of each record, y.
     #[serde(skip)]
     pub runs: Vec<Vec<f64>>,
+}
+
+/// Several models beside the same recordings. Serialises to the keys of `compare --json` of several models.
+#[derive(Clone, Debug, Serialize)]
+pub struct SideBySide {
+    /// The answer: which model has the lowest error.
+    pub answer: Answer,
+    /// The models in the order in which they were given.
+    pub models: Vec<NamedComparison>,
+}
+
+/// One of several models.
+#[derive(Clone, Debug, Serialize)]
+pub struct NamedComparison {
+    /// What it is called.
+    pub model: String,
+    /// Parameters: coefficients that are not 0, those of the delay and of the effects.
+    pub parameters: usize,
+    /// Its effects.
+    pub effects: Vec<String>,
+    /// What a comparison of it alone says.
+    #[serde(flatten)]
+    pub comparison: Comparison,
+}
+
+/// Runs each of `models`, which have names, free over every record of `set`.
+///
+/// # Errors
+/// [`StepError`] as [`compare`], with the name of the model.
+pub fn compare_several(
+    models: &[(String, &Model)],
+    set: &DataSet,
+) -> Result<SideBySide, (String, StepError)> {
+    let each = models.iter().map(|(name, model)| {
+        let comparison = compare(model, set).map_err(|error| (name.clone(), error))?;
+        Ok(NamedComparison {
+            model: name.clone(),
+            parameters: model.values().iter().filter(|value| **value != 0.0).count(),
+            effects: model.effect_names(),
+            comparison,
+        })
+    });
+    let models: Vec<NamedComparison> = each.collect::<Result<_, _>>()?;
+    let scored = models.iter();
+    let scored = scored.map(|named| (named.model.as_str(), &named.comparison.scores));
+    Ok(SideBySide {
+        answer: level::ranked(scored),
+        models,
+    })
 }
 
 fn places<S: Serializer>(failures: &Failures, serializer: S) -> Result<S::Ok, S::Error> {
@@ -47,11 +102,14 @@ fn places<S: Serializer>(failures: &Failures, serializer: S) -> Result<S::Ok, S:
 /// [`StepError`] when the sampling periods differ, a channel is missing or a run diverges.
 pub fn compare(model: &Model, set: &DataSet) -> Result<Comparison, StepError> {
     check_period(model, set)?;
-    let records = model.targets(&set.records);
+    let prepared = prepared(set)?;
+    let records = model.targets(&prepared.records);
     let (scores, runs) = score(model, &records)?;
     let failures = where_it_fails(model, &records)?;
     Ok(Comparison {
         words: failures.describe(),
+        answer: level::compared(&scores, &failures, &records, &runs),
+        beside: Beside::of(&records),
         scores,
         failures,
         runs,

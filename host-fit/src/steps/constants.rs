@@ -3,13 +3,13 @@
 use serde::Serialize;
 
 use super::StepError;
-use crate::codegen::generate;
+use crate::codegen::{Language, write};
 use crate::model::{Law, Model};
 
 /// Constants for a board. Serialises to the keys of `codegen --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BoardConstants {
-    /// The Rust file.
+    /// The file.
     #[serde(skip)]
     pub text: String,
     /// N1, N2 and N3 of the model.
@@ -39,7 +39,15 @@ pub struct BoardConstants {
 /// # Errors
 /// [`StepError::Codegen`] with the reason why this model cannot run on a board.
 pub fn constants(model: &Model) -> Result<BoardConstants, StepError> {
-    let text = generate(model)?;
+    written(model, &Language::Rust)
+}
+
+/// Writes `model`, and its law where it has one, in `language`.
+///
+/// # Errors
+/// [`StepError::Codegen`] with the reason.
+pub fn written(model: &Model, language: &Language) -> Result<BoardConstants, StepError> {
+    let text = write(model, language)?;
     Ok(BoardConstants {
         sizes: [model.a.len(), model.product_lags.len(), model.b.len()],
         bytes: text.len(),

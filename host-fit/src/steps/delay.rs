@@ -6,7 +6,7 @@ use serde::{Serialize, Serializer};
 
 use super::StepError;
 use crate::data::{DataSet, Use};
-use crate::delay::{DelayOptions, DelayStudy, EdgeDelay, study_delays};
+use crate::delay::{DeadTime, DelayOptions, DelayStudy, EdgeDelay, study_delays};
 use crate::excitation::Excitation;
 
 /// The delays of a data set. Serialises to the keys of `delay --json`.
@@ -36,12 +36,14 @@ pub struct EdgeReport<'a> {
     delay_samples: Option<f64>,
     standard_error_samples: Option<f64>,
     half_response_samples: Option<f64>,
+    delay_s: Option<f64>,
+    standard_error_s: Option<f64>,
     mean_output: Option<f64>,
     not_measured: Option<&'static str>,
 }
 
-impl<'a> From<&'a EdgeDelay> for EdgeReport<'a> {
-    fn from(e: &'a EdgeDelay) -> Self {
+impl<'a> EdgeReport<'a> {
+    fn of(e: &'a EdgeDelay, sample_period_s: f64) -> Self {
         let onset = e.onset.ok();
         Self {
             record: &e.record,
@@ -52,6 +54,8 @@ impl<'a> From<&'a EdgeDelay> for EdgeReport<'a> {
             delay_samples: onset.map(|o| o.delay),
             standard_error_samples: onset.map(|o| o.standard_error),
             half_response_samples: onset.and_then(|o| o.half_response),
+            delay_s: onset.map(|o| o.delay * sample_period_s),
+            standard_error_s: onset.map(|o| o.standard_error * sample_period_s),
             mean_output: e.mean_output,
             not_measured: e.onset.err().map(|u| u.words()),
         }
@@ -62,7 +66,9 @@ impl DelayReport {
     /// Every edge as JSON and CSV have it.
     #[must_use]
     pub fn edges(&self) -> Vec<EdgeReport<'_>> {
-        self.study.edges.iter().map(EdgeReport::from).collect()
+        let each = self.study.edges.iter();
+        each.map(|e| EdgeReport::of(e, self.sample_period_s))
+            .collect()
     }
 
     /// Writes every edge as CSV.
@@ -80,10 +86,43 @@ impl DelayReport {
 
 impl Serialize for DelayReport {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        /// A dead time in samples and in seconds.
+        #[derive(Serialize)]
+        struct Both {
+            samples: f64,
+            standard_error_samples: f64,
+            low_samples: f64,
+            high_samples: f64,
+            seconds: f64,
+            standard_error_s: f64,
+            low_s: f64,
+            high_s: f64,
+        }
+        let both = |time: DeadTime| {
+            let in_seconds = time.scaled(self.sample_period_s);
+            Both {
+                samples: time.samples,
+                standard_error_samples: time.standard_error,
+                low_samples: time.low,
+                high_samples: time.high,
+                seconds: in_seconds.samples,
+                standard_error_s: in_seconds.standard_error,
+                low_s: in_seconds.low,
+                high_s: in_seconds.high,
+            }
+        };
         #[derive(Serialize)]
         struct Document<'a> {
             sample_period_s: f64,
             window_samples: u32,
+            max_delay_samples: usize,
+            reach_samples: usize,
+            method: crate::delay::DelayMethod,
+            plant: Option<crate::delay::ResponsePlant>,
+            dead_time: Option<Both>,
+            dead_time_rising: Option<Both>,
+            dead_time_falling: Option<Both>,
+            law_not_kept: Option<&'a str>,
             law: Option<&'a crate::delay::DelayLawFit>,
             statistics: Option<&'a crate::delay::DelayStatistics>,
             verdict: crate::delay::DelayVerdict,
@@ -99,6 +138,14 @@ impl Serialize for DelayReport {
         let document = Document {
             sample_period_s: self.sample_period_s,
             window_samples: self.window,
+            max_delay_samples: study.max_delay,
+            reach_samples: study.reach,
+            method: study.method,
+            plant: study.plant,
+            dead_time: study.dead_time.map(both),
+            dead_time_rising: study.rising.map(both),
+            dead_time_falling: study.falling.map(both),
+            law_not_kept: study.law_not_kept.as_deref(),
             law: study.law.as_ref(),
             statistics: study.statistics.as_ref(),
             verdict: study.verdict,
@@ -123,20 +170,21 @@ impl Serialize for DelayReport {
 ///
 /// let set = DataSet::load("../data/paper-like".as_ref())?;
 /// let measured = measure_delays(&set, &DelayOptions::default())?;
-/// let law = measured.study.law.as_ref().ok_or("no law")?;
+/// let dead_time = measured.study.dead_time.ok_or("no response")?;
 /// println!("{}", measured.study.words);
-/// assert!((20.0..80.0).contains(&law.p0.value));
+/// assert!((40.0..65.0).contains(&dead_time.samples));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
-/// [`StepError::Data`] when the command is not on/off.
+/// [`StepError::Data`] when an on/off command has values that are neither 0 nor 1.
 pub fn measure_delays(set: &DataSet, options: &DelayOptions) -> Result<DelayReport, StepError> {
+    let study = study_delays(set, options)?;
     Ok(DelayReport {
         sample_period_s: set.sample_period_s,
         window: options.window,
         records: set.records.iter().map(|r| r.name.clone()).collect(),
-        study: study_delays(set, options)?,
-        remarks: Excitation::of(set, options.max_delay).remarks,
+        remarks: Excitation::of(set, study.max_delay).remarks,
+        study,
     })
 }

@@ -2,15 +2,20 @@
 
 use serde::Serialize;
 
-use super::StepError;
+use super::prepared::prepared;
+use super::{StepError, check_period};
+use crate::data::DataSet;
 use crate::design::{
-    MaximiseRequest, Optimum, Proof, TrackDesign, TrackRequest, Trial, maximise, prove,
-    prove_pulses, track,
+    DesignError, Margin, MaximiseRequest, Optimum, PossibleFlow, Proof, RULES, TrackDesign,
+    TrackRequest, Trial, Trials, margin, maximise, possible_flows, prove, prove_pulses, track,
 };
+use crate::fit::RULES as FIT;
 use crate::model::{Law, Model};
+use crate::terms::Units;
 use closed_loop::Controlled;
 
-/// What a law is for.
+/// What a law is for. Levels are what the sensor shows, in the unit of the records, its zero included; costs and rates are in
+/// that unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DesignRequest {
     /// Hold the friction at a value.
@@ -25,11 +30,21 @@ pub struct Design {
     /// The model with its law.
     #[serde(skip)]
     pub model: Model,
+    /// The loop's period, which the law's times are samples of, s.
+    pub sample_period_s: f64,
     /// The law.
     pub law: Law,
+    /// What the sensor shows of a flow without friction, y: levels here and in trials are with it, those of the law without.
+    pub sensor_zero: f64,
     /// What the design rests on.
     #[serde(flatten)]
     pub outcome: DesignOutcome,
+    /// Size of y, for which the rules of the design are written at 1.
+    #[serde(skip)]
+    pub(crate) size: f64,
+    /// Noise of the sensor in units of a usual hot film's.
+    #[serde(skip)]
+    pub(crate) noise: f64,
 }
 
 /// What a design rests on.
@@ -46,15 +61,115 @@ impl Design {
     /// The same design, whose law says in which trials attachment was lost.
     #[must_use]
     pub fn which_lost(self, trials: Vec<String>) -> Self {
-        let law = self.law.which_lost(trials);
+        let law = self.law.clone().which_lost(trials);
+        let model = Model {
+            law: Some(law.clone()),
+            ..self.model
+        };
+        Self { model, law, ..self }
+    }
+}
+
+/// Units in which y of `model` is of order one and the sensor's zero is at 0.
+#[must_use]
+pub fn units_of_order_one(model: &Model) -> Units {
+    let zero = model.zero_among(&model.values());
+    let [low, high] = model.training.y_range;
+    let size = (low - zero).abs().max((high - zero).abs());
+    let as_it_is = (FIT.order_one_low..FIT.order_one_high).contains(&size) || size <= 0.0;
+    Units {
+        zero,
+        y: if as_it_is { 1.0 } else { size },
+        command: model.command,
+        ..Units::NONE
+    }
+}
+
+impl TrackRequest {
+    fn inward(&self, units: &Units) -> Self {
         Self {
-            model: Model {
-                law: Some(law.clone()),
-                ..self.model
-            },
-            law,
-            outcome: self.outcome,
+            target: (self.target - units.zero) / units.y,
+            ramp_per_s: self.ramp_per_s.map(|ramp| ramp / units.y),
+            slow_noise: self.slow_noise.map(|noise| noise / units.y),
+            ..*self
         }
+    }
+}
+
+/// Longest time in a request, samples: a valve's shortest times, a period, a horizon. Beyond it no law is found within
+/// minutes, and the board's memory of the command ends before.
+const LONGEST: f64 = 100_000.0;
+
+/// Refuses times that no law can be searched over.
+fn check_times(model: &Model, request: &DesignRequest) -> Result<(), StepError> {
+    let (min_on_s, min_off_s, period_s, horizon_s) = match request {
+        DesignRequest::Track(r) => (r.min_on_s, r.min_off_s, None, None),
+        DesignRequest::Maximise(r) => (r.min_on_s, r.min_off_s, r.longest_period_s, r.horizon_s),
+    };
+    let longest_s = LONGEST * model.sample_period_s;
+    for (what, time_s) in [
+        ("shortest on time", Some(min_on_s)),
+        ("shortest off time", Some(min_off_s)),
+        ("longest period", period_s),
+        ("horizon", horizon_s),
+    ] {
+        if let Some(time_s) = time_s.filter(|t| !(0.0..=longest_s).contains(t)) {
+            return Err(StepError::DesignTime {
+                what,
+                time_s,
+                longest_s,
+            });
+        }
+    }
+    Ok(())
+}
+
+impl TrackDesign {
+    fn outward(mut self, units: &Units, target: f64) -> Self {
+        let level = |y: f64| y * units.y + units.zero;
+        self.target = target;
+        self.reachable = self.reachable.map(level);
+        for steady in [&mut self.natural, &mut self.blown] {
+            steady.friction = level(steady.friction);
+            steady.reading = level(steady.reading);
+        }
+        let law = &mut self.law;
+        law.reachable = law.reachable.map(|y| y * units.y);
+        for y in [
+            &mut law.reference,
+            &mut law.slope,
+            &mut law.play,
+            &mut law.correction_limit,
+            &mut law.residual_limit,
+        ] {
+            *y *= units.y;
+        }
+        self
+    }
+}
+
+impl Optimum {
+    fn outward(mut self, units: &Units) -> Self {
+        let level = |y: f64| y * units.y + units.zero;
+        self.law.air_price *= units.y;
+        for y in [
+            &mut self.mean,
+            &mut self.mean_after_minutes,
+            &mut self.mean_detuned,
+        ] {
+            *y = level(*y);
+        }
+        self.range = self.range.map(level);
+        self.steady_mean = self.steady_mean.map(level);
+        self.refused_mean = self.refused_mean.map(level);
+        if let Some(outside) = &mut self.outside {
+            outside.friction *= units.y;
+        }
+        if let Some(planned) = &mut self.planned {
+            planned.value = level(planned.value);
+            planned.steady_value = level(planned.steady_value);
+        }
+        self
     }
 }
 
@@ -77,17 +192,35 @@ impl Design {
 /// ```
 ///
 /// # Errors
-/// [`StepError::Design`] with the reason: out of reach, a model that does not settle, not from rest, not at 1 kHz.
+/// [`StepError::Design`] with the reason: out of reach, a model that does not settle, not from rest, a sample period that is no
+/// loop's (0.2 to 100 ms).
 pub fn design(model: &Model, request: &DesignRequest) -> Result<Design, StepError> {
-    let (law, outcome) = match request {
+    check_times(model, request)?;
+    let units = units_of_order_one(model);
+    let inner = units.model_in(model);
+    let outward = |error: DesignError| error.outward(&units);
+    let (law, outcome, noise) = match request {
         DesignRequest::Track(request) => {
-            let design = track(model, request)?;
-            (Law::Track(design.law.clone()), DesignOutcome::Track(design))
+            let inward = request.inward(&units);
+            let design = track(&inner, &inward).map_err(outward)?;
+            let design = design.outward(&units, request.target);
+            let noise = inward
+                .slow_noise
+                .map_or(1.0, |noise| noise / RULES.usual_slow_noise);
+            (
+                Law::Track(design.law.clone()),
+                DesignOutcome::Track(design),
+                noise,
+            )
         }
         DesignRequest::Maximise(request) => {
-            let optimum = maximise(model, request)?;
+            let inward = MaximiseRequest {
+                air_price: request.air_price / units.y,
+                ..*request
+            };
+            let optimum = maximise(&inner, &inward).map_err(outward)?.outward(&units);
             let law = Law::Maximise(optimum.law.clone());
-            (law, DesignOutcome::Maximise(optimum))
+            (law, DesignOutcome::Maximise(optimum), 1.0)
         }
     };
     Ok(Design {
@@ -95,19 +228,123 @@ pub fn design(model: &Model, request: &DesignRequest) -> Result<Design, StepErro
             law: Some(law.clone()),
             ..model.clone()
         },
+        sample_period_s: model.sample_period_s,
         law,
+        sensor_zero: units.zero,
         outcome,
+        size: units.y,
+        noise,
     })
 }
 
-/// Tries the law of `design` on the flow as it is expected (`plant`) and on others; a tracking law also on its own
-/// model. `blown` is the friction of the expected flow under steady blowing, y.
-pub fn try_out<F>(design: &Design, blown: f64, plant: &Trial<F>, others: &[Trial<F>]) -> Proof
+/// The flows that `set` leaves possible beside `model`: what a law has to keep attached.
+///
+/// # Errors
+/// [`StepError`]: other sampling, a missing channel, a model whose free run diverges.
+pub fn possible(model: &Model, set: &DataSet) -> Result<Vec<PossibleFlow>, StepError> {
+    check_period(model, set)?;
+    Ok(possible_flows(model, &prepared(set)?)?)
+}
+
+/// Tries the law of `design` on its model, on `possible` flows and on those under `stress`; figures are in the sensor's units,
+/// its zero included. Noise is repeatable by `seed`.
+pub fn try_out<F>(
+    design: &Design,
+    possible: &[PossibleFlow],
+    stress: &[Trial<F>],
+    seed: u64,
+) -> Proof
 where
     F: Controlled + Clone + Sync,
 {
-    match &design.law {
-        Law::Track(law) => prove(&design.model, law, plant, others),
-        Law::Maximise(law) => prove_pulses(law, blown, plant, others),
+    let trials = Trials {
+        possible,
+        stress,
+        noise: design.noise * design.size,
+        seed,
+    };
+    let proof = match (&design.law, &design.outcome) {
+        (Law::Maximise(law), DesignOutcome::Maximise(optimum)) => {
+            // Pulses have no reference: steady blowing is the measure, or what they reach where that grows.
+            let blown = optimum.steady_mean.unwrap_or(optimum.mean) - design.sensor_zero;
+            prove_pulses(&design.model, law, blown, &trials)
+        }
+        (Law::Maximise(law), DesignOutcome::Track(_)) => {
+            prove_pulses(&design.model, law, 0.0, &trials)
+        }
+        (Law::Track(law), _) => prove(&design.model, law, &trials),
+    };
+    proof.shown_by(design.sensor_zero)
+}
+
+/// The margin of a tracking law: how wrong the model may be, with errors two at a time where `planes` are wanted. `None` for pulses, which do not depend on what is measured.
+#[must_use]
+pub fn law_margin(design: &Design, seed: u64, planes: bool) -> Option<Margin> {
+    let Law::Track(law) = &design.law else {
+        return None;
+    };
+    let noise = design.noise * design.size;
+    Some(margin(&design.model, law, noise, seed, planes))
+}
+
+/// Whether a law for a target passes all trials that decide.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TargetVerdict {
+    /// The target, in the sensor's units.
+    pub target: f64,
+    /// Whether it passes.
+    pub passes: bool,
+    /// Why it does not: the trials that lose attachment, or why there is no law.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
+/// Which targets over the reachable interval pass when everything else of `request` is kept.
+#[must_use]
+pub fn passing_targets(
+    model: &Model,
+    request: &TrackRequest,
+    reachable: [f64; 2],
+    possible: &[PossibleFlow],
+    seed: u64,
+) -> Vec<TargetVerdict> {
+    let steps = RULES.targets;
+    let [low, high] = reachable;
+    let verdict = |step: u32| {
+        let share = f64::from(step) / f64::from(steps);
+        // Two digits of the interval are enough to choose by.
+        let decimals = (1.0 - (high - low).log10().floor()).clamp(0.0, 9.0) as usize;
+        let exact = low + share * (high - low);
+        let target = format!("{exact:.decimals$}").parse().unwrap_or(exact);
+        let request = DesignRequest::Track(TrackRequest { target, ..*request });
+        let reason = match design(model, &request) {
+            Ok(design) => {
+                let lost = try_out::<NoStress>(&design, possible, &[], seed).lost();
+                (!lost.is_empty()).then(|| lost.join(", "))
+            }
+            Err(error) => Some(error.to_string()),
+        };
+        TargetVerdict {
+            target,
+            passes: reason.is_none(),
+            reason,
+        }
+    };
+    (1..steps).map(verdict).collect()
+}
+
+/// What stands for a flow where nothing is tried under stress.
+#[derive(Clone, Copy, Debug)]
+pub enum NoStress {}
+
+impl Controlled for NoStress {
+    fn sample_period_s(&self) -> f64 {
+        match *self {}
+    }
+    fn step(&mut self, _: bool) -> Option<f64> {
+        match *self {}
+    }
+    fn friction(&self) -> f64 {
+        match *self {}
     }
 }

@@ -1,22 +1,23 @@
 //! Which physical effect is missing.
 
 use serde::{Serialize, Serializer};
+use std::collections::BTreeMap;
 
 use super::onlooker::watched;
-use super::{Onlooker, StepError, check_period, trained_in_free_run, verdict};
-use crate::data::DataSet;
+use super::prepared::prepared;
+use super::{Answer, Onlooker, StepError, check_period, trained_in_free_run, verdict};
+use crate::data::{DataSet, Record};
 use crate::diagnose::{
-    Diagnosis, HeldOutBy, Memory, NotTried, Options, Quoted, Ranked, Rung, Verdict,
-    diagnose as search,
+    Certificate, Diagnosis, HeldOutBy, Memory, NotTried, Options, Parsimony, Quoted,
+    RULES as DIAGNOSE, Ranked, Rung, Verdict, diagnose as search,
 };
 use crate::discover::{Glance, glance};
 use crate::experiment::Separation;
 use crate::indicators::{Scores, score, score_new};
 use crate::model::{Model, Training};
 use crate::power::{Detectable, detectable};
-use crate::residual::{Failures, NoiseSource, Where, where_it_fails};
+use crate::residual::{FailureCoordinate, Failures, NoiseSource, Where, where_it_fails};
 use crate::simulate::SimulateError;
-use crate::terms::{MovingZero, tared};
 
 /// A diagnosis with all that is said of it. Serialises to the keys of `diagnose --json`.
 #[derive(Clone, Debug)]
@@ -25,10 +26,8 @@ pub struct Finding {
     pub model: Model,
     /// The diagnosis.
     pub diagnosis: Diagnosis,
-    /// It in a few words.
-    pub headline: String,
-    /// It in sentences.
-    pub meaning: String,
+    /// The answer: verdict, evidence, confidence, next command.
+    pub answer: Answer,
     /// Where that model still fails; none if its free run diverges.
     pub failures: Option<Failures>,
     /// Why there is none.
@@ -43,6 +42,10 @@ pub struct Finding {
     pub beyond: Option<Glance>,
     /// What of each effect would have been seen, had it been there; said where nothing is missing.
     pub detectable: Vec<Detectable>,
+    /// The last error, y, of the runs that decided, where those were not whole runs over records marked `validate`.
+    pub judged_rmse: Option<f64>,
+    /// A measured channel that the error follows, and the share of its energy above the noise.
+    pub channel: Option<(String, f64)>,
 }
 
 impl Serialize for Finding {
@@ -50,12 +53,17 @@ impl Serialize for Finding {
         #[derive(Serialize)]
         struct Document<'a> {
             verdict: Verdict,
+            answer: &'a Answer,
             missing: &'a [String],
             stand_ins: &'a [String],
             sets: &'a [Vec<String>],
             memory: &'a [Memory],
             ladder: &'a [Rung],
             ranking: &'a [Ranked],
+            evidence_nats: Option<f64>,
+            posterior: &'a [Vec<f64>],
+            certificate: &'a BTreeMap<String, Certificate>,
+            parsimony: Option<&'a Parsimony>,
             not_tried: &'a [NotTried],
             #[serde(rename = "where")]
             places: &'a [Where],
@@ -66,6 +74,8 @@ impl Serialize for Finding {
             alternatives: usize,
             p_value: Option<f64>,
             restarted_s: Option<f64>,
+            judged_rmse: Option<f64>,
+            channel: Option<&'a str>,
             noise_source: NoiseSource,
             noise_estimate: f64,
             experiment: Option<&'a Separation>,
@@ -74,12 +84,17 @@ impl Serialize for Finding {
         let found = &self.diagnosis;
         let document = Document {
             verdict: found.verdict,
+            answer: &self.answer,
             missing: &found.missing,
             stand_ins: &found.stand_ins,
             sets: &found.sets,
             memory: &found.memory,
             ladder: &found.ladder,
             ranking: &found.ranking,
+            evidence_nats: found.evidence_nats,
+            posterior: &found.posterior,
+            certificate: &found.certificates,
+            parsimony: found.parsimony.as_ref(),
             not_tried: &found.not_tried,
             places: self.failures.as_ref().map_or(&[], |f| &f.by),
             detectable: &self.detectable,
@@ -89,16 +104,18 @@ impl Serialize for Finding {
             alternatives: found.alternatives,
             p_value: found.p_value,
             restarted_s: found.restarted_s,
+            judged_rmse: self.judged_rmse,
+            channel: self.channel.as_ref().map(|(name, _)| name.as_str()),
             noise_source: found.noise_source,
             noise_estimate: found.noise_estimate,
             experiment: found.separation.as_ref(),
-            words: format!("{}. {}", self.headline, self.meaning),
+            words: self.answer.sentence(),
         };
         document.serialize(serializer)
     }
 }
 
-/// Finds what `model` lacks on `set`, judged in free run on held-out records. Effects of the user's own are tried with
+/// Finds what `model` lacks on `set`, judged in free run on validation records. Effects of the user's own are tried with
 /// those of the catalogue if the model knows them ([`Model::define`]).
 ///
 /// ```no_run
@@ -110,7 +127,7 @@ impl Serialize for Finding {
 /// let model = Model::load("model.toml".as_ref())?;
 /// let set = DataSet::load("data/hidden-ramp".as_ref())?;
 /// let found = diagnose(&model, &set, &Options::default(), &())?;
-/// println!("{}. {}", found.headline, found.meaning);
+/// println!("{}", found.answer.words());
 /// found.model.save("with-what-was-missing.toml".as_ref())?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -124,11 +141,18 @@ pub fn diagnose(
     onlooker: &dyn Onlooker,
 ) -> Result<Finding, StepError> {
     check_period(model, set)?;
-    let records = model.targets(&set.records);
+    let prepared = prepared(set)?;
+    let records = model.targets(&prepared.records);
+    let (mut judged_rmse, mut channel) = (None, None);
     let (diagnosis, failures, detectable, beyond) = watched(onlooker, "diagnosis", || {
         let progress = |what: &str| onlooker.now(what);
-        let diagnosis = search(model, &records, options, onlooker.interrupt(), &progress)?;
-        let failures = where_it_fails(&diagnosis.model, &tared(&records));
+        let mut diagnosis = search(model, &records, options, onlooker.interrupt(), &progress)?;
+        judged_rmse = as_written(&mut diagnosis, model, &records);
+        let failures = where_it_fails(&diagnosis.model, &records);
+        channel = followed_channel(&diagnosis, failures.as_ref().ok());
+        if channel.is_some() && diagnosis.verdict == Verdict::NothingMissing {
+            diagnosis.verdict = Verdict::Unexplained;
+        }
         let detectable = match diagnosis.verdict {
             Verdict::NothingMissing => {
                 detectable(&diagnosis.model, &records, diagnosis.usual_by_chance)
@@ -161,12 +185,12 @@ pub fn diagnose(
         Ok((scores, runs)) => (scores, Some(runs)),
         Err(_) => (score_new(&diagnosis.model, &records)?.0, None),
     };
-    let (headline, mut meaning) = verdict::words(&diagnosis);
+    let mut answer = verdict::answer(&diagnosis, judged_rmse, channel.as_ref(), set.plant);
     if let Some(beyond) = &beyond {
-        meaning += &verdict::beyond(beyond);
+        answer.note(verdict::beyond(beyond));
     }
-    if let Some(moving) = MovingZero::of(&records) {
-        meaning += &format!(" {moving}");
+    if let Some(moving) = &prepared.moving_zero {
+        answer.note(moving.to_string());
     }
     Ok(Finding {
         model: Model {
@@ -176,8 +200,7 @@ pub fn diagnose(
             },
             ..diagnosis.model.clone()
         },
-        headline,
-        meaning,
+        answer,
         failures,
         unstable,
         scores,
@@ -185,6 +208,56 @@ pub fn diagnose(
         runs,
         beyond,
         detectable,
+        judged_rmse,
+        channel,
         diagnosis,
     })
+}
+
+/// The errors of the ladder as `compare` has them of each model that stands there, and the given model in the place of
+/// one that errs more. Gives the last error as it was judged, where that was of other runs than whole ones over records
+/// marked `validate`: of runs that start anew, or of records left out in turn.
+fn as_written(diagnosis: &mut Diagnosis, given: &Model, records: &[Record]) -> Option<f64> {
+    let judged = diagnosis.ladder.last().map(|rung| rung.validate_rmse);
+    for rung in &mut diagnosis.ladder {
+        rung.as_compared(records);
+    }
+    let error = |rung: Option<&Rung>| rung.map_or(f64::INFINITY, |rung| rung.validate_rmse);
+    let (first, last) = (
+        diagnosis.ladder.first().cloned(),
+        error(diagnosis.ladder.last()),
+    );
+    if let Some(first) = first
+        && diagnosis.model != *given
+        && (last.is_nan() || last > first.validate_rmse)
+    {
+        if !diagnosis.missing.is_empty() || !diagnosis.stand_ins.is_empty() {
+            diagnosis.verdict = Verdict::Unexplained;
+        }
+        diagnosis.missing.clear();
+        diagnosis.stand_ins.clear();
+        diagnosis.sets.clear();
+        diagnosis.p_value = None;
+        diagnosis.model = given.clone();
+        diagnosis.ladder.push(first.once_more());
+    }
+    let whole = diagnosis.held_out_by == HeldOutBy::Records && diagnosis.restarted_s.is_none();
+    judged.filter(|_| !whole)
+}
+
+/// The measured channel that the error of the final model follows, and the share of its energy above the noise; none
+/// where it follows none, or an effect of the model has that channel.
+fn followed_channel(diagnosis: &Diagnosis, failures: Option<&Failures>) -> Option<(String, f64)> {
+    let failures = failures.filter(|failures| failures.above_noise)?;
+    let known = diagnosis.model.channels();
+    failures
+        .by
+        .iter()
+        .find_map(|place| match &place.coordinate {
+            FailureCoordinate::Channel(name) if !known.contains(name) => {
+                let enough = place.explained_fraction >= DIAGNOSE.follows_a_channel;
+                enough.then(|| (name.clone(), place.explained_fraction))
+            }
+            _ => None,
+        })
 }

@@ -1,8 +1,10 @@
 //! The term that is missing where no catalogue has it.
 
 use super::onlooker::watched;
-use super::{Onlooker, StepError, check_period, trained_in_free_run};
-use crate::data::DataSet;
+use super::prepared::prepared;
+use super::verdict::times;
+use super::{Answer, Onlooker, StepError, Tone, check_period, trained_in_free_run};
+use crate::data::{DataSet, Record};
 use crate::diagnose::Rung;
 use crate::discover::{Discovery, FoundTerm, Options, Smallest, Trace, discover as search};
 use crate::experiment::Separation;
@@ -21,10 +23,8 @@ pub struct Terms {
     pub model: Model,
     /// The discovery.
     pub discovery: Discovery,
-    /// It in a few words.
-    pub headline: String,
-    /// It in sentences.
-    pub meaning: String,
+    /// The answer: verdict, evidence, confidence, next command.
+    pub answer: Answer,
     /// Indicators of the model.
     pub scores: Scores,
     /// The free run of the given model over each record, y; none if it diverges.
@@ -38,6 +38,7 @@ impl Serialize for Terms {
         #[derive(Serialize)]
         struct Document<'a> {
             terms: &'a [FoundTerm],
+            answer: &'a Answer,
             ladder: &'a [Rung],
             smallest_seen: &'a BTreeMap<String, Smallest>,
             held_out_by: HeldOutBy,
@@ -51,6 +52,7 @@ impl Serialize for Terms {
         let found = &self.discovery;
         let document = Document {
             terms: &found.terms,
+            answer: &self.answer,
             ladder: &found.ladder,
             smallest_seen: &found.smallest_seen,
             held_out_by: found.held_out_by,
@@ -59,7 +61,7 @@ impl Serialize for Terms {
             curves_looked_at: found.looked_at,
             trace: found.trace.as_ref(),
             experiment: found.separation.as_ref(),
-            words: format!("{}. {}", self.headline, self.meaning),
+            words: self.answer.sentence(),
         };
         document.serialize(serializer)
     }
@@ -76,7 +78,7 @@ impl Serialize for Terms {
 /// let model = Model::load("model.toml".as_ref())?;
 /// let set = DataSet::load("data/hidden-ramp".as_ref())?;
 /// let found = discover(&model, &set, &Options::default(), &())?;
-/// println!("{}. {}", found.headline, found.meaning);
+/// println!("{}", found.answer.words());
 /// found.model.save("with-a-new-term.toml".as_ref())?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -90,19 +92,20 @@ pub fn discover(
     onlooker: &dyn Onlooker,
 ) -> Result<Terms, StepError> {
     check_period(model, set)?;
-    let records = model.targets(&set.records);
-    let discovery = watched(onlooker, "discovery", || {
+    let prepared = prepared(set)?;
+    let records = model.targets(&prepared.records);
+    let mut discovery = watched(onlooker, "discovery", || {
         let progress = |what: &str| onlooker.now(what);
         search(model, &records, options, onlooker.interrupt(), &progress)
     })?;
     let runs_before = score(model, &records).ok().map(|(_, runs)| runs);
-    let (scores, runs) = score(&discovery.model, &records)?;
-    let (headline, mut meaning) = words(&discovery);
+    let (scores, runs) = as_written(&mut discovery, model, &records)?;
+    let mut answer = answer(&discovery);
     if let Some(trace) = &discovery.trace {
-        meaning += &where_it_enters(trace);
+        answer.note(where_it_enters(trace));
     }
     if let Some(moving) = &discovery.moving_zero {
-        meaning += &format!(" {moving}");
+        answer.note(moving.to_string());
     }
     let found = discovery.terms.iter().map(|term| term.effect.clone());
     Ok(Terms {
@@ -113,8 +116,7 @@ pub fn discover(
             },
             ..discovery.model.clone()
         },
-        headline,
-        meaning,
+        answer,
         scores,
         runs_before,
         runs,
@@ -122,100 +124,181 @@ pub fn discover(
     })
 }
 
-/// Headline and meaning.
-fn words(discovery: &Discovery) -> (String, String) {
-    let noise = discovery.noise_estimate;
-    let last = discovery
-        .ladder
-        .last()
-        .map_or(f64::NAN, |rung| rung.validate_rmse);
-    let floor = match discovery.noise_source {
-        NoiseSource::Measured | NoiseSource::Repeats => format!(
-            "the noise floor is {} ({:.2} times it is left)",
-            significant(noise, 3),
-            last / noise
-        ),
-        NoiseSource::Scatter => "the noise floor is not known".to_owned(),
+/// How the model that is handed over scores over whole `records`: the one that was found, or the given one where that
+/// errs less. The last rung of the ladder says the same.
+fn as_written(
+    discovery: &mut Discovery,
+    given: &Model,
+    records: &[Record],
+) -> Result<(Scores, Vec<Vec<f64>>), StepError> {
+    let rmse = |scores: &Scores| scores.held_out().map_or(f64::INFINITY, |all| all.rmse);
+    let found = score(&discovery.model, records);
+    let before = score(given, records);
+    let (scores, runs) = match (found, before) {
+        (Ok(found), Ok(before)) if rmse(&found.0) <= rmse(&before.0) => found,
+        (_, Ok(before)) => {
+            discovery.terms.clear();
+            discovery.model = given.clone();
+            let first = discovery.ladder.first().cloned();
+            discovery.ladder.extend(first.map(Rung::once_more));
+            before
+        }
+        (found, Err(_)) => found?,
     };
-    if discovery.terms.is_empty() {
-        let mut meaning = format!(
-            "{} curves were looked at and none lowers the held-out error by more than chance or than the flow's own \
-             memory does: it is {}, {floor}.",
-            discovery.looked_at,
-            significant(last, 3)
-        );
-        for (place, smallest) in &discovery.smallest_seen {
-            meaning += &format!(
-                " At the {place} a term of {} to {} (rms) would have counted, depending on its coordinate.",
-                spoken(smallest.from, smallest.unit),
-                spoken(smallest.to, smallest.unit)
-            );
-        }
-        return ("no term was found".to_owned(), meaning);
+    if let Some(first) = discovery.ladder.first_mut() {
+        first.model = Some(given.clone());
+        first.as_compared(records);
     }
-    let each = discovery
-        .terms
-        .iter()
-        .map(|term| format!("at the {} by {}", term.place.word(), term.coordinate));
-    let headline = format!(
-        "a term was found {}",
-        each.collect::<Vec<_>>().join(", and one ")
-    );
-    let mut meaning = String::new();
-    for term in &discovery.terms {
-        meaning += &format!(
-            "The {} depends on {}: it takes {:.0} % of the excess of the held-out error (p {}). ",
-            term.changes,
-            term.coordinate,
-            term.excess_taken_percent,
-            if term.p_value < 0.001 {
-                "< 0.001".to_owned()
-            } else {
-                format!("= {}", significant(term.p_value, 1))
-            }
-        );
-        if term.is_formula {
-            let values = term.parameters.iter().map(|(name, estimate)| {
-                format!(
-                    "{name} {} {}",
-                    significant(estimate.value, 3),
-                    estimate.unit
-                )
-            });
-            meaning += &format!(
-                "As a formula: {}, with {}. ",
-                term.formula,
-                values.collect::<Vec<_>>().join(", ")
-            );
-        } else {
-            meaning += "No formula on the list does as well as its curve, which is handed over as a table. ";
-        }
-        if !term.resembles.is_empty() {
-            meaning += &format!("It resembles {}. ", term.resembles.join(", "));
-        }
-        if !term.alike.is_empty() {
-            let others = term.alike.iter().map(|other| {
-                let place = other.place.word();
-                format!("one at the {place} by {}", other.coordinate)
-            });
-            meaning += &format!(
-                "These records cannot tell it from {}. ",
-                others.collect::<Vec<_>>().join(", or ")
-            );
-        }
-        meaning += &format!(
-            "Place and coordinate come out best in {:.0} % of the resamples of the held-out records. ",
-            term.stability_percent
-        );
+    if let Some(last) = discovery.ladder.last_mut() {
+        last.model = Some(discovery.model.clone());
+        last.as_compared(records);
     }
-    if let Some(separation) = &discovery.separation {
-        meaning += &format!("{} ", separation.words());
-    }
-    meaning += &format!("The held-out error is {}; {floor}.", significant(last, 3));
-    (headline, meaning)
+    Ok((scores, runs))
 }
 
-/// Where the misfit enters, by its trace.
+/// The answer of a discovery.
+fn answer(discovery: &Discovery) -> Answer {
+    let rmse = |rung: Option<&Rung>| rung.map_or(f64::NAN, |rung| rung.validate_rmse);
+    let (first, last) = (
+        rmse(discovery.ladder.first()),
+        rmse(discovery.ladder.last()),
+    );
+    let noise = discovery.noise_estimate;
+    let error = match discovery.held_out_by {
+        HeldOutBy::Records => "validation error",
+        HeldOutBy::Turns | HeldOutBy::End => "estimation error",
+    };
+    let known = discovery.noise_source != NoiseSource::Scatter && noise > 0.0;
+    if discovery.terms.is_empty() {
+        let level = match known {
+            true => format!(
+                "{} × the noise level (RMSE {})",
+                times(last / noise),
+                significant(last, 3)
+            ),
+            false => format!("RMSE {}; the noise level is unknown", significant(last, 3)),
+        };
+        let mut answer = Answer::new(Tone::Warning, "no term was found")
+            .evidence(format!("The {error} stays at {level}."))
+            .confidence(format!(
+                "None of {} candidate curves lowers it significantly and by more than additional lags do.",
+                discovery.looked_at
+            ));
+        for (place, smallest) in &discovery.smallest_seen {
+            answer.note(format!(
+                "At the {place}, a term of {} to {} (rms) would have been found; the value depends on its coordinate.",
+                spoken(smallest.from, smallest.unit),
+                spoken(smallest.to, smallest.unit)
+            ));
+        }
+        return answer;
+    }
+    let each = discovery.terms.iter().map(|term| {
+        format!(
+            "at the {}, depending on {}",
+            term.place.word(),
+            term.coordinate
+        )
+    });
+    let each: Vec<String> = each.collect();
+    let verdict = match each.as_slice() {
+        [one] => format!("a term is missing {one}"),
+        several => format!("terms are missing {}", several.join(" and ")),
+    };
+    let (from, to) = (significant(first, 3), significant(last, 3));
+    let fall = match known {
+        true => format!(
+            "from {} to {} × the noise level (RMSE {from} → {to})",
+            times(first / noise),
+            times(last / noise)
+        ),
+        false => format!("from RMSE {from} to {to}"),
+    };
+    let explained = discovery.terms.iter().map(|term| {
+        format!(
+            "{} with {} explains {:.0} % of the model error above the noise",
+            capitalised(term.changes),
+            term.coordinate,
+            term.excess_taken_percent
+        )
+    });
+    let sure = discovery.terms.iter().map(|term| {
+        let p = if term.p_value < 0.001 {
+            "< 0.001".to_owned()
+        } else {
+            format!("= {}", significant(term.p_value, 1))
+        };
+        let stable = term.stability_percent;
+        let stable = match stable >= 90.0 {
+            true => {
+                format!("stable: the same term wins in {stable:.0} % of the bootstrap resamples")
+            }
+            false => format!(
+                "not stable: the same term wins in only {stable:.0} % of the bootstrap resamples"
+            ),
+        };
+        format!(
+            "p {p} over {} candidate curves; {stable}.",
+            discovery.looked_at
+        )
+    });
+    let mut answer = Answer::new(Tone::Finding, verdict)
+        .evidence(format!(
+            "The {error} falls {fall}. {}.",
+            explained.collect::<Vec<_>>().join("; ")
+        ))
+        .confidence(sure.collect::<Vec<_>>().join(" "))
+        .next("host-fit discover model.toml DATASET -o new.toml --effect-out own.toml");
+    for term in &discovery.terms {
+        describe_term(&mut answer, term);
+    }
+    if let Some(separation) = &discovery.separation {
+        answer.note(separation.words());
+    }
+    answer
+}
+
+/// A term's formula, and what it is like.
+fn describe_term(answer: &mut Answer, term: &FoundTerm) {
+    if term.is_formula {
+        let values = term.parameters.iter().map(|(name, estimate)| {
+            let value = significant(estimate.value, 3);
+            match estimate.unit.as_str() {
+                "-" | "" => format!("{name} {value}"),
+                unit => format!("{name} {value} {unit}"),
+            }
+        });
+        answer.note(format!(
+            "Formula: {}, with {}.",
+            term.formula,
+            values.collect::<Vec<_>>().join(", ")
+        ));
+    } else {
+        answer
+            .note("No formula on the list fits equally well, so the curve is written as a table.");
+    }
+    if !term.resembles.is_empty() {
+        answer.note(format!("It resembles {}.", term.resembles.join(", ")));
+    }
+    if !term.alike.is_empty() {
+        let others = term.alike.iter().map(|other| {
+            let place = other.place.word();
+            format!("one at the {place} that depends on {}", other.coordinate)
+        });
+        answer.note(format!(
+            "Not distinguishable on these data from {}.",
+            others.collect::<Vec<_>>().join(", or ")
+        ));
+    }
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string());
+    first.unwrap_or_default() + letters.as_str()
+}
+
+/// At which place the error enters, by its trace.
 fn where_it_enters(trace: &Trace) -> String {
     let odds = trace
         .odds
@@ -224,11 +307,11 @@ fn where_it_enters(trace: &Trace) -> String {
     let odds = odds.collect::<Vec<_>>().join(", ");
     match trace.place {
         Some(place) => format!(
-            " Whatever it depends on, what is missing beside the flow's own memory enters at the {} (odds: {odds}).",
+            "The error enters at the {} whatever it depends on (posterior: {odds}).",
             place.word()
         ),
         None => format!(
-            " A free signal at one place explains the misfit as well as at another: these records cannot tell where it enters (odds: {odds})."
+            "These records do not show at which place the error enters (posterior: {odds})."
         ),
     }
 }

@@ -57,6 +57,18 @@ pub enum StepError {
     /// No law was designed.
     #[error(transparent)]
     Design(#[from] DesignError),
+    /// A time of a law that nothing can be searched over.
+    #[error(
+        "a {what} of {time_s:?} s is none for a law of this model: give 0 to {longest_s} s (100000 samples)"
+    )]
+    DesignTime {
+        /// What the time is of.
+        what: &'static str,
+        /// The time, s.
+        time_s: f64,
+        /// The longest, s.
+        longest_s: f64,
+    },
     /// No constants were generated.
     #[error(transparent)]
     Codegen(#[from] CodegenError),
@@ -96,15 +108,37 @@ pub enum StepError {
         /// The model's, s.
         model: f64,
     },
-    /// A model that starts from measurements, and none are given.
+    /// The model that was found does not stay finite on its own records.
     #[error(
-        "{place}: no column `y`, but this model starts from measurements (`start = \"measured\"`); \
-         add the measured y of the first {samples} samples (later values are not used)"
+        "no model was written: the best that was found does not stay finite on these records ({0}). Use fewer lags \
+         (`--n1 1 --n2 1`), or a longer record with more switchings"
     )]
-    NoMeasurements {
-        /// The command file.
-        place: Box<FilePlace>,
-        /// How many are needed.
+    Unstable(crate::simulate::SimulateError),
+    /// An effect does not help.
+    #[error(
+        "nothing was written: with {effects} the error of the free run does not fall ({before} → {after} on the {on} \
+         records). Use the model as it was, or another effect (`host-fit diagnose` ranks them)"
+    )]
+    NoGain {
+        /// The effects.
+        effects: String,
+        /// Root mean square error before, y.
+        before: String,
+        /// After.
+        after: String,
+        /// `validation` or `estimation`.
+        on: &'static str,
+    },
+    /// Too few samples are left to judge a model on.
+    #[error(
+        "{scored} of {samples} samples would be scored, which is less than half: the other records or samples only lead up to \
+         them (`lead_samples` in dataset.toml) or begin in mid-run. Record longer, or state what the command was before \
+         the first sample (`u_before` in dataset.toml)"
+    )]
+    TooFewScored {
+        /// Samples that would be scored.
+        scored: usize,
+        /// Samples in all.
         samples: usize,
     },
     /// A channel that the model's effects need.

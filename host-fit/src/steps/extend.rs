@@ -5,12 +5,14 @@ use std::collections::BTreeMap;
 use serde::{Serialize, Serializer};
 
 use super::onlooker::watched;
-use super::{Onlooker, StepError, check_period, trained_in_free_run};
-use crate::data::DataSet;
+use super::prepared::prepared;
+use super::{Answer, Onlooker, StepError, check_period, level, trained_in_free_run};
+use crate::data::{DataSet, Use};
 use crate::diagnose::ParameterEstimate;
 use crate::extend::{Extended, StructureKept, extend as refit};
 use crate::indicators::{Indicators, Scores, score};
 use crate::model::Model;
+use crate::picture::significant;
 
 /// A model with effects added. Serialises to the keys of `extend --json`.
 #[derive(Clone, Debug, Serialize)]
@@ -18,6 +20,8 @@ pub struct Extension {
     /// The model.
     #[serde(skip)]
     pub model: Model,
+    /// The answer: verdict, evidence, next command.
+    pub answer: Answer,
     /// The effects that were added: one name, or a list of them.
     #[serde(rename = "effect", serialize_with = "one_or_several")]
     pub effects: Vec<String>,
@@ -51,7 +55,7 @@ pub struct RecordChange {
     pub before_rmse: Option<f64>,
     /// After.
     pub after_rmse: f64,
-    /// The noise floor, y; none without `y_sd`.
+    /// The noise level, y; none without `y_sd`.
     pub noise_rmse: Option<f64>,
 }
 
@@ -60,6 +64,29 @@ fn one_or_several<S: Serializer>(effects: &[String], serializer: S) -> Result<S:
         [one] => one.serialize(serializer),
         several => several.serialize(serializer),
     }
+}
+
+/// A model that errs more than the one it came from is not handed over.
+fn refuse_worse(
+    effects: &[String],
+    before: Option<&Scores>,
+    after: &Scores,
+) -> Result<(), StepError> {
+    let (Some(before), Some(after)) = (before.and_then(Scores::held_out), after.held_out()) else {
+        return Ok(());
+    };
+    if after.rmse <= before.rmse {
+        return Ok(());
+    }
+    Err(StepError::NoGain {
+        effects: effects.join(" and "),
+        before: significant(before.rmse, 5),
+        after: significant(after.rmse, 5),
+        on: match after.role {
+            Use::Validate => "validation",
+            Use::Identify => "estimation",
+        },
+    })
 }
 
 /// Adds the effects called `effects` to `model` and refits everything on the identify records of `set`.
@@ -85,7 +112,8 @@ pub fn extend(
     onlooker: &dyn Onlooker,
 ) -> Result<Extension, StepError> {
     check_period(model, set)?;
-    let records = model.targets(&set.records);
+    let prepared = prepared(set)?;
+    let records = model.targets(&prepared.records);
     // A model that diverges on these records can still be extended.
     let scores_before = score(model, &records).ok().map(|(scores, _)| scores);
     let Extended {
@@ -94,9 +122,10 @@ pub fn extend(
         parameters,
         ..
     } = watched(onlooker, "refitting everything", || {
-        refit(model, &records, effects)
+        refit(model, &records, effects, onlooker.interrupt())
     })?;
     let (scores_after, _) = score(&extended, &records)?;
+    refuse_worse(effects, scores_before.as_ref(), &scores_after)?;
     extended.training = trained_in_free_run(set, &scores_after, model.training.seed);
     let several = parameters.len() > 1;
     let named = |effect: &str, name: String| match several {
@@ -110,6 +139,11 @@ pub fn extend(
     let before_rmse = |index: usize| Some(scores_before.as_ref()?.records.get(index)?.rmse);
     let changes = scores_after.records.iter().enumerate();
     Ok(Extension {
+        answer: level::extended(
+            &effects.join(" and "),
+            scores_before.as_ref().and_then(Scores::held_out),
+            scores_after.held_out(),
+        ),
         effects: effects.to_vec(),
         parameters: parameters.collect(),
         before: scores_before.as_ref().and_then(Scores::held_out).cloned(),

@@ -2,22 +2,26 @@
 
 use serde::{Serialize, Serializer};
 
-use super::measured_law::measured_law;
+use super::candidate_law::candidate_law;
 use super::onlooker::{Searching, watched};
-use super::{Onlooker, StepError, finite_fit, trained_in_free_run, training};
-use crate::data::{DataSet, Record};
+use super::prepared::prepared;
+use super::{
+    Answer, Beside, Onlooker, StepError, finite_fit, level, trained_in_free_run, training,
+};
+use crate::data::{DataSet, Record, Use};
 use crate::excitation::{Demand, ExcitationError, check_excitation};
 use crate::extend::{effects_for, extend};
 use crate::identify::{
     ExponentialDelay, Identified, IdentifyError, IdentifyOptions, InputDelay, Objective, RULES,
     Refinement, Structure, identify as search,
 };
-use crate::indicators::{Scores, one_step_norm, score_new};
+use crate::indicators::{Scores, one_step_norm, score, score_new};
 use crate::model::{Delay, Model, Start};
+use crate::preparation::Preparation;
 use crate::search::{Settings, StopReason};
-use crate::terms::{MovingZero, base_model};
+use crate::terms::{Frame, Units, base_model, baselines};
 use crate::user_effect::Definition;
-use model_core::effects::StateDependentDelay;
+use model_core::effects::{NUISANCES, StateDependentDelay};
 use model_core::recursion::LagConvention;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -25,7 +29,7 @@ use std::time::Instant;
 /// What to identify and how.
 #[derive(Debug, Clone)]
 pub struct IdentifyRequest {
-    /// Where the input delays come from; none for what does better on held-out records.
+    /// Where the input delays come from; none for what does better on validation records.
     pub delay: Option<DelayKind>,
     /// Keep delays between samples even where they do not pay.
     pub interpolated: bool,
@@ -34,7 +38,7 @@ pub struct IdentifyRequest {
     /// Identify the model of the moving averages, eqs. (14) and (15).
     pub averaged: bool,
     /// Number of state lags N1. Where no count is given and the objective is the free run, the structure is chosen by
-    /// held-out error; otherwise 5, for the averaged model 2.
+    /// validation error; otherwise 5, for the averaged model 2.
     pub n1: Option<u16>,
     /// Number of product lags N2; by default 10, for the averaged model 2.
     pub n2: Option<u16>,
@@ -98,6 +102,8 @@ pub struct Identification {
     /// The model, with its effects and its training record.
     #[serde(skip)]
     pub model: Model,
+    /// The answer: verdict, evidence, confidence, next command.
+    pub answer: Answer,
     /// What was minimised.
     #[serde(serialize_with = "objective_name")]
     pub objective: Objective,
@@ -112,6 +118,9 @@ pub struct Identification {
     /// Indicators of the free run per record, and together.
     #[serde(flatten)]
     pub scores: Scores,
+    /// Baselines on the same samples.
+    #[serde(flatten)]
+    pub beside: Beside,
     /// Lags and delays of the model.
     pub delays: IdentifiedDelays,
     /// Candidates that the search judged in closed form.
@@ -174,11 +183,11 @@ impl IdentifiedDelays {
 
 impl IdentifyRequest {
     /// Sizes and conventions, without the input delay.
-    fn structure(&self, set: &DataSet) -> Result<Structure, StepError> {
+    fn structure(&self, set: &DataSet, prepared: &Preparation) -> Result<Structure, StepError> {
         let learning: Vec<&Record> = set.identify().collect();
         let shortest = learning.iter().map(|r| r.len()).min();
         let shortest = shortest.ok_or(ExcitationError::NoIdentifyRecord)?;
-        let at_rest = set.is_on_off() && starts_at_rest(&learning);
+        let at_rest = prepared.at_rest;
         let size = |given: Option<u16>, full: u16, averaged: u16| -> usize {
             given
                 .unwrap_or(if self.averaged { averaged } else { full })
@@ -205,7 +214,17 @@ impl IdentifyRequest {
         })
     }
 
-    /// Whether the structure is chosen by held-out error.
+    /// The direct search over delays.
+    fn settings(&self) -> Settings {
+        Settings {
+            evaluations: self.evaluations,
+            seed: self.seed,
+            threads: self.threads,
+            ..Settings::default()
+        }
+    }
+
+    /// Whether the structure is chosen by validation error.
     fn is_automatic(&self) -> bool {
         let counted = self.n1.or(self.n2).or(self.n3).or(self.max_lag).is_some();
         let of_the_paper = self.averaged || self.lags == LagConvention::Literal;
@@ -227,38 +246,40 @@ impl IdentifyRequest {
         }
     }
 
-    /// The input delay, and what is to be said about it.
-    fn input_delay(
+    /// The input delays that are searched, the one that is asked for first; the validation error decides.
+    fn input_delays(
         &self,
         set: &DataSet,
         remarks: &mut Vec<String>,
-    ) -> Result<InputDelay, StepError> {
+    ) -> Result<Vec<InputDelay>, StepError> {
         if self.factors.iter().any(|f| !(f.is_finite() && *f >= 0.0)) {
             return Err(StepError::BadFactors);
         }
-        let learning: Vec<&Record> = set.identify().collect();
-        let law = match self.delay.unwrap_or(DelayKind::Fixed) {
-            DelayKind::Fixed if self.factors.is_empty() => {
-                return Ok(InputDelay::Fixed { delays: None });
-            }
-            DelayKind::Fixed => return Err(StepError::FactorsWithoutLaw),
-            DelayKind::Prescribed(law) => law,
-            DelayKind::StateDependent => measured_law(set, &learning, remarks)?,
-        };
-        Ok(InputDelay::StateDependent {
+        let constant = InputDelay::Fixed { delays: None };
+        let factors = (!self.factors.is_empty()).then(|| self.factors.clone());
+        let by_law = |law| InputDelay::StateDependent {
             law,
-            factors: (!self.factors.is_empty()).then(|| self.factors.clone()),
-        })
+            factors: factors.clone(),
+        };
+        match self.delay.unwrap_or(DelayKind::Fixed) {
+            DelayKind::Fixed if factors.is_none() => Ok(vec![constant]),
+            DelayKind::Fixed => Err(StepError::FactorsWithoutLaw),
+            DelayKind::Prescribed(law) => Ok(vec![by_law(law)]),
+            DelayKind::StateDependent => {
+                let learning: Vec<&Record> = set.identify().collect();
+                let found = candidate_law(set, &learning)?;
+                if let Some((_, origin)) = &found {
+                    remarks.push(format!("delay law {origin}"));
+                }
+                match (found, &factors) {
+                    (Some((law, _)), Some(_)) => Ok(vec![by_law(law)]),
+                    (None, Some(_)) => Err(StepError::NoDelayLaw),
+                    (Some((law, _)), None) => Ok(vec![by_law(law), constant]),
+                    (None, None) => Ok(vec![constant]),
+                }
+            }
+        }
     }
-}
-
-/// Whether records begin near y = 0, as a flow at rest does.
-fn starts_at_rest(records: &[&Record]) -> bool {
-    records.iter().all(|record| {
-        let largest = record.y.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
-        let near = RULES.near_rest * largest;
-        record.y.first().is_some_and(|y| y.abs() <= near)
-    })
 }
 
 /// The error with the file of the record that it is about.
@@ -281,22 +302,22 @@ fn overfitted(scores: &Scores) -> Option<String> {
     );
     (held_out < own - RULES.overfitted_points).then(|| {
         format!(
-            "The model fits what it learned from ({own:.0} % FIT) far better than what was held out ({held_out:.0} %): \
-             it has more lags than these records can tell. Use fewer (`--n1 2 --n2 2`), more varied records, or \
-             `diagnose`, which starts from the fewest lags and adds physical effects."
+            "The model over-fits: FIT {own:.0} % on the estimation records, {held_out:.0} % on the validation records. Use \
+             fewer lags (`--n1 2 --n2 2`), more varied records, or `host-fit diagnose`, which adds physical effects to \
+             the fewest lags."
         )
     })
 }
 
 /// Identifies a model on the identify records of `set`: the delays by search, the coefficients by least squares inside
-/// it, refined on the free run where that is the objective and the held-out error falls.
+/// it, refined on the free run where that is the objective and the validation error falls.
 ///
 /// ```
 /// use host_fit::data::DataSet;
 /// use host_fit::steps::{DelayKind, IdentifyRequest, identify};
 ///
 /// let set = DataSet::load("../data/paper-like".as_ref())?;
-/// // One lag of each kind is found in no time; without these counts the structure is chosen by held-out error.
+/// // One lag of each kind is found in no time; without these counts the structure is chosen by validation error.
 /// let request = IdentifyRequest {
 ///     delay: Some(DelayKind::Fixed),
 ///     n1: Some(1),
@@ -318,7 +339,8 @@ pub fn identify(
     request: &IdentifyRequest,
     onlooker: &dyn Onlooker,
 ) -> Result<Identification, StepError> {
-    let mut structure = request.structure(set)?;
+    let prepared = prepared(set)?;
+    let structure = request.structure(set, &prepared)?;
     let demand = Demand {
         max_lag: structure.longest_lag.into(),
         coefficients: structure.coefficients(),
@@ -328,40 +350,65 @@ pub fn identify(
         onlooker.hears(remark);
     }
     let mut remarks = Vec::new();
-    if structure.start == Start::Measured {
-        remarks.push(
-            "the records do not start at rest or the input is not on/off: the model has a constant term, and \
-             free runs follow the measurement for as long as the longest lag"
-                .to_owned(),
-        );
-    }
+    remarks.extend(prepared.remarks());
     if request.is_automatic() {
-        remarks.clear();
-        return automatic(set, request, onlooker, excitation);
+        return automatic(set, &prepared, request, onlooker, (remarks, excitation));
     }
-    structure.delay = request.input_delay(set, &mut remarks)?;
-    let options = IdentifyOptions {
-        structure,
-        objective: request.objective,
-        search: Settings {
-            evaluations: request.evaluations,
-            seed: request.seed,
-            threads: request.threads,
-            ..Settings::default()
-        },
-        ..IdentifyOptions::default()
+    // The recursion has its zero where the records rest, and jets between 0 and 1.
+    let units = Units {
+        zero: prepared.zero,
+        command: prepared.command,
+        ..Units::NONE
     };
-    let identified: Identified = watched(onlooker, "searching the delays", || {
-        let progress = Searching(onlooker);
-        search(&set.records, &options, &progress, onlooker.interrupt())
-    })
-    .map_err(|error| located(set, error))?;
-    let records = identified.model.targets(&set.records);
-    let (mut model, scores) =
+    let inner: Vec<Record> = prepared
+        .records
+        .iter()
+        .map(|r| units.record_in(r))
+        .collect();
+    let delays = request.input_delays(set, &mut remarks)?;
+    let mut searched: Vec<(Identified, Vec<Record>)> = Vec::new();
+    for delay in delays {
+        // Interrupted, the law that was searched is the result.
+        if !searched.is_empty() && onlooker.interrupt().load(Ordering::Relaxed) {
+            break;
+        }
+        let options = IdentifyOptions {
+            structure: Structure {
+                delay,
+                ..structure.clone()
+            },
+            objective: request.objective,
+            search: request.settings(),
+            ..IdentifyOptions::default()
+        };
+        let mut identified: Identified = watched(onlooker, "searching the delays", || {
+            let progress = Searching(onlooker);
+            search(&inner, &options, &progress, onlooker.interrupt())
+        })
+        .map_err(|error| located(set, error))?;
+        identified.model = units.model_out(&identified.model);
+        let records = identified.model.targets(&prepared.records);
+        searched.push((identified, records));
+    }
+    if let [by_law, constant] = searched.as_slice() {
+        let [law, fixed] = [by_law, constant].map(|(found, records)| {
+            let scores = score(&found.model, records).ok().map(|(scores, _)| scores);
+            finite_fit(scores.as_ref().and_then(Scores::held_out)).unwrap_or(f64::NEG_INFINITY)
+        });
+        if fixed >= law {
+            remarks.push(format!(
+                "The delay is constant: with law (2) the FIT is {law:.1} %, with a constant delay {fixed:.1} %."
+            ));
+            searched.swap(0, 1);
+        }
+    }
+    let (identified, records) = searched.swap_remove(0);
+    let (mut model, scores, beside) =
         with_effects(identified.model, &records, request, onlooker, &mut remarks)?;
     let (name, value) = (identified.objective.name(), identified.objective_value);
     model.training = training(set, &scores, request.seed, name, value);
     Ok(Identification {
+        answer: answer(&scores, &beside, &model),
         objective: identified.objective,
         objective_value: value,
         one_step_norm: if model.effects.is_empty() {
@@ -372,6 +419,7 @@ pub fn identify(
         evaluations: identified.evaluations,
         wall_time_s: identified.wall_time.as_secs_f64(),
         scores,
+        beside,
         delays: IdentifiedDelays::of(&model),
         screened: identified.screened,
         stop: identified.stop,
@@ -383,6 +431,11 @@ pub fn identify(
     })
 }
 
+fn answer(scores: &Scores, beside: &Beside, model: &Model) -> Answer {
+    let parameters = model.values().iter().filter(|value| **value != 0.0).count();
+    level::identified(scores, &beside.fits, parameters)
+}
+
 /// The base model with the effects that were asked for, and how it scores.
 fn with_effects(
     mut model: Model,
@@ -390,65 +443,112 @@ fn with_effects(
     request: &IdentifyRequest,
     onlooker: &dyn Onlooker,
     remarks: &mut Vec<String>,
-) -> Result<(Model, Scores), StepError> {
+) -> Result<(Model, Scores, Beside), StepError> {
     for definition in &request.definitions {
         model.define(definition)?;
     }
     if !request.effects.is_empty() {
         effects_for(&model, &request.effects)?;
         model = watched(onlooker, "refitting with the effects", || {
-            extend(&model, records, &request.effects)
+            extend(&model, records, &request.effects, onlooker.interrupt())
         })?
         .model;
     }
     let (scores, diverged) = score_new(&model, records)?;
-    remarks.extend(diverged.iter().map(ToString::to_string));
+    if let Some(diverged) = diverged.into_iter().next() {
+        return Err(StepError::Unstable(diverged));
+    }
     remarks.extend(overfitted(&scores));
-    Ok((model, scores))
+    let beside = Beside::of(records);
+    let fit = scores.held_out().map_or(f64::NAN, |all| all.fit_percent);
+    remarks.extend(beside.better_than(fit));
+    Ok((model, scores, beside))
 }
 
-/// Identifies a model whose structure is chosen by held-out error.
+/// The baseline that does best on validation, as a model, where it beats `model` there; effects that were asked for stay.
+fn better_baseline(
+    model: &Model,
+    scores: &Scores,
+    beside: &Beside,
+    records: &[Record],
+) -> Option<(Model, Scores)> {
+    let fit = |scores: &Scores| finite_fit(scores.held_out()).unwrap_or(f64::NEG_INFINITY);
+    beside.better_than(fit(scores))?;
+    let is_nuisance = |name: &str| NUISANCES.iter().any(|spec| spec.name == name);
+    if !model.effects.iter().all(|added| is_nuisance(&added.name)) {
+        return None;
+    }
+    let frame = Model {
+        sample_period_s: model.sample_period_s,
+        ..Model::default()
+    };
+    let learning: Vec<&Record> = records.iter().filter(|r| r.role == Use::Identify).collect();
+    let all = baselines(&frame, &learning)
+        .into_iter()
+        .filter_map(|model| {
+            let (scores, _) = score(&model, records).ok()?;
+            Some((model, scores))
+        });
+    all.filter(|(_, own)| fit(own) > fit(scores))
+        .max_by(|a, b| fit(&a.1).total_cmp(&fit(&b.1)))
+}
+
+/// Identifies a model whose structure is chosen by validation error.
 fn automatic(
     set: &DataSet,
+    prepared: &Preparation,
     request: &IdentifyRequest,
     onlooker: &dyn Onlooker,
-    excitation: Vec<String>,
+    (mut remarks, excitation): (Vec<String>, Vec<String>),
 ) -> Result<Identification, StepError> {
     let started = Instant::now();
     let found = watched(onlooker, "choosing the structure", || {
         let progress = |what: &str| onlooker.now(what);
         let laws = request.laws();
         let interrupt = onlooker.interrupt();
+        let how = Frame {
+            laws: &laws,
+            interpolated: request.interpolated,
+            settings: request.settings(),
+        };
         base_model(
-            &set.records,
-            &laws,
-            request.interpolated,
+            &prepared.records,
+            &how,
             interrupt,
             &progress,
+            &Searching(onlooker),
         )
     });
     let found = found.ok_or(ExcitationError::NoIdentifyRecord)??;
-    let records = found.model.targets(&set.records);
-    let moving = MovingZero::of(&set.records);
-    let mut remarks: Vec<String> = moving.iter().map(ToString::to_string).collect();
-    let (mut model, scores) = with_effects(found.model, &records, request, onlooker, &mut remarks)?;
+    let records = found.model.targets(&prepared.records);
+    let (mut model, mut scores, beside) =
+        with_effects(found.model, &records, request, onlooker, &mut remarks)?;
+    if let Some((baseline, better)) = better_baseline(&model, &scores, &beside, &records) {
+        (model, scores) = (baseline, better);
+        remarks.push(
+            "The model that is written is that baseline: no bilinear structure has a lower validation error."
+                .to_owned(),
+        );
+    }
     model.training = trained_in_free_run(set, &scores, request.seed);
     let objective_value = model.training.objective_value;
     let objective = Objective::FreeRun;
     let pole = |on| model.largest_pole(on).map_err(IdentifyError::from);
     Ok(Identification {
+        answer: answer(&scores, &beside, &model),
         objective,
         objective_value,
         one_step_norm: one_step_norm(&model, &records)?,
-        evaluations: found.tried,
+        evaluations: found.evaluations,
         wall_time_s: started.elapsed().as_secs_f64(),
         scores,
+        beside,
         delays: IdentifiedDelays::of(&model),
-        screened: 0,
+        screened: found.tried,
         stop: if onlooker.interrupt().load(Ordering::Relaxed) {
             StopReason::Interrupted
         } else {
-            StopReason::LocallyOptimal
+            found.stop
         },
         refinement: None,
         poles: [pole(false)?, pole(true)?],

@@ -1,6 +1,6 @@
 //! Files of other programs to a data set.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -15,13 +15,15 @@ pub struct ImportedSet {
     pub imported: Imported,
     /// Hash of the data set.
     pub hash: String,
-    /// Sampling period, s.
+    /// Sampling period of the records, s.
     pub sample_period_s: f64,
     /// What became of each file.
     pub files: Vec<ImportedFile>,
+    /// What should be known of the data set as a whole: periods that were made one, that nothing is held out.
+    pub remarks: Vec<String>,
 }
 
-/// Makes a data set of CSV files of any dialect, MATLAB's `.mat`, NumPy's `.npy` and `.npz`.
+/// Makes a data set of CSV files of any dialect, MATLAB's `.mat`, NumPy's `.npy` and `.npz`, or of a folder of them.
 ///
 /// ```
 /// use host_fit::data::import::{Import, Mapping};
@@ -37,12 +39,15 @@ pub struct ImportedSet {
 /// # Errors
 /// [`StepError`] naming file, line and column or variable, or the name that no file has.
 pub fn import(files: &[&Path], request: &Import) -> Result<ImportedSet, StepError> {
-    super::average::check_names(files, &request.validate)?;
-    let imported = import::import(files, request)?;
+    let files = import::files_of(files)?;
+    let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+    super::average::check_names(&files, &request.validate)?;
+    let imported = import::import(&files, request)?;
     Ok(ImportedSet {
         hash: imported.set.hash.clone(),
         sample_period_s: imported.set.sample_period_s,
         files: imported.files.clone(),
+        remarks: imported.remarks.clone(),
         imported,
     })
 }

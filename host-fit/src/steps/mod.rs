@@ -12,7 +12,9 @@
 //! | [`extend`] | a model, a data set and effects | [`Extension`] |
 //! | [`simulate`] | a model and a command | [`Simulation`] |
 //! | [`design`] | a model and a goal | [`Design`] |
+//! | [`possible`] | a model and a data set | [`PossibleFlow`](crate::design::PossibleFlow)s |
 //! | [`try_out`] | a design and flows | [`Proof`](crate::design::Proof) |
+//! | [`law_margin`] | a design | [`Margin`](crate::design::Margin) |
 //! | [`constants`] | a model | [`BoardConstants`] |
 //!
 //! [`catalogue`] lists the effects that can be missing, [`rulebooks`] every threshold that decides.
@@ -21,7 +23,10 @@
 //! that the program wrote; what only a picture needs is left out of the document. The program itself is these
 //! functions, a parser before them and three renderers (words, JSON, pages) behind them.
 
+mod answer;
 mod average;
+mod baselines;
+mod candidate_law;
 mod catalogue;
 mod compare;
 mod constants;
@@ -33,18 +38,25 @@ mod error;
 mod extend;
 mod identify;
 mod import;
-mod measured_law;
+mod level;
 mod onlooker;
+mod prepared;
 mod rules;
 mod simulate;
+mod symptom;
 mod verdict;
 
+pub use answer::{Answer, DATASET, MODEL, Tone};
 pub use average::{Average, average};
-pub use catalogue::{EffectEntry, ParameterEntry, catalogue};
-pub use compare::{Comparison, compare};
-pub use constants::{BoardConstants, constants};
+pub use baselines::Beside;
+pub use catalogue::{EffectEntry, ParameterEntry, base_terms, catalogue};
+pub use compare::{Comparison, NamedComparison, SideBySide, compare, compare_several};
+pub use constants::{BoardConstants, constants, written};
 pub use delay::{DelayReport, EdgeReport, measure_delays};
-pub use design::{Design, DesignOutcome, DesignRequest, design, try_out};
+pub use design::{
+    Design, DesignOutcome, DesignRequest, NoStress, TargetVerdict, design, law_margin,
+    passing_targets, possible, try_out, units_of_order_one,
+};
 pub use diagnose::{Finding, diagnose};
 pub use discover::{Terms, discover};
 pub use error::StepError;

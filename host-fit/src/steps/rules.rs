@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::rules::Rulebook;
 use crate::{
     data, delay, design, diagnose, discover, excitation, experiment, fit, identify, model, power,
-    residual, search, simulate, terms,
+    preparation, residual, search, simulate, terms,
 };
 
 /// The rules of every room, in the order in which the way of the data meets them.
@@ -13,6 +13,7 @@ use crate::{
 pub fn rulebooks() -> Vec<Rulebook> {
     vec![
         data::RULES.book(),
+        preparation::RULES.book(),
         excitation::RULES.book(),
         delay::RULES.book(),
         identify::RULES.book(),

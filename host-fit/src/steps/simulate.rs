@@ -5,8 +5,9 @@ use std::io;
 use serde::Serialize;
 
 use super::StepError;
-use crate::data::InputFile;
+use crate::data::{InputFile, Record, Use};
 use crate::model::{Model, Start};
+use crate::preparation::Preparation;
 use crate::simulate::Signals;
 
 /// A free run. Serialises to the keys of `simulate --json`.
@@ -83,12 +84,6 @@ pub fn simulate(model: &Model, input: &InputFile) -> Result<Simulation, StepErro
             model: period,
         });
     }
-    if input.y.is_none() && model.start == Start::Measured {
-        return Err(StepError::NoMeasurements {
-            place: place(),
-            samples: model.warm_up(),
-        });
-    }
     let channels = model.channels().into_iter().map(|channel| {
         let values = input.channels.get(&channel).map(Vec::as_slice);
         values.ok_or_else(|| StepError::NoChannel {
@@ -96,11 +91,20 @@ pub fn simulate(model: &Model, input: &InputFile) -> Result<Simulation, StepErro
             channel,
         })
     });
-    let measured = input.y.as_deref();
+    // A model that starts from measurements begins as it does in `compare`, where they are given.
+    let measured = input.y.as_ref().filter(|_| model.start == Start::Measured);
+    let prepared = measured.map(|y| {
+        let record = Record::new("", Use::Validate, period, input.u.clone(), y.clone());
+        Preparation::of(&[record]).records
+    });
+    let begun = prepared.as_ref().and_then(|records| records.first());
     let signals = Signals {
-        u: &input.u,
-        y: measured.filter(|_| model.start == Start::Measured),
+        y: begun.map(|record| record.y.as_slice()),
+        u_before: begun.and_then(|record| record.u_before.map(|u| model.command.share(u))),
+        y_before: begun.and_then(|record| record.y_before),
+        follow: begun.map_or(0, |record| record.follow),
         channels: channels.collect::<Result<_, _>>()?,
+        ..Signals::commanded(model, &input.u)
     };
     let y = model
         .run_free(&signals)

@@ -1,5 +1,8 @@
-//! A diagnosis in plain language.
+//! The answer of a diagnosis, in words.
 
+use super::symptom::{meant, shown};
+use super::{Answer, Tone};
+use crate::data::Plant;
 use crate::diagnose::{Diagnosis, FLOW_LAG, FLOW_MEMORY, HeldOutBy, Rung, Verdict};
 use crate::discover::Glance;
 use crate::picture::significant;
@@ -8,76 +11,339 @@ use crate::terms::{RULES as TERMS, second_lag_s};
 use model_core::effect::Place;
 use model_core::effects::spec;
 
-/// Headline and meaning of a diagnosis, in words.
-pub(super) fn words(diagnosis: &Diagnosis) -> (String, String) {
-    let (headline, mut meaning) = finding(diagnosis);
-    match diagnosis.held_out_by {
-        HeldOutBy::Records => meaning.push_str(&quoted(diagnosis)),
-        HeldOutBy::Turns => meaning.push_str(
-            " No record is marked `validate`: each in turn was judged by models that had not seen it.",
-        ),
-        HeldOutBy::End => meaning.push_str(
-            " There is one record only: its end was judged by models that saw its beginning; a second record would say more.",
-        ),
-    }
-    if let Some(seconds) = diagnosis.restarted_s {
-        meaning.push_str(&format!(
-            " The rig integrates and its free run drifts: all errors here are of free runs that start anew from the measurement every {} s.",
-            significant(seconds, 3)
+/// What a p-value and an interval are worth, measured on simulated plants (docs/calibration.md).
+const CALIBRATED: &str = "What p and intervals are worth, measured on simulated plants: of 300 without a missing effect, 2 got a name; \
+     95 % intervals held the truth in about 90 % of the cases.";
+
+/// The answer of a diagnosis. `judged_rmse` is the error, y, that the decision was made by where that was not the error
+/// of whole validation records; `channel` is a measured channel that the residual follows, with the share of the
+/// unexplained variance that it explains.
+pub(super) fn answer(
+    diagnosis: &Diagnosis,
+    judged_rmse: Option<f64>,
+    channel: Option<&(String, f64)>,
+    plant: Plant,
+) -> Answer {
+    let mut answer = finding(diagnosis, plant);
+    if let Some((channel, share)) = channel {
+        if diagnosis.verdict == Verdict::Unexplained {
+            answer.verdict = format!("the residual follows the channel {channel}");
+        }
+        answer.note(format!(
+            "The measured channel {channel} explains {:.0} % of the unexplained variance (cross-validated): it acts on y and \
+             is not in the model.",
+            100.0 * share
         ));
     }
+    for name in &diagnosis.missing {
+        answer.note(meant(name, plant).unwrap_or_default());
+    }
+    for set in diagnosis.sets.iter().filter(|set| set.len() > 1) {
+        answer.note(format!(
+            "Not distinguishable on these data: {}.",
+            set.join(", ")
+        ));
+    }
+    surrogates(&mut answer, diagnosis);
+    records(&mut answer, diagnosis, judged_rmse);
+    answer.note(bench_check(&diagnosis.sets));
+    dynamics(&mut answer, diagnosis);
+    if let Some(separation) = &diagnosis.separation {
+        answer.note(separation.words());
+    }
+    if !diagnosis.missing.is_empty() {
+        answer.note(CALIBRATED);
+    }
+    answer
+}
+
+/// What a term beyond the catalogue promises.
+pub(super) fn beyond(glance: &Glance) -> String {
+    format!(
+        "A first look beyond the catalogue: a term at the {} that depends on {} would explain about {:.0} % of the \
+         unexplained variance.",
+        glance.place.word(),
+        glance.coordinate,
+        glance.error_taken_percent
+    )
+}
+
+/// Which error the ladder holds.
+fn error_name(diagnosis: &Diagnosis) -> &'static str {
+    match diagnosis.held_out_by {
+        HeldOutBy::Records => "validation error",
+        HeldOutBy::Turns | HeldOutBy::End => "estimation error",
+    }
+}
+
+/// An error beside the noise level, as far as that is known: "1.01 × the noise level (RMSE 0.0104)".
+fn beside_noise(rmse: f64, diagnosis: &Diagnosis) -> String {
+    let noise = diagnosis.noise_estimate;
+    match diagnosis.noise_source {
+        NoiseSource::Measured | NoiseSource::Repeats if noise > 0.0 => format!(
+            "{} × the noise level (RMSE {})",
+            times(rmse / noise),
+            significant(rmse, 3)
+        ),
+        _ => format!("RMSE {}", significant(rmse, 3)),
+    }
+}
+
+/// Two errors beside the noise level: "from 2.64 to 1.01 × the noise level (RMSE 0.0273 → 0.0104)".
+fn from_to(before: f64, after: f64, diagnosis: &Diagnosis) -> String {
+    let noise = diagnosis.noise_estimate;
+    let (from, to) = (significant(before, 3), significant(after, 3));
+    match diagnosis.noise_source {
+        NoiseSource::Measured | NoiseSource::Repeats if noise > 0.0 => format!(
+            "from {} to {} × the noise level (RMSE {from} → {to})",
+            times(before / noise),
+            times(after / noise),
+        ),
+        _ => format!("from RMSE {from} to {to}"),
+    }
+}
+
+/// A ratio with two decimals, or three digits where it is large.
+pub(super) fn times(ratio: f64) -> String {
+    if ratio < 10.0 {
+        format!("{ratio:.2}")
+    } else {
+        significant(ratio, 3)
+    }
+}
+
+fn joined(names: &[String]) -> String {
+    names.join(" and ")
+}
+
+fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
+    let rmse = |rung: Option<&Rung>| rung.map_or(f64::NAN, |rung| rung.validate_rmse);
+    let first = rmse(diagnosis.ladder.first());
+    let last = rmse(diagnosis.ladder.last());
+    let error = error_name(diagnosis);
+    let now = format!("The {error} is {}.", beside_noise(last, diagnosis));
+    let add = |names: &[String]| {
+        let effects = names.iter().map(|name| format!(" --effect {name}"));
+        let effects: String = effects.collect();
+        format!("host-fit extend model.toml DATASET{effects} -o better.toml")
+    };
+    let discover = "host-fit discover model.toml DATASET -o new.toml";
+    match diagnosis.verdict {
+        Verdict::NothingMissing => Answer::new(Tone::Good, "no effect is missing")
+            .evidence(now)
+            .confidence(
+                "No candidate of the catalogue lowers the error significantly and by more than additional lags do.",
+            )
+            .next("host-fit design model.toml --goal maximise -o controlled.toml"),
+        Verdict::EffectMissing => {
+            let named = [diagnosis.missing.as_slice(), &diagnosis.stand_ins].concat();
+            Answer::new(Tone::Finding, claim(diagnosis, plant))
+                .evidence(match plant {
+                    Plant::Flow => format!(
+                        "{} The records show {}.",
+                        fall(diagnosis, &joined(&named)),
+                        behaviour(diagnosis)
+                    ),
+                    _ => fall(diagnosis, &joined(&named)),
+                })
+                .confidence(confidence(diagnosis))
+                .next(add(&diagnosis.missing))
+        }
+        Verdict::PartlyExplained => {
+            Answer::new(Tone::Warning, "something is missing; its cause stays open")
+                .evidence(format!(
+                    "With {} as surrogates the {error} falls {}.",
+                    joined(&diagnosis.stand_ins),
+                    from_to(first, last, diagnosis)
+                ))
+                .confidence(
+                    "Surrogates describe the error and are not claimed as its cause: too much variance stays unexplained.",
+                )
+                .next(discover)
+        }
+        Verdict::Unexplained => {
+            let tried = diagnosis.ladder.last().map(|rung| joined(&rung.effects));
+            let tried = tried.filter(|tried| !tried.is_empty());
+            Answer::new(
+                Tone::Warning,
+                "something is missing that no effect describes",
+            )
+            .evidence(match &tried {
+                Some(tried) => format!(
+                    "The best candidate, {tried}, lowers the {error} only {}; it is not in the model.",
+                    from_to(first, last, diagnosis)
+                ),
+                None => now,
+            })
+            .confidence("No effect of the catalogue, alone or with others, explains most of the unexplained variance.")
+            .next(discover)
+        }
+    }
+}
+
+/// How sure the named effects are, and by which test.
+fn confidence(diagnosis: &Diagnosis) -> String {
+    match diagnosis.p_value {
+        Some(p) => format!(
+            "Family-wise p {} {} over {} candidates.",
+            if p > 1.0 / (TERMS.draws + 1) as f64 {
+                "="
+            } else {
+                "≤"
+            },
+            significant(p, 2),
+            diagnosis.alternatives
+        ),
+        None => "Chosen by parsimony, not by a significance test: the model with it fits equally well with fewer parameters."
+            .to_owned(),
+    }
+}
+
+/// How the error falls with what is named. An effect that is named by parsimony does not lower the error of the model as
+/// given; its gain shows beside the model with the fewest lags.
+fn fall(diagnosis: &Diagnosis, with: &str) -> String {
+    let rmse = |rung: Option<&Rung>| rung.map_or(f64::NAN, |rung| rung.validate_rmse);
+    let last = rmse(diagnosis.ladder.last());
+    let error = error_name(diagnosis);
+    let fewest = diagnosis.ladder.get(1);
+    match fewest.filter(|rung| diagnosis.p_value.is_none() && rung.effects.is_empty()) {
+        Some(fewest) => format!(
+            "Beside the fewest lags, {with} lowers the {error} {}; without it, additional lags fit equally well.",
+            from_to(rmse(Some(fewest)), last, diagnosis)
+        ),
+        None => format!(
+            "With {with} the {error} falls {}.",
+            from_to(rmse(diagnosis.ladder.first()), last, diagnosis)
+        ),
+    }
+}
+
+/// The behaviour that each missing effect stands for, in words.
+fn behaviour(diagnosis: &Diagnosis) -> String {
+    let each = diagnosis.missing.iter().map(|name| {
+        let text = shown(name, diagnosis.parameters.get(name));
+        text.unwrap_or_else(|| format!("the behaviour of `{name}`"))
+    });
+    each.collect::<Vec<_>>().join("; and ")
+}
+
+/// What is missing: in a flow by name, elsewhere by behaviour. Members of a set that the records do not distinguish stand
+/// beside each name.
+fn claim(diagnosis: &Diagnosis, plant: Plant) -> String {
+    match plant {
+        Plant::Flow => missing(&diagnosis.missing, &diagnosis.sets),
+        _ => format!("missing: {}", behaviour(diagnosis)),
+    }
+}
+
+fn missing(names: &[String], sets: &[Vec<String>]) -> String {
+    let each = names.iter().map(|name| {
+        let set = sets.iter().find(|set| set.first() == Some(name));
+        set.map_or_else(|| name.clone(), |set| set.join(" or "))
+    });
+    let each: Vec<String> = each.collect();
+    match each.as_slice() {
+        [one] => format!("{one} is missing"),
+        several if sets.iter().all(|set| set.len() < 2) => {
+            format!("{} are missing", several.join(" and "))
+        }
+        several => format!("{} are missing", several.join(", and ")),
+    }
+}
+
+/// Surrogates beside named effects.
+fn surrogates(answer: &mut Answer, diagnosis: &Diagnosis) {
+    if diagnosis.verdict != Verdict::EffectMissing || diagnosis.stand_ins.is_empty() {
+        return;
+    }
+    let several = diagnosis.stand_ins.len() > 1;
+    answer.note(format!(
+        "{} {} in the model as {}: not significant beside what is named, or not identifiable on these records.",
+        joined(&diagnosis.stand_ins),
+        if several { "are" } else { "is" },
+        if several { "surrogates" } else { "a surrogate" },
+    ));
+}
+
+/// On which records the errors stand, and how far the noise level is known.
+fn records(answer: &mut Answer, diagnosis: &Diagnosis, judged_rmse: Option<f64>) {
+    match diagnosis.noise_source {
+        NoiseSource::Measured => {}
+        NoiseSource::Repeats => answer.note(
+            "The noise level was estimated from repeats of the command, because there is no `y_sd`.",
+        ),
+        NoiseSource::Scatter => answer.note(format!(
+            "The noise level is unknown: no `y_sd`, no repeated command. From sample to sample y scatters by {}.",
+            significant(diagnosis.noise_estimate, 3)
+        )),
+    }
+    match (diagnosis.held_out_by, &diagnosis.quoted) {
+        (HeldOutBy::Records, Some(quoted)) => answer.note(format!(
+            "Independent estimate on {}, which no choice used: RMSE {} → {}{}.",
+            joined(&quoted.records),
+            significant(quoted.before_rmse, 3),
+            significant(quoted.validate_rmse, 3),
+            quoted.noise_rmse.map_or(String::new(), |noise| format!(
+                ", {} × the noise level there",
+                times(quoted.validate_rmse / noise)
+            ))
+        )),
+        (HeldOutBy::Records, None) if diagnosis.tried > 0 => answer.note(
+            "The structure was chosen on these validation records, so the error is optimistic; add a fourth `validate` \
+             record for an independent estimate.",
+        ),
+        (HeldOutBy::Records, None) => {}
+        (HeldOutBy::Turns, _) => answer.note(
+            "No record is marked `validate`: errors are of the estimation records, and cross-validation over them decided. \
+             A validation record would give an independent estimate.",
+        ),
+        (HeldOutBy::End, _) => answer.note(
+            "There is one record only: its end decided, with models of its beginning. A validation record would give an \
+             independent estimate.",
+        ),
+    }
+    let judged = judged_rmse.map(|rmse| significant(rmse, 3));
+    if let Some(seconds) = diagnosis.restarted_s {
+        answer.note(format!(
+            "Free runs over whole records drift on this plant, so runs that restart from the measurement every {} s decided{}.",
+            significant(seconds, 3),
+            judged.map_or(String::new(), |rmse| format!(" (RMSE {rmse})"))
+        ));
+    } else if diagnosis.held_out_by != HeldOutBy::Records
+        && let Some(rmse) = judged
+    {
+        answer.note(format!("Cross-validation error: RMSE {rmse}."));
+    }
     if let Some(scatter) = diagnosis.level_scatter {
-        meaning.push_str(&format!(
-            " The level scatters between repeats (`y_sd` grows with y), by {} % from record to record: as much of an error along y is not held \
-             against a model.",
+        answer.note(format!(
+            "The level of y varies by {} % from record to record (`y_sd` grows with y); an error of that size along y counts \
+             as noise.",
             significant(100.0 * scatter, 2)
         ));
     }
-    meaning.push_str(bench_check(&diagnosis.sets));
-    let told = diagnosis.sets.iter().flatten().any(|name| name == FLOW_LAG);
-    if let Some(second) = second_lag_s(&diagnosis.model).filter(|_| !told) {
-        meaning.push_str(&format!(
-            " The model has a second lag of {} ms in series with the flow's: these records cannot tell whether it is the flow's own, a film's or a \
-             valve's. At the bench, with the tunnel off, the flow's goes.",
+}
+
+/// Lags of the model beyond the first that these records show.
+fn dynamics(answer: &mut Answer, diagnosis: &Diagnosis) {
+    let named = diagnosis.sets.iter().flatten().any(|name| name == FLOW_LAG);
+    if let Some(second) = second_lag_s(&diagnosis.model).filter(|_| !named) {
+        answer.note(format!(
+            "The model has a second lag of {} ms in series with the first; these records do not distinguish a lag of the \
+             plant, of the sensor and of the actuator.",
             significant(1e3 * second, 2)
         ));
     }
     for memory in &diagnosis.memory {
-        meaning.push_str(&format!(
-            " The flow feels its own past of {} s, with {} without jets and {} under them.",
+        answer.note(format!(
+            "The plant has a memory of {} s, with weight {} while the command is off and {} while it is on.",
             significant(memory.lag_s, 3),
             significant(memory.weight, 2),
             significant(memory.weight_blown, 2)
         ));
     }
-    if let Some(separation) = &diagnosis.separation {
-        meaning.push_str(&format!(" {}", separation.words()));
-    }
-    (headline, meaning)
 }
 
-/// On which records the last error stands.
-fn quoted(diagnosis: &Diagnosis) -> String {
-    match &diagnosis.quoted {
-        Some(quoted) => format!(
-            " On {}, by which nothing was chosen, it goes from {} to {}{}.",
-            quoted.records.join(" and "),
-            significant(quoted.before_rmse, 3),
-            significant(quoted.validate_rmse, 3),
-            quoted.noise_rmse.map_or(String::new(), |noise| format!(
-                ", {} times the noise there",
-                significant(quoted.validate_rmse / noise, 3)
-            ))
-        ),
-        None if diagnosis.tried > 0 => {
-            " The model was chosen by the same records; of four or more marked `validate`, some are kept back to quote on."
-                .to_owned()
-        }
-        None => String::new(),
-    }
-}
-
-/// What tells apart at the rig, without the flow, what records cannot: lags in series commute.
+/// The bench check that distinguishes places which records alone do not: lags in series commute.
 fn bench_check(sets: &[Vec<String>]) -> &'static str {
     let places = |set: &[String]| {
         let of = |name: &String| match name.as_str() {
@@ -96,163 +362,14 @@ fn bench_check(sets: &[Vec<String>]) -> &'static str {
     let across = |place: Place| sets.iter().any(|set| set.len() > 1 && set.contains(&place));
     match (across(Place::Jet), across(Place::Sensor)) {
         (true, _) => {
-            " At the bench: play the same command with the tunnel off. What the valve and its supply do shows in the jets and stays; what the flow does goes."
+            "Bench check: play the same command with the tunnel off. What stays belongs to the actuator; what disappears \
+             belongs to the flow."
         }
         (false, true) => {
-            " At the bench: give the sensor alone a step, of its heating current or behind a shutter. What the sensor does stays; what the flow does goes."
+            "Bench check: give the sensor alone a step (its heating current, or a shutter). What stays belongs to the sensor; \
+             what disappears belongs to the flow."
         }
         (false, false) => "",
-    }
-}
-
-/// What a term beyond the catalogue promises, and how to go on.
-pub(super) fn beyond(glance: &Glance) -> String {
-    format!(
-        " Beyond the catalogue, a term at the {} by {} promises to take {:.0} % of what is left; `host-fit discover` looks for it.",
-        glance.place.word(),
-        glance.coordinate,
-        glance.error_taken_percent
-    )
-}
-
-fn finding(diagnosis: &Diagnosis) -> (String, String) {
-    let rmse = |rung: Option<&Rung>| rung.map_or(f64::NAN, |rung| rung.validate_rmse);
-    let first = rmse(diagnosis.ladder.first());
-    let last = rmse(diagnosis.ladder.last());
-    let noise = diagnosis.noise_estimate;
-    let floor = match diagnosis.noise_source {
-        NoiseSource::Measured => format!(
-            "the noise floor is {} ({:.2} times it is left)",
-            significant(noise, 3),
-            last / noise
-        ),
-        NoiseSource::Repeats => format!(
-            "there is no y_sd; how y differs between repeats of the command puts the noise floor at {} ({:.2} times it is left)",
-            significant(noise, 3),
-            last / noise
-        ),
-        NoiseSource::Scatter => format!(
-            "the noise floor is not known: there is no y_sd and no repeat; from sample to sample y scatters by {}",
-            significant(noise, 3)
-        ),
-    };
-    match diagnosis.verdict {
-        Verdict::NothingMissing => (
-            "nothing is missing".to_owned(),
-            format!(
-                "The model's held-out error is {}: {floor}. No effect of the catalogue lowers it by more than chance or than the flow's own memory does.",
-                significant(last, 3)
-            ),
-        ),
-        Verdict::EffectMissing => {
-            let headline = claim(&diagnosis.missing, &diagnosis.sets);
-            let with = match (diagnosis.missing.len(), diagnosis.stand_ins.as_slice()) {
-                (1, []) => "it".to_owned(),
-                (_, []) => "them".to_owned(),
-                (_, others) => [&diagnosis.missing, others].concat().join(" and "),
-            };
-            let mut meaning = fall(diagnosis, &with, &floor);
-            if let Some(p) = diagnosis.p_value {
-                meaning.push_str(&format!(
-                    " Noise alone would make one of {} alternatives do as much with p {} {}.",
-                    diagnosis.alternatives,
-                    if p > 1.0 / (TERMS.draws + 1) as f64 {
-                        "="
-                    } else {
-                        "≤"
-                    },
-                    significant(p, 2)
-                ));
-            }
-            let found = diagnosis
-                .ranking
-                .iter()
-                .filter(|r| diagnosis.missing.contains(&r.effect));
-            for entry in found.filter(|entry| !entry.confounded_with.is_empty()) {
-                meaning.push_str(&format!(
-                    " These records cannot tell {} from {}.",
-                    entry.effect,
-                    entry.confounded_with.join(", ")
-                ));
-            }
-            if !diagnosis.stand_ins.is_empty() {
-                let several = diagnosis.stand_ins.len() > 1;
-                meaning.push_str(&format!(
-                    " {} {} the rest only and may stand in for anything: without {} the held-out error is within what the noise floor is known to, or a second \
-                     one of what is named does as well, or these records do not tell its parameters. The model is handed over with {}, marked.",
-                    diagnosis.stand_ins.join(" and "),
-                    if several { "take" } else { "takes" },
-                    if several { "them" } else { "it" },
-                    if several { "them" } else { "it" },
-                ));
-            }
-            (headline, meaning)
-        }
-        Verdict::PartlyExplained => (
-            "something is missing, and the catalogue describes part of it".to_owned(),
-            format!(
-                "With {} the held-out error falls from {} to {}; {floor}. They stand in for what is missing: too much is \
-                 left to take them for its names. The model is handed over with them, marked as stand-ins.",
-                diagnosis.stand_ins.join(" and "),
-                significant(first, 3),
-                significant(last, 3)
-            ),
-        ),
-        Verdict::Unexplained => (
-            "something is missing that the catalogue does not have".to_owned(),
-            match diagnosis
-                .ladder
-                .last()
-                .map(|rung| rung.effects.join(" and "))
-            {
-                Some(tried) if !tried.is_empty() => format!(
-                    "The best that the catalogue does is {tried}: the held-out error is then {} and {floor}. \
-                     That is too little to name them as the cause; they are not in the model \
-                     (`host-fit extend` adds them all the same).",
-                    significant(last, 3)
-                ),
-                _ => format!(
-                    "The held-out error is {} and {floor}; no effect of the catalogue, nor several, explains most of it.",
-                    significant(last, 3)
-                ),
-            },
-        ),
-    }
-}
-
-/// How the error falls with what is named. Who is named for making do with less than the flow's lags need does not
-/// lower the error of the model as given; what it is named for shows beside the fewest lags.
-fn fall(diagnosis: &Diagnosis, with: &str, floor: &str) -> String {
-    let error =
-        |rung: Option<&Rung>| significant(rung.map_or(f64::NAN, |rung| rung.validate_rmse), 3);
-    let last = error(diagnosis.ladder.last());
-    let fewest = diagnosis.ladder.get(1);
-    match fewest.filter(|rung| diagnosis.p_value.is_none() && rung.effects.is_empty()) {
-        Some(fewest) => format!(
-            "With {with} fewer lags of the flow are enough: the held-out error of the fewest falls from {} to {last}; {floor}. Without \
-             {with}, more lags do as well.",
-            error(Some(fewest))
-        ),
-        None => format!(
-            "With {with} the held-out error falls from {} to {last}; {floor}.",
-            error(diagnosis.ladder.first())
-        ),
-    }
-}
-
-/// What is missing, each with what the records cannot tell from it: a name is a claim.
-fn claim(missing: &[String], sets: &[Vec<String>]) -> String {
-    let each = missing.iter().map(|name| {
-        let set = sets.iter().find(|set| set.first() == Some(name));
-        set.map_or_else(|| name.clone(), |set| set.join(" or "))
-    });
-    let each: Vec<String> = each.collect();
-    match each.as_slice() {
-        [one] => format!("{one} is missing"),
-        several if sets.iter().all(|set| set.len() < 2) => {
-            format!("{} are missing", several.join(" and "))
-        }
-        several => format!("{} are missing", several.join(", and ")),
     }
 }
 
@@ -266,8 +383,8 @@ mod tests {
             let sets: Vec<Vec<String>> = (sets.iter())
                 .map(|set| set.iter().map(|name| (*name).to_owned()).collect())
                 .collect();
-            let missing: Vec<String> = sets.iter().map(|set| set[0].clone()).collect();
-            claim(&missing, &sets)
+            let names: Vec<String> = sets.iter().map(|set| set[0].clone()).collect();
+            missing(&names, &sets)
         };
         assert_eq!(said(&[&["valve-lag"]]), "valve-lag is missing");
         let alike = ["hot-film-lag", FLOW_LAG];

@@ -2,20 +2,30 @@
 //! their place, the delay law that does better, the sensor's zero where it is off.
 
 use super::bench::Bench;
+use super::evidence::p_value;
 use super::judge::{Judge, Judged};
+use super::linear;
 use super::search::{Hypothesis, Search};
+use super::settled::{Settled, settled};
 use super::term::take_delay_law;
 use super::{Known, RULES};
 use crate::data::Record;
 use crate::model::{Delay, Model};
+use crate::search::{Progress, Settings, StopReason};
 use crate::simulate::SimulateError;
-use model_core::effects::SaturatingDelay;
+use model_core::effect::Physics;
+use model_core::effects::{ConstantDelay, SaturatingDelay};
+use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// From which level of y on, in inner units, a delay is tried as that of the attached flow …
 const LEVEL: f64 = 0.6;
 /// … and by how many samples at least it differs from that at rest.
 const LEAST_RISE: f64 = 4.0;
+
+/// Averaging times of y that a delay law is tried with beside that of eq. (1), samples: a flow that carries the jets at
+/// the speed of the moment needs none.
+const AVERAGES: [u32; 3] = [2, 50, 125];
 
 /// A base model and what its search took.
 #[derive(Clone, Debug)]
@@ -24,21 +34,36 @@ pub struct Automatic {
     pub model: Model,
     /// Structures that were refitted in full.
     pub tried: usize,
+    /// Evaluations of the direct search that settled the delays.
+    pub evaluations: usize,
+    /// Why that ended.
+    pub stop: StopReason,
 }
 
-/// The base model of `records`, its input delays after the best of `laws`. Delays
-/// between samples are kept where they pay, or `always`.
+/// How the base model is searched.
+pub struct Frame<'a> {
+    /// Delay laws of which the best is kept.
+    pub laws: &'a [Delay],
+    /// Whether delays between samples are kept even where they do not pay.
+    pub interpolated: bool,
+    /// The direct search that settles the delays.
+    pub settings: Settings,
+}
+
+/// The base model of `records`: the structure by validation error, its input delays after the best of the laws, then
+/// lags and delays by mesh adaptive direct search on the free run.
 ///
 /// # Errors
 /// [`SimulateError`] when no law gives a stable free run; nothing to learn from is
 /// `None`.
 pub fn base_model(
     records: &[Record],
-    laws: &[Delay],
-    always: bool,
+    how: &Frame<'_>,
     interrupt: &AtomicBool,
     progress: &(dyn Fn(&str) + Sync),
+    snapshots: &dyn Progress,
 ) -> Option<Result<Automatic, SimulateError>> {
+    let laws = how.laws;
     let frame = Model {
         sample_period_s: records.first()?.sample_period_s,
         ..Model::default()
@@ -69,17 +94,39 @@ pub fn base_model(
     let mut roots: Vec<Hypothesis> = Vec::new();
     let mut refused = None;
     for law in laws {
-        progress("the leanest model");
+        progress("the model with the fewest lags");
         match search.root(&with_law(law), mid_run) {
             Ok(root) => roots.push(root),
             Err(error) => refused = Some(error),
         }
     }
     let by_score = |a: &&Hypothesis, b: &&Hypothesis| a.judged.size().total_cmp(&b.judged.size());
-    let Some(root) = roots.iter().min_by(by_score) else {
+    progress("first and second order with dead time");
+    let linear: Vec<Model> = linear::baselines(&given, &judge.learning(0))
+        .into_iter()
+        .filter(|_| laws.iter().any(|law| matches!(law, Delay::Fixed { .. })))
+        .collect();
+    let linear: Vec<Hypothesis> = linear
+        .into_par_iter()
+        .filter_map(|model| judge.refitted(&model).ok())
+        .map(Hypothesis::new)
+        .collect();
+    let Some(root) = roots
+        .iter()
+        .min_by(by_score)
+        .or(linear.iter().min_by(by_score))
+    else {
         return refused.map(Err);
     };
     let mut found = search.run(root.clone(), || None);
+    // What a linear model of two lags does better than the best structure so far is where to set out from.
+    if let Some(better) = linear.iter().min_by(by_score)
+        && better.judged.size() + RULES.linear_better < found.best.judged.size()
+    {
+        let tried = found.tried;
+        found = search.run(better.clone(), || None);
+        found.tried += tried;
+    }
     // With the lags that were found another law may do better than the one that was chosen without them.
     let mut others: Vec<Delay> = roots
         .iter()
@@ -107,15 +154,108 @@ pub fn base_model(
             found.tried += tried;
         }
     }
-    let judged = if always {
-        found.best.judged
+    if laws.len() > 1 && !interrupt.load(Ordering::Relaxed) {
+        progress("averaging times of the delay law");
+        let own = found.best.judged.model();
+        let lawful = others.iter().chain([&own.delay]);
+        let averaged = lawful.filter(|law| has_average(law));
+        let tried: Vec<Model> = averaged
+            .flat_map(|law| AVERAGES.map(|window| with_average(own, law, window)))
+            .collect();
+        let tried = tried
+            .into_par_iter()
+            .filter_map(|model| judge.refitted(&model).ok());
+        let tried: Vec<Judged> = tried.collect();
+        let best = tried
+            .into_iter()
+            .min_by(|a, b| a.size().total_cmp(&b.size()));
+        // The averaging time is a parameter and has to earn its place like all others.
+        if let Some(best) = best.filter(|best| best.size() + RULES.price < found.best.judged.size())
+        {
+            found.best.judged = best;
+        }
+    }
+    let lawful = without_needless_law(&judge, found.best.judged, laws);
+    let judged = if how.interpolated {
+        lawful
     } else {
-        on_samples_unless_it_costs(&judge, found.best.judged)
+        on_samples_unless_it_costs(&judge, lawful)
     };
+    progress("lags and delays by direct search");
+    let Settled {
+        judged,
+        evaluations,
+        stop,
+    } = settled(&judge, judged, &how.settings, snapshots, interrupt);
     Some(Ok(Automatic {
         model: units.model_out(&judge.final_fit(&judged).model),
         tried: found.tried,
+        evaluations,
+        stop,
     }))
+}
+
+/// The model with a constant delay where its law is no more than that over the levels of the records: a law has to vary
+/// by more than a sample, to be positive, and to err less by a test.
+fn without_needless_law(judge: &Judge, judged: Judged, laws: &[Delay]) -> Judged {
+    let model = judged.model();
+    let constant_allowed = laws.iter().any(|law| matches!(law, Delay::Fixed { .. }));
+    let Delay::Law(law) = &model.delay else {
+        return judged;
+    };
+    if law.spec.base || !constant_allowed {
+        return judged;
+    }
+    let mut levels: Vec<f64> = judge
+        .learning(0)
+        .iter()
+        .flat_map(|record| record.y.iter().copied())
+        .collect();
+    levels.sort_by(f64::total_cmp);
+    let quantile = |share: f64| {
+        let at = (share * levels.len() as f64) as usize;
+        let level = levels.get(at.min(levels.len().saturating_sub(1)));
+        model.delay.present(
+            level.copied().unwrap_or(0.0).max(0.0),
+            model.sample_period_s,
+        )
+    };
+    let delays = [0.02, 0.25, 0.5, 0.75, 0.98].map(quantile);
+    let shortest = delays.iter().copied().fold(f64::INFINITY, f64::min);
+    let longest = delays.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let mut constant = model.clone();
+    let middle = 0.5 * (shortest + longest).max(0.0);
+    let factors = model.delay.factors();
+    constant.delay = Delay::of::<ConstantDelay<f64>>(&[middle], factors, true);
+    constant.averaging = Model::default().averaging;
+    let Ok(constant) = judge.refitted(&constant) else {
+        return judged;
+    };
+    let varies = longest - shortest > RULES.least_rise && shortest >= 0.0;
+    let p = p_value(&constant.held_out, &judged.held_out);
+    if varies && p < RULES.law_level && constant.size() > judged.size() {
+        judged
+    } else {
+        constant
+    }
+}
+
+/// Whether a delay law follows the mean of y.
+fn has_average(law: &Delay) -> bool {
+    match law {
+        Delay::Fixed { .. } => false,
+        Delay::Law(law) => law.spec.name != <ConstantDelay<f64> as Physics<f64>>::SPEC.name,
+    }
+}
+
+/// The model after a delay law that follows the mean of y over `window` samples.
+fn with_average(model: &Model, law: &Delay, window: u32) -> Model {
+    let mut other = model.clone();
+    if !model.delay.is_alike(law) {
+        take_delay_law(&mut other, law);
+    }
+    other.averaging.window = window;
+    other
 }
 
 /// The law that ends at a level, about as the law of `model` is.

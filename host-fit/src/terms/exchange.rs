@@ -98,7 +98,7 @@ impl Search<'_> {
             // What is nearly at the floor can only be had for less.
             let less_only =
                 term.effect().is_none() && self.over(&hypothesis) <= RULES.near_the_floor;
-            (self.progress)(&format!("what could stand in the place of {}", term.name()));
+            (self.progress)(&format!("candidates in place of {}", term.name()));
             done.push(term.name());
             let others = effects - count_effects(std::slice::from_ref(term));
             let room = others < self.most_effects;

@@ -14,7 +14,7 @@ pub(crate) struct Fold {
     pub(crate) judging: Vec<Judging>,
 }
 
-/// A record that is judged from a sample on; the run before leads up to it.
+/// A record that is judged from a sample on, its lead left out; the run before leads up to it.
 #[derive(Clone, Debug)]
 pub(crate) struct Judging {
     pub(crate) record: Record,
@@ -22,6 +22,11 @@ pub(crate) struct Judging {
 }
 
 impl Judging {
+    /// The first sample that is scored.
+    pub(crate) fn scored_from(&self) -> usize {
+        self.from.max(self.record.lead)
+    }
+
     /// y of the last so many samples: those that an error is left on.
     pub(crate) fn last(&self, samples: usize) -> &[f64] {
         let y = &self.record.y;
@@ -121,6 +126,10 @@ mod tests {
             role,
             sample_period_s: 0.001,
             t0: 0.0,
+            u_before: None,
+            lead: 0,
+            y_before: None,
+            follow: 0,
             u: vec![0.0; 10],
             y: (0..10).map(f64::from).collect(),
             y_sd: Some(vec![0.1; 10]),

@@ -6,6 +6,7 @@ use super::grid::{hides, longest_lag};
 use super::proposal::Proposal;
 use super::screen::Screen;
 use super::search::{Hypothesis, Search};
+use super::table::path_terms;
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit, settle_fixed_delay, starts};
 use crate::model::Model;
@@ -60,6 +61,15 @@ impl Search<'_> {
                 terms.iter().map(other).collect()
             });
             return second.collect();
+        }
+        let path = terms.iter().position(|t| matches!(t, Term::Path { .. }));
+        if let Some((at, Term::Path { spec, .. })) = path.map(|at| (at, &terms[at])) {
+            let others = path_terms(spec).into_iter().map(|other| {
+                let mut terms = terms.to_vec();
+                terms[at] = other;
+                terms
+            });
+            return others.collect();
         }
         match terms {
             [term @ Term::Effect { spec, .. }] if hides(spec) => {
@@ -192,8 +202,9 @@ fn moved(model: &Model, terms: &[Term], steps: &[i32], longest: u16) -> (Model, 
 /// Whether an effect was bent as far as its card lets it: it stands in for something
 /// else then. Delay laws are exempt: levels that y hardly visits leave them open.
 fn at_a_bound(model: &Model, term: &Term) -> bool {
-    let Some(spec) = term.effect() else {
-        return false;
+    let spec = match term {
+        Term::Effect { spec, .. } | Term::Path { spec, .. } => spec,
+        _ => return false,
     };
     let added = model.effects.iter().find(|added| added.name == spec.name);
     let values = added.map_or(&[][..], |added| &added.parameters);

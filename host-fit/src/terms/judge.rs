@@ -106,7 +106,7 @@ impl Judge {
         let measured: Vec<Vec<f64>> = whole.iter().map(|record| record.y.clone()).collect();
         let (mut floor, noise_source) = noise_floor(&whole, &measured);
         for (variance, judging) in floor.iter_mut().zip(judging()) {
-            variance.drain(..judging.from.min(variance.len()));
+            variance.drain(..judging.scored_from().min(variance.len()));
         }
         let measured_noise = root_mean(&floor);
         let level_scatter = match restarted {
@@ -177,6 +177,16 @@ impl Judge {
         fold.learning.iter().chain(judging).collect()
     }
 
+    /// The same with their leads: what precedes the samples that are judged is not scored.
+    pub(crate) fn scored_records(&self) -> Vec<Record> {
+        let fold = &self.folds[0];
+        let judging = fold.judging.iter().map(|judging| Record {
+            lead: judging.scored_from(),
+            ..judging.record.clone()
+        });
+        fold.learning.iter().cloned().chain(judging).collect()
+    }
+
     /// How `model` is fitted: with the constant where it has one.
     #[must_use]
     pub fn options_for(&self, model: &Model) -> FitOptions {
@@ -199,7 +209,6 @@ impl Judge {
 
     /// y − y_sim from a sample on; a run that diverges is far off everywhere.
     fn error(model: &Model, record: &Record, from: usize) -> Result<Vec<f64>, SimulateError> {
-        let from = from.max(model.warm_up());
         let measured = record.y.iter().skip(from);
         match model.free_run(record) {
             Ok(run) => Ok(measured
@@ -232,9 +241,9 @@ impl Judge {
             .enumerate()
             .flat_map(|(fold, split)| split.judging.iter().map(move |judging| (fold, judging)))
             .collect();
-        let each = judged
-            .par_iter()
-            .map(|(fold, judging)| Self::error(models(*fold), &judging.record, judging.from));
+        let each = judged.par_iter().map(|(fold, judging)| {
+            Self::error(models(*fold), &judging.record, judging.scored_from())
+        });
         let errors: Vec<Result<Vec<f64>, SimulateError>> = each.collect();
         let mut errors: Vec<Vec<f64>> = errors.into_iter().collect::<Result<_, _>>()?;
         let Some(scatter) = &self.options.level_scatter else {

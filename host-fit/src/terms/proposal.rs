@@ -122,6 +122,7 @@ fn clash(a: &Candidate, b: &Candidate) -> bool {
             x.name == y.name || both(Place::Delay) || (both(Place::Jet) && g != h)
         }
         (Term::Inertia(_), Term::Inertia(_)) | (Term::Wake(_), Term::Wake(_)) => true,
+        (Term::Path { spec: x, .. }, Term::Path { spec: y, .. }) => x.name == y.name,
         _ => a.columns.iter().any(|column| b.columns.contains(column)),
     }
 }

@@ -9,9 +9,9 @@ rules! {
     /// What each parameter of a term must take off the held-out rms error, as a share of it.
     price: f64 = 0.004, "share of the rms error", "nulls of six families of flows: coloured noise of 20 repeats makes 0.001 to 0.003 of a needless parameter";
     /// A model within this factor of the noise floor has nothing left to find.
-    at_the_floor: f64 = 1.005, "times the noise floor", "two standard deviations of what three records of 10 s say";
+    at_the_floor: f64 = 1.005, "times the noise level", "two standard deviations of what three records of 10 s say";
     /// Where the best model is further from the floor than this, a second one is followed as well.
-    near_the_floor: f64 = 1.05, "times the noise floor", "judgement: half of the margin to which `y_sd` is known";
+    near_the_floor: f64 = 1.05, "times the noise level", "judgement: half of the margin to which `y_sd` is known";
     /// The second one is followed if its error is within this factor of the best one's.
     rival: f64 = 2.0, "times the best error", "rigs with memory: the right first step was never further behind";
     /// Delays between samples are rounded where that costs no more than this.
@@ -23,7 +23,7 @@ rules! {
     /// Rounds without a gain that end the search.
     patience: usize = 2, "rounds", "judgement: for the time it takes";
     /// Where this much or more is left when the search ends, it goes on once with what promised less …
-    much: f64 = 1.25, "times the noise floor", "what is named leaves less";
+    much: f64 = 1.25, "times the noise level", "what is named leaves less";
     /// … for so many more rounds …
     rounds_after: usize = 3, "rounds", "judgement: for the time it takes";
     /// … of which the first refits so many times as much.
@@ -56,16 +56,29 @@ rules! {
     level: f64 = 0.05, "p-value", "convention";
     /// The base that effects have to beat must have been given this many more parameters than they have.
     head_start: usize = 2, "parameters", "a memory costs three, an effect one to four";
-    /// A record begins at rest if the mean of so many first samples …
-    beginning: usize = 20, "samples", "judgement: as long as a fast flow takes";
-    /// … is no further from the level of rest than this: a command that is on from the first sample arrives later.
-    at_rest: f64 = 0.1, "size of y", "the noise of 20 samples is 0.01 at most in any set at hand";
     /// Longest lag that is tried …
     longest_lag_s: f64 = 0.5, "s at 1 kHz", "the paper's lags";
     /// … and no more than this share of the shortest record.
     longest_lag_share: f64 = 0.25, "share of a record", "judgement";
     /// Steps between the lags that are screened.
     lag_step: usize = 8, "samples", "a wrong lag of half a step leaves a tenth of what the right one takes";
+
+    /// A linear model of two lags and inputs is set out from where it errs less than the best structure by this.
+    linear_better: f64 = 0.03, "share of the rms error", "judgement: a second input a sample later stands for a fraction of a delay";
+    /// Evaluations of the mesh adaptive direct search that settles the delays of a chosen structure, at most …
+    settling: usize = 300, "", "judgement: each is a brief fit; a structure of five delays needs 60 to 150";
+    /// … the iterations of the fit at each …
+    settling_iterations: usize = 2, "iterations", "judgement: the start is the best fit so far";
+    /// … how far a lag may go …
+    settling_reach: f64 = 0.25, "share of the lag", "judgement: what is further off the search over terms has tried";
+    /// … at least …
+    settling_least: usize = 8, "samples", "the step of the grid that lags are screened on";
+    /// … and the first frame.
+    settling_frame: f64 = 0.25, "share of each variable's range", "judgement: the start is near";
+    /// A delay law that differs by less than this over the levels of the records is a constant delay …
+    least_rise: f64 = 1.0, "samples", "what rounding to samples hides";
+    /// … and so is one that no test tells from it at this level.
+    law_level: f64 = 0.01, "p-value", "convention: one of a hundred constant delays gets a law";
 
     /// Points along a parameter's range where it is the only one that is free, one of two, of more …
     grid: [usize; 3] = [12, 4, 3], "", "judgement";
@@ -76,24 +89,6 @@ rules! {
 
     /// y is of size 1 where this share of all samples is closer to the level of rest than that.
     full: f64 = 0.995, "share of the samples", "judgement: what is beyond is noise";
-    /// Commands whose largest is no less than this, up to 1, are shares of a full jet of 1.
-    share_of_full: f64 = 0.5, "u", "graded commands that draw levels seldom draw the full one; a supply in volts is seldom below 1";
-    /// The level of rest is the mean of y before the first blowing, taken in pieces that are independent of each other …
-    quiet_piece: usize = 50, "samples", "judgement";
-    /// … if there are so many of them …
-    quiet_pieces: usize = 5, "pieces", "judgement";
-    /// … and 0 unless it is off by so much.
-    off_zero: f64 = 5.0, "standard errors", "convention";
-    /// The zero moves if records rest further apart than this, and than chance.
-    moving_zero: f64 = 0.03, "share of the range of y", "judgement: what slow noise makes of the mean of half a second stays below it";
-    /// … or, where its standard errors are known, more than so many of them.
-    moving_zero_noise: f64 = 4.0, "standard errors of y", "in 30 sets slow noise reached 2.9";
-    /// This share of either is enough where the rests follow the order of the records …
-    creeping_share: f64 = 0.5, "", "judgement: zeros that drifted began at 2.6 standard errors in 30 sets";
-    /// … with this p-value.
-    creeping_zero: f64 = 0.005, "p-value", "all of 30 zeros that drifted in a straight line lay below 0.0013, eight of them less than four standard errors apart; all of 45 that did not lay above 0.0066";
-    /// Where records do not begin at rest, 0 is the level of rest unless it is further from all of y than this.
-    far: f64 = 1.0, "times the range of y", "judgement";
 
     /// Series are screened with so many numbers at most: longer ones are averaged over neighbours.
     longest_series: usize = 24_000, "values", "judgement: for the time it takes";

@@ -72,12 +72,9 @@ impl<'a> Screen<'a> {
     pub fn new(judge: &'a Judge, model: &'a Model) -> Option<Self> {
         let fold = &judge.folds[0];
         let records = judge.first_fold();
-        let warm_up = model.warm_up();
-        let judged_from = fold.judging.iter().map(|judging| judging.from.max(warm_up));
-        let from: Vec<usize> = vec![warm_up; fold.learning.len()]
-            .into_iter()
-            .chain(judged_from)
-            .collect();
+        let judged_from = fold.judging.iter().map(|judging| judging.scored_from());
+        let learning = fold.learning.iter().map(|record| record.lead);
+        let from: Vec<usize> = learning.chain(judged_from).collect();
         let samples: usize = records.iter().map(|r| r.len()).sum();
         let stride = samples.div_ceil(RULES.longest_series).max(1);
         let indices = judge.free(model);

@@ -2,6 +2,7 @@
 
 use super::screen::Screen;
 use super::table::Table;
+use super::term::Term;
 use crate::fit::Known;
 use crate::linalg::dot;
 use crate::model::Model;
@@ -37,9 +38,22 @@ pub(crate) struct Unnamed {
 }
 
 impl Unnamed {
-    /// All that could be added to the screen's model without a name.
+    /// All that could be added to the screen's model without a name and in any amount: a term in the path of the jets
+    /// is there with its time or is not.
     pub(crate) fn of(screen: &Screen, known: &Known) -> Self {
-        let columns = Table::of(screen, known, false).columns;
+        let Table {
+            candidates,
+            mut columns,
+            ..
+        } = Table::of(screen, known, false);
+        let paths = candidates
+            .iter()
+            .filter(|c| matches!(c.term, Term::Path { .. }));
+        let mut paths: Vec<usize> = paths.flat_map(|c| c.columns.iter().copied()).collect();
+        paths.sort_unstable();
+        while let Some(path) = paths.pop() {
+            columns.remove(path);
+        }
         let product =
             |i: usize, j: usize| dot(&columns[i][..screen.learned], &columns[j][..screen.learned]);
         let all = 0..columns.len();

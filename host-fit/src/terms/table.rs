@@ -7,9 +7,9 @@ use super::screen::Screen;
 use super::term::Term;
 use crate::fit::{Known, channel_reference, sensitivities};
 use crate::linalg::dot;
-use crate::model::{Model, Start};
+use crate::model::Model;
 use model_core::effect::{Place, Sign, Spec};
-use model_core::effects::{LEVEL_RATE, SLOW_WAKE, ZERO_OFFSET};
+use model_core::effects::{LEVEL_RATE, PATH_TERMS, SLOW_WAKE, ZERO_OFFSET};
 use model_core::recursion::Grading;
 use rayon::prelude::*;
 
@@ -174,6 +174,20 @@ impl Screen<'_> {
         changes.collect()
     }
 
+    /// Changes by terms in the path of the jets, from all starting values of their cards.
+    fn paths(&self) -> Vec<(Term, Vec<f64>)> {
+        let absent = |spec: &&'static Spec| !self.model.has_effect(spec.name);
+        let terms = PATH_TERMS.into_iter().filter(absent).flat_map(path_terms);
+        let terms: Vec<Term> = terms.collect();
+        let changes = terms.into_par_iter().filter_map(|term| {
+            let mut column = self.change(&term.added_to(self.model, &[]))?;
+            self.residualise(&mut column);
+            let (scale, ..) = self.regress(&[&column])?;
+            Self::is_feasible(&term, scale[0]).then_some((term, column))
+        });
+        changes.collect()
+    }
+
     /// Changes by a slow wake, per pull.
     fn wakes(&self) -> Vec<(Term, Vec<f64>)> {
         if self.model.has_effect(SLOW_WAKE.name) {
@@ -182,12 +196,6 @@ impl Screen<'_> {
         let changes = RULES.wakes_s.into_par_iter().filter_map(|time_constant| {
             let term = Term::Wake(time_constant);
             let mut column = self.change(&term.added_to(self.model, &[RULES.slope]))?;
-            if self.model.start == Start::Measured {
-                // With a wake, free runs follow the measurement for longer, which is no merit of it.
-                let followed = self.change(&term.added_to(self.model, &[0.0]))?;
-                let pairs = column.iter_mut().zip(followed);
-                pairs.for_each(|(x, y)| *x -= y);
-            }
             column.iter_mut().for_each(|x| *x /= RULES.slope);
             self.residualise(&mut column);
             Some((term, column))
@@ -224,7 +232,7 @@ impl Screen<'_> {
             all.push((term, vec![columns.len()]));
             columns.push(column);
         }
-        for (term, column) in self.wakes() {
+        for (term, column) in self.paths().into_iter().chain(self.wakes()) {
             all.push((term, vec![columns.len()]));
             columns.push(column);
         }
@@ -269,7 +277,10 @@ impl Screen<'_> {
             };
             // Time constants say different things: which one shows beside an effect.
             let alike: Vec<&Candidate> = kept.iter().filter(same_kind).collect();
-            let has_time = matches!(candidate.term, Term::Inertia(_) | Term::Wake(_));
+            let has_time = matches!(
+                candidate.term,
+                Term::Inertia(_) | Term::Wake(_) | Term::Path { .. }
+            );
             if has_time || (alike.len() < RULES.kept_lags && !alike.iter().any(|k| near(k))) {
                 kept.push(candidate);
             }
@@ -283,7 +294,7 @@ impl Screen<'_> {
             Term::Effect {
                 spec, parameters, ..
             } => (spec, parameters),
-            Term::Inertia(_) => return scale > RULES.some,
+            Term::Inertia(_) | Term::Path { .. } => return scale > RULES.some,
             _ => return true,
         };
         let linear = spec.amplitude.filter(|amplitude| amplitude.linear);
@@ -449,6 +460,20 @@ impl Screen<'_> {
         }
         (kept, Chance::of(by_chance))
     }
+}
+
+/// A term in the path of the jets from all starting values of its card.
+pub(super) fn path_terms(spec: &'static Spec) -> Vec<Term> {
+    let each = spec.parameters.iter().map(|parameter| parameter.starts);
+    let points = each.fold(vec![Vec::new()], |points: Vec<Vec<f64>>, starts| {
+        let with = |point: &Vec<f64>| {
+            let longer = |start: &f64| [point.as_slice(), &[*start]].concat();
+            starts.iter().map(longer).collect::<Vec<_>>()
+        };
+        points.iter().flat_map(with).collect()
+    });
+    let term = |parameters| Term::Path { spec, parameters };
+    points.into_iter().map(term).collect()
 }
 
 /// Whether the model has an effect on the jet: it has a response to part jets then.

@@ -2,8 +2,8 @@
 
 use super::RULES;
 use crate::model::{Delay, Model};
-use model_core::effect::{Place, Spec};
-use model_core::effects::{LEVEL_RATE, SLOW_WAKE, ZERO_OFFSET};
+use model_core::effect::{Effect as _, Instant, Place, Setting, Spec};
+use model_core::effects::{AnyEffect, LEVEL_RATE, PATH_TERMS, SLOW_WAKE, ZERO_OFFSET};
 use model_core::recursion::Grading;
 
 /// An addition to a model.
@@ -21,6 +21,13 @@ pub enum Term {
     LevelRate,
     /// A slow wake of so many inner seconds, a memory of the flow.
     Wake(f64),
+    /// A base term in the path of the jets, with the values from which it is fitted.
+    Path {
+        /// Its card.
+        spec: &'static Spec,
+        /// Parameters from which to set out.
+        parameters: Vec<f64>,
+    },
     /// The sensor's zero, which is no missing physics.
     Offset,
     /// A physical effect, with the values from which it is fitted.
@@ -39,7 +46,20 @@ pub enum Term {
 impl Term {
     /// What a base may have without its being a missing effect, and what imitates some
     /// effects; their values are the search's.
-    pub(crate) const UNNAMED: [Self; 3] = [Self::LevelRate, Self::Wake(0.0), Self::Inertia(0.0)];
+    pub(crate) const UNNAMED: [Self; 3 + PATH_TERMS.len()] = [
+        Self::LevelRate,
+        Self::Wake(0.0),
+        Self::Inertia(0.0),
+        Self::path(0),
+        Self::path(1),
+    ];
+
+    const fn path(index: usize) -> Self {
+        Self::Path {
+            spec: PATH_TERMS[index],
+            parameters: Vec::new(),
+        }
+    }
 
     /// The lags of `model` that can move, as terms.
     pub(crate) fn lags_of(model: &Model) -> Vec<Self> {
@@ -71,7 +91,13 @@ impl Term {
                 name if name == LEVEL_RATE.name => terms.push(Self::LevelRate),
                 name if name == SLOW_WAKE.name => terms.push(Self::Wake(added.parameters[0])),
                 name if name == ZERO_OFFSET.name => terms.push(Self::Offset),
-                _ => {}
+                name => {
+                    let mut path = PATH_TERMS.into_iter();
+                    terms.extend(path.find(|spec| spec.name == name).map(|spec| Self::Path {
+                        spec,
+                        parameters: added.parameters.clone(),
+                    }));
+                }
             }
         }
         let bare = terms
@@ -151,7 +177,9 @@ impl Term {
             | Self::LevelRate
             | Self::Wake(_) => 2,
             Self::Offset => 1,
-            Self::Effect { spec, .. } => spec.parameters.iter().filter(|p| p.low < p.high).count(),
+            Self::Effect { spec, .. } | Self::Path { spec, .. } => {
+                spec.parameters.iter().filter(|p| p.low < p.high).count()
+            }
         }
     }
 
@@ -166,7 +194,7 @@ impl Term {
             Self::LevelRate => LEVEL_RATE.name.to_owned(),
             Self::Wake(_) => SLOW_WAKE.name.to_owned(),
             Self::Offset => ZERO_OFFSET.name.to_owned(),
-            Self::Effect { spec, .. } => spec.name.to_owned(),
+            Self::Effect { spec, .. } | Self::Path { spec, .. } => spec.name.to_owned(),
         }
     }
 
@@ -261,6 +289,11 @@ impl Term {
                 model.add(SLOW_WAKE, &[*time_constant, pull], None);
             }
             Self::Inertia(samples) => in_series(&mut model, *samples),
+            Self::Path { spec, parameters } => {
+                model.add(spec, parameters, None);
+                let mean = mean_delay(spec, parameters, model.sample_period_s);
+                model.delay_later(-mean);
+            }
             lags => {
                 let Some(lag) = lags.lag() else {
                     return model;
@@ -298,6 +331,13 @@ impl Term {
             Self::LevelRate => model.effects.retain(|e| e.name != LEVEL_RATE.name),
             Self::Wake(_) => model.effects.retain(|e| e.name != SLOW_WAKE.name),
             Self::Inertia(_) => out_of_series(&mut model),
+            Self::Path { spec, .. } => {
+                if let Some(at) = model.effects.iter().position(|e| e.name == spec.name) {
+                    let added = model.effects.remove(at);
+                    let mean = mean_delay(spec, &added.parameters, model.sample_period_s);
+                    model.delay_later(mean);
+                }
+            }
             lags => {
                 let of = |all: &[u16]| all.iter().position(|lag| Some(*lag) == lags.lag());
                 if lags.reads_states()
@@ -341,6 +381,31 @@ impl Term {
         Some(model)
     }
 }
+
+/// The mean delay of a step through a term in the path of the jets, samples.
+fn mean_delay(spec: &Spec, parameters: &[f64], period: f64) -> f64 {
+    let setting = Setting {
+        period,
+        channel: 0,
+        reference: 1.0,
+    };
+    let Some(effect) = AnyEffect::new(spec.name, parameters, &setting) else {
+        return 0.0;
+    };
+    let step = Instant {
+        command: 1.0,
+        flow: 0.0,
+        arrived: 0.0,
+        present: 0.0,
+        channels: &[],
+    };
+    let mut state = effect.start();
+    let missing = (0..PATH_SETTLED).map(|_| 1.0 - effect.jet(&mut state, 1.0, &step));
+    missing.sum()
+}
+
+/// Samples after which a step is through.
+const PATH_SETTLED: usize = 4000;
 
 /// Gives a model another's delay law, about where its own was: the other may have been fitted
 /// beside quite other terms.
@@ -492,6 +557,36 @@ mod tests {
             vec![Term::State(200), Term::Product(60), Term::Offset],
         ] {
             assert!(!Term::are_alike(&one, &other), "{other:?}");
+        }
+    }
+
+    /// The delay is shorter by the mean of what the term adds, and comes back.
+    #[test]
+    fn a_term_in_the_path_of_the_jets_takes_its_mean_from_the_delay() {
+        let mut model = base();
+        model.delay = Delay::Fixed {
+            delays: vec![80, 80],
+        };
+        for (spec, parameters, mean) in [
+            (PATH_TERMS[0], vec![0.020], 0.020 * 3.0_f64.sqrt()),
+            (PATH_TERMS[1], vec![0.5, 0.020], 1.5 * 0.020),
+        ] {
+            let term = Term::Path {
+                spec,
+                parameters: parameters.clone(),
+            };
+            let period = model.sample_period_s;
+            let own = mean_delay(spec, &parameters, period) * period;
+            assert!((own - mean).abs() < 3.0 * period, "{}: {own}", spec.name);
+            let with = term.added_to(&model, &[]);
+            let Delay::Fixed { delays } = &with.delay else {
+                panic!("still fixed");
+            };
+            assert!((80.0 - f64::from(delays[0]) - own / period).abs() <= 0.5);
+            let found = Term::all_of(&with, &model).unwrap();
+            assert_eq!(found[0].name(), spec.name);
+            let without = term.taken_from(&with, &model);
+            assert_eq!(without, model);
         }
     }
 

@@ -5,11 +5,11 @@
 //! back: names stay, parameters change with their units.
 
 use super::RULES;
-use super::rest::level_of_rest;
 use crate::data::Record;
 use crate::fit::RULES as FIT;
-use crate::model::{Delay, Model, Start};
-use model_core::effect::Spec;
+use crate::model::{CommandRange, Delay, Model, Start};
+use crate::preparation::Preparation;
+use model_core::effect::{Place, Spec};
 use model_core::effects::ZERO_OFFSET;
 
 /// The sample period that cards are written for, s.
@@ -22,8 +22,8 @@ pub struct Units {
     pub zero: f64,
     /// Size of y.
     pub y: f64,
-    /// Size of u.
-    pub u: f64,
+    /// The commands of no jet and of a full one: 0 and 1 within.
+    pub command: CommandRange,
     /// Size of times.
     pub time: f64,
 }
@@ -33,18 +33,28 @@ impl Units {
     pub const NONE: Self = Self {
         zero: 0.0,
         y: 1.0,
-        u: 1.0,
+        command: CommandRange::UNIT,
         time: 1.0,
     };
 
-    /// The units of `records` for a search that starts from `model`. A user's own
+    /// The units of prepared records for a search that starts from `model`. A user's own
     /// effects are written for the data as they are.
     #[must_use]
-    pub fn of(model: &Model, records: &[Record]) -> Self {
+    pub fn of(model: &Model, prepared: &Preparation) -> Self {
+        // What a model calls a full jet stays one; jet effects that are there already know no other.
+        let command = if model.command.is_unit() && !has_jet_effects(model) {
+            prepared.command
+        } else {
+            model.command
+        };
         if !model.definitions.is_empty() {
-            return Self::NONE;
+            return Self {
+                command: model.command,
+                ..Self::NONE
+            };
         }
-        let zero = level_of_rest(records).unwrap_or_else(|| far_level(records));
+        let zero = prepared.zero;
+        let records = &prepared.records;
         let mut sizes: Vec<f64> = records
             .iter()
             .flat_map(|r| r.y.iter().map(|y| (y - zero).abs()))
@@ -54,19 +64,11 @@ impl Units {
         let full = sizes
             .get((RULES.full * sizes.len() as f64) as usize)
             .copied();
-        let largest = |series: &[f64]| series.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let u = records.iter().map(|r| largest(&r.u)).fold(0.0, f64::max);
         let or_one = |x: f64| if x > 0.0 && x.is_finite() { x } else { 1.0 };
-        // Graded commands need not reach a full jet to be shares of one.
-        let u = if (RULES.share_of_full..1.0).contains(&u) {
-            1.0
-        } else {
-            u
-        };
         Self {
             zero,
             y: or_one(full.unwrap_or(1.0)),
-            u: or_one(u),
+            command,
             time: or_one(model.sample_period_s / PERIOD_S),
         }
     }
@@ -75,11 +77,14 @@ impl Units {
     #[must_use]
     pub fn record_in(&self, record: &Record) -> Record {
         let y = |series: &[f64]| series.iter().map(|y| (y - self.zero) / self.y).collect();
+        let u = |u: &f64| self.command.share(*u);
         Record {
             sample_period_s: record.sample_period_s / self.time,
             t0: record.t0 / self.time,
-            u: record.u.iter().map(|u| u / self.u).collect(),
+            u: record.u.iter().map(u).collect(),
+            u_before: record.u_before.as_ref().map(u),
             y: y(&record.y),
+            y_before: record.y_before.map(|y| (y - self.zero) / self.y),
             y_sd: record
                 .y_sd
                 .as_ref()
@@ -94,7 +99,7 @@ impl Units {
         let pairs = spec.parameters.iter().zip(values);
         pairs
             .map(|(parameter, value)| {
-                let scale = parameter.unit.scale(self.y, self.time, self.u);
+                let scale = parameter.unit.scale(self.y, self.time, 1.0);
                 if inward { value / scale } else { value * scale }
             })
             .collect()
@@ -103,12 +108,11 @@ impl Units {
     /// A model with all that has units scaled, but for the zero.
     fn scale(&self, model: &Model, inward: bool) -> Model {
         let by = |x: f64| if inward { 1.0 / x } else { x };
-        let (y, u, time) = (by(self.y), by(self.u), by(self.time));
+        let (y, time) = (by(self.y), by(self.time));
         let mut model = model.clone();
         model.sample_period_s *= time;
         model.constant *= y;
-        model.b.iter_mut().for_each(|b| *b *= y / u);
-        model.c.iter_mut().for_each(|c| *c /= u);
+        model.b.iter_mut().for_each(|b| *b *= y);
         if let Delay::Law(law) = &mut model.delay {
             law.parameters = self.scaled(law.spec, &law.parameters, inward);
         }
@@ -129,7 +133,7 @@ impl Units {
     /// A model in inner units, its sensor's zero where the records' is.
     #[must_use]
     pub fn model_in(&self, model: &Model) -> Model {
-        let mut model = self.scale(model, true);
+        let mut model = self.scale(&self.commanded_in(model), true);
         // y of order one is friction and calibrated as cards say; in other units nobody knows, and the size of y will do.
         let of_order_one = (FIT.order_one_low..FIT.order_one_high).contains(&self.y);
         model.calibrated_at = of_order_one.then(|| 1.0 / self.y);
@@ -141,34 +145,48 @@ impl Units {
     #[must_use]
     pub fn model_out(&self, model: &Model) -> Model {
         let mut model = self.scale(model, false);
+        model.command = self.command;
         model.calibrated_at = None;
         self.move_zero(&mut model, self.zero);
         model
     }
 
-    /// Whether a model runs in the user's units as it does within, to a hundredth of the size of y. What reads the share
-    /// of a full jet, or an edge between commands of 0 and 1, does not where a full jet is another command.
-    #[must_use]
-    pub fn keep(&self, inner: &Model, outer: &Model, records: &[Record]) -> bool {
-        records.iter().all(|record| {
-            let Ok(inside) = inner.free_run(&self.record_in(record)) else {
-                return true;
-            };
-            let apart = |outside: Vec<f64>| {
-                let pairs = outside.iter().zip(&inside);
-                let squares = pairs.map(|(a, b)| (a - self.zero - self.y * b).powi(2));
-                (squares.sum::<f64>() / inside.len().max(1) as f64).sqrt()
-            };
-            outer
-                .free_run(record)
-                .is_ok_and(|outside| apart(outside) < 0.01 * self.y)
-        })
+    /// A model whose commands are shares of a full jet: one that was written for the commands as they are takes their
+    /// size and their zero into its coefficients.
+    fn commanded_in(&self, model: &Model) -> Model {
+        let mut inner = model.clone();
+        inner.command = CommandRange::UNIT;
+        if model.command == self.command {
+            return inner;
+        }
+        // u = off + size·share, where u is a share of what the model calls a full jet.
+        let off = model.command.share(self.command.off);
+        let size = model.command.share(self.command.full) - off;
+        let count = model.product_lags.len();
+        for (l, b) in model.b.iter().enumerate() {
+            inner.constant += off * b;
+            inner.b[l] = size * b;
+            for (j, lag) in model.product_lags.iter().enumerate() {
+                let c = model.c[l * count + j];
+                inner.c[l * count + j] = size * c;
+                if off != 0.0 {
+                    match inner.state_lags.iter().position(|own| own == lag) {
+                        Some(own) => inner.a[own] += off * c,
+                        None => {
+                            inner.state_lags.push(*lag);
+                            inner.a.push(off * c);
+                        }
+                    }
+                }
+            }
+        }
+        inner
     }
 
     /// A parameter's value in the user's units.
     #[must_use]
     pub fn value_out(&self, unit: model_core::effect::Unit, value: f64) -> f64 {
-        value * unit.scale(self.y, self.time, self.u)
+        value * unit.scale(self.y, self.time, 1.0)
     }
 
     /// Shifts what the model reads by `by`.
@@ -195,26 +213,11 @@ impl Units {
     }
 }
 
-/// Whether a record, in inner units, begins while something is going on already: the
-/// command is on, or y is not where it rests.
-#[must_use]
-pub fn begins_in_mid_run(record: &Record) -> bool {
-    let first = record.y.len().min(RULES.beginning);
-    let mean = record.y[..first].iter().sum::<f64>() / first.max(1) as f64;
-    mean.abs() > RULES.at_rest
-}
-
-/// 0, or the mean of y where 0 is far from all of them.
-fn far_level(records: &[Record]) -> f64 {
-    let all = || records.iter().flat_map(|r| r.y.iter().copied());
-    let low = all().fold(f64::INFINITY, f64::min);
-    let high = all().fold(f64::NEG_INFINITY, f64::max);
-    let range = high - low;
-    if low - RULES.far * range > 0.0 || high + RULES.far * range < 0.0 {
-        all().sum::<f64>() / all().count().max(1) as f64
-    } else {
-        0.0
-    }
+/// Whether a model has effects at the jet.
+fn has_jet_effects(model: &Model) -> bool {
+    let place = |name: &str| model.spec(name).map(|spec| spec.place);
+    let mut own = model.effects.iter();
+    own.any(|added| place(&added.name) == Some(Place::Jet))
 }
 
 #[cfg(test)]
@@ -247,7 +250,7 @@ mod tests {
                 sample_period_s: record.sample_period_s,
                 ..Model::default()
             };
-            let units = Units::of(&model, std::slice::from_ref(&record));
+            let units = Units::of(&model, &Preparation::of(std::slice::from_ref(&record)));
             units.record_in(&record)
         };
         let plain = seen(1.0, 0.0, 1.0);
@@ -259,18 +262,29 @@ mod tests {
         }
     }
 
-    /// Graded commands that stop short of a full jet are shares of one; volts are not.
+    /// A model that was written for commands in volts runs within as it does outside.
     #[test]
-    fn a_full_jet_is_one_where_commands_come_near_it() {
-        let full = |largest: f64| {
-            let mut record = record(1.0, 0.0, 1.0);
-            record.u.iter_mut().for_each(|u| *u *= largest);
-            Units::of(&Model::default(), &[record]).u
+    fn commands_in_other_units_go_into_the_coefficients() {
+        let mut record = record(1.0, 0.0, 1.0);
+        record.u.iter_mut().for_each(|u| *u = 5.0 - 3.0 * *u);
+        let model = Model {
+            a: vec![0.98],
+            b: vec![0.01],
+            c: vec![-0.002],
+            constant: -0.02,
+            start: Start::Measured,
+            ..Model::default()
         };
-        assert_eq!(
-            [0.97, 0.6, 1.0, 5.0, 0.2].map(full),
-            [1.0, 1.0, 1.0, 5.0, 0.2]
-        );
+        let units = Units::of(&model, &Preparation::of(std::slice::from_ref(&record)));
+        assert_eq!((units.command.off, units.command.full), (5.0, 2.0));
+        let inner = units.model_in(&model);
+        let inside = inner.free_run(&units.record_in(&record)).unwrap();
+        for outer in [&model, &units.model_out(&inner)] {
+            let outside = outer.free_run(&record).unwrap();
+            for (outside, inside) in outside.iter().zip(&inside) {
+                assert!((outside - units.zero - units.y * inside).abs() < 1e-9);
+            }
+        }
     }
 
     /// A film's calibration is that of its card where y is friction, and where y is full in other units.
@@ -279,13 +293,15 @@ mod tests {
         let film = spec("hot-film-nonlinearity").unwrap();
         let added = |full: f64| {
             let record = record(full, 0.0, 1.0);
-            let units = Units::of(&Model::default(), std::slice::from_ref(&record));
+            let units = Units::of(
+                &Model::default(),
+                &Preparation::of(std::slice::from_ref(&record)),
+            );
             let mut inner = units.model_in(&Model::default());
             inner.b = vec![0.02];
             inner.a = vec![0.98];
             inner.add(film, &[3.0, 0.1], None);
             let outer = units.model_out(&inner);
-            assert!(units.keep(&inner, &outer, &[record]));
             let text = outer.to_toml();
             assert_eq!(Model::from_toml(&text, "m").expect("own file"), outer);
             outer.effects[0].reference
@@ -311,7 +327,7 @@ mod tests {
         model.add(spec("amplitude-saturation").unwrap(), &[1e-5], None);
         model.add(spec("hot-film-nonlinearity").unwrap(), &[3.0, 0.1], None);
         model.add(ZERO_OFFSET, &[12.0], None);
-        let units = Units::of(&model, std::slice::from_ref(&record));
+        let units = Units::of(&model, &Preparation::of(std::slice::from_ref(&record)));
         let inner = units.model_in(&model);
         let run = model.free_run(&record).unwrap();
         let inside = inner.free_run(&units.record_in(&record)).unwrap();
@@ -339,7 +355,7 @@ mod tests {
             start: Start::Measured,
             ..Model::default()
         };
-        let units = Units::of(&model, std::slice::from_ref(&record));
+        let units = Units::of(&model, &Preparation::of(std::slice::from_ref(&record)));
         assert!(units.zero > 0.0);
         let mut found = Model {
             a: vec![0.98],
@@ -356,12 +372,5 @@ mod tests {
         for (outer, inner) in outside.iter().zip(&inside) {
             assert!((outer - (units.zero + units.y * inner)).abs() < 1e-6);
         }
-        let outer = units.model_out(&found);
-        assert!(units.keep(&found, &outer, std::slice::from_ref(&record)));
-        let other = Model {
-            constant: 1.5 * outer.constant,
-            ..outer
-        };
-        assert!(!units.keep(&found, &other, std::slice::from_ref(&record)));
     }
 }

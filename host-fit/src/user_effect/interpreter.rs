@@ -115,8 +115,15 @@ pub struct UserState<T> {
 /// The signals of a sample.
 struct Readings<'a, T> {
     own: T,
-    relaxation: T,
+    /// What effects of the flow see besides.
+    flow: Option<&'a Flow<T>>,
     at: &'a Instant<'a, T>,
+}
+
+impl<T: Real> Readings<'_, T> {
+    fn flow(&self, of: impl FnOnce(&Flow<T>) -> T) -> T {
+        self.flow.map_or(T::ZERO, of)
+    }
 }
 
 impl<T: Real> UserEffect<T> {
@@ -124,7 +131,21 @@ impl<T: Real> UserEffect<T> {
     /// ones count as 0.
     #[must_use]
     pub fn new(definition: &'static Definition, parameters: &[T], setting: &Setting<T>) -> Self {
-        let program = &definition.program;
+        Self::of(
+            &definition.program,
+            definition.spec.place,
+            parameters,
+            setting,
+        )
+    }
+
+    /// Prepares a program that acts at `place`.
+    pub(crate) fn of(
+        program: &'static Program,
+        place: Place,
+        parameters: &[T],
+        setting: &Setting<T>,
+    ) -> Self {
         let mut results = vec![T::ZERO; program.ops.len()];
         let mut taps = vec![Tap::on(0); program.lines];
         let needed = program.needed();
@@ -169,7 +190,7 @@ impl<T: Real> UserEffect<T> {
         let tables = program.tables.iter();
         Self {
             program,
-            place: definition.spec().place,
+            place,
             setting: *setting,
             tables: tables.map(|lines| Table::new(lines, &results)).collect(),
             results,
@@ -178,8 +199,18 @@ impl<T: Real> UserEffect<T> {
         }
     }
 
+    /// The result of an operation that is the same at every sample; of a delayed signal its longest delay, samples.
+    pub(crate) fn constant(&self, register: Register) -> T {
+        self.results.get(register).copied().unwrap_or(T::ZERO)
+    }
+
+    /// Where memory `line` is read, if its delay does not change.
+    pub(crate) fn tap(&self, line: usize) -> Tap<T> {
+        self.taps.get(line).copied().unwrap_or(Tap::on(0))
+    }
+
     /// Samples that each memory of a delayed signal must hold.
-    pub(super) fn line_lengths(&self) -> Vec<usize> {
+    pub(crate) fn line_lengths(&self) -> Vec<usize> {
         self.taps.iter().map(|tap| tap.whole + 2).collect()
     }
 
@@ -230,7 +261,11 @@ impl<T: Real> UserEffect<T> {
                     Signal::Command => at.command,
                     Signal::Flow => at.flow,
                     Signal::Arrived => at.arrived,
-                    Signal::Relaxation => signals.relaxation,
+                    Signal::Relaxation => signals.flow(|flow| flow.relaxation),
+                    Signal::Before => signals.flow(|flow| flow.before),
+                    Signal::Next => signals.flow(|flow| flow.next),
+                    Signal::Released => signals.flow(|flow| flow.released),
+                    Signal::Present => at.present,
                     Signal::Channel => {
                         let channel = at.channels.get(self.setting.channel);
                         // A channel that is not connected counts as being at its reference.
@@ -272,7 +307,7 @@ impl<T: Real> Effect<T> for UserEffect<T> {
         }
         let signals = Readings {
             own: jet,
-            relaxation: T::ZERO,
+            flow: None,
             at,
         };
         self.run(state, &signals)
@@ -288,7 +323,7 @@ impl<T: Real> Effect<T> for UserEffect<T> {
         }
         let signals = Readings {
             own: flow.now,
-            relaxation: flow.relaxation,
+            flow: Some(flow),
             at,
         };
         self.run(state, &signals)
@@ -300,7 +335,7 @@ impl<T: Real> Effect<T> for UserEffect<T> {
         }
         let signals = Readings {
             own: signal,
-            relaxation: T::ZERO,
+            flow: None,
             at,
         };
         self.run(state, &signals)

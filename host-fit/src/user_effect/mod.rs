@@ -8,8 +8,9 @@
 
 mod expression;
 mod fault_place;
+pub(crate) mod form;
 mod interpreter;
-mod program;
+pub(crate) mod program;
 mod rust;
 mod source;
 
@@ -90,6 +91,15 @@ pub struct Definition {
     program: Program,
 }
 
+/// What an effect file that was [checked](Definition::check) says of itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Checked {
+    /// The effect's name.
+    pub name: String,
+    /// The physics in one line.
+    pub summary: String,
+}
+
 impl PartialEq for Definition {
     fn eq(&self, other: &Self) -> bool {
         self.source == other.source
@@ -114,18 +124,20 @@ impl Definition {
     /// # Errors
     /// As [`load`](Self::load).
     pub fn from_toml(text: &str, place: &str) -> Result<&'static Self, DefinitionError> {
-        let source: Source = toml::from_str(text).map_err(|error| {
-            let start = error.span().map_or(0, |span| span.start);
-            let before = text.get(..start).unwrap_or("");
-            let line = before.rsplit('\n').next().unwrap_or("");
-            DefinitionError::Syntax {
-                place: place.to_owned(),
-                line: before.matches('\n').count() + 1,
-                column: line.chars().count() + 1,
-                problem: error.message().to_owned(),
-            }
-        })?;
-        Self::from_source(source, place, "")
+        Self::from_source(read(text, place)?, place, "")
+    }
+
+    /// Whether a text is one of an effect file; it is not kept, so that a text may be checked at every keystroke.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn check(text: &str, place: &str) -> Result<Checked, DefinitionError> {
+        let source = read(text, place)?;
+        compiled(&source, place, "")?;
+        Ok(Checked {
+            name: source.name,
+            summary: source.summary,
+        })
     }
 
     /// Checks and compiles; `prefix` comes before the keys in errors.
@@ -135,20 +147,7 @@ impl Definition {
         prefix: &str,
     ) -> Result<&'static Self, DefinitionError> {
         static KNOWN: Mutex<Vec<&'static Definition>> = Mutex::new(Vec::new());
-        let program = source.compile().map_err(|refusal| match refusal {
-            Refusal::Key(key, problem) => DefinitionError::Key {
-                place: place.to_owned(),
-                key: format!("{prefix}{key}"),
-                problem,
-            },
-            Refusal::Expression(key, fault) => DefinitionError::Expression {
-                place: place.to_owned(),
-                key: format!("{prefix}{key}"),
-                line: fault.line,
-                column: fault.column,
-                problem: fault.problem,
-            },
-        })?;
+        let program = compiled(&source, place, prefix)?;
         let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(same) = known.iter().find(|known| known.source == source) {
             return Ok(same);
@@ -169,9 +168,47 @@ impl Definition {
         &self.spec
     }
 
+    /// What it does at a sample.
+    pub(crate) fn program(&self) -> &Program {
+        &self.program
+    }
+
     pub(crate) fn source(&self) -> &Source {
         &self.source
     }
+}
+
+/// What stands in the text of an effect file.
+fn read(text: &str, place: &str) -> Result<Source, DefinitionError> {
+    toml::from_str(text).map_err(|error| {
+        let start = error.span().map_or(0, |span| span.start);
+        let before = text.get(..start).unwrap_or("");
+        let line = before.rsplit('\n').next().unwrap_or("");
+        DefinitionError::Syntax {
+            place: place.to_owned(),
+            line: before.matches('\n').count() + 1,
+            column: line.chars().count() + 1,
+            problem: error.message().to_owned(),
+        }
+    })
+}
+
+/// The program of an effect; `prefix` comes before the keys in errors.
+fn compiled(source: &Source, place: &str, prefix: &str) -> Result<Program, DefinitionError> {
+    source.compile().map_err(|refusal| match refusal {
+        Refusal::Key(key, problem) => DefinitionError::Key {
+            place: place.to_owned(),
+            key: format!("{prefix}{key}"),
+            problem,
+        },
+        Refusal::Expression(key, fault) => DefinitionError::Expression {
+            place: place.to_owned(),
+            key: format!("{prefix}{key}"),
+            line: fault.line,
+            column: fault.column,
+            problem: fault.problem,
+        },
+    })
 }
 
 #[cfg(test)]

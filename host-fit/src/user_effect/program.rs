@@ -5,11 +5,11 @@ use model_core::Real;
 use std::cmp::Ordering;
 
 /// Index of the operation whose result is meant.
-pub(super) type Register = usize;
+pub(crate) type Register = usize;
 
 /// A signal an expression can read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Signal {
+pub(crate) enum Signal {
     /// What the effect is there to change: jet strength or sensor reading.
     Own,
     /// u.
@@ -20,6 +20,14 @@ pub(super) enum Signal {
     Arrived,
     /// 1 − Σa − Σc·j of the recursion.
     Relaxation,
+    /// The flow a sample ago; of the catalogue's effects only, as the next three.
+    Before,
+    /// The flow at the next sample without this effect.
+    Next,
+    /// The separated flow's share of the motion.
+    Released,
+    /// The jet strength at the flow at this very instant.
+    Present,
     /// The measured channel.
     Channel,
     /// Time in the record, s.
@@ -29,7 +37,7 @@ pub(super) enum Signal {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Unary {
+pub(crate) enum Unary {
     Negative,
     Abs,
     Sqrt,
@@ -41,7 +49,7 @@ pub(super) enum Unary {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Binary {
+pub(crate) enum Binary {
     Add,
     Subtract,
     Multiply,
@@ -59,7 +67,7 @@ pub(super) enum Binary {
 }
 
 impl Binary {
-    pub(super) fn compares(self) -> bool {
+    pub(crate) fn compares(self) -> bool {
         matches!(
             self,
             Self::Less
@@ -74,7 +82,7 @@ impl Binary {
 
 /// One operation; operands are results of earlier ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Op {
+pub(crate) enum Op {
     Number(f64),
     Parameter(usize),
     Period,
@@ -100,7 +108,7 @@ pub(super) enum Op {
 }
 
 impl Op {
-    pub(super) fn operands(&self) -> impl Iterator<Item = Register> + use<> {
+    pub(crate) fn operands(&self) -> impl Iterator<Item = Register> + use<> {
         let all = match *self {
             Self::Number(_)
             | Self::Parameter(_)
@@ -162,27 +170,27 @@ impl Op {
 /// Operations that together are straight lines between points, the places numbers and the values the same at every
 /// sample: of them only the lines around x count, and those before it as a sum that is known beforehand.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Lines {
-    pub(super) x: Register,
+pub(crate) struct Lines {
+    pub(crate) x: Register,
     /// The value below the first place.
-    pub(super) first: Register,
-    pub(super) lines: Vec<Line>,
+    pub(crate) first: Register,
+    pub(crate) lines: Vec<Line>,
 }
 
 /// A line from one place to the next, `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Line {
-    pub(super) from: Register,
-    pub(super) to: f64,
-    pub(super) steepness: Register,
-    pub(super) rise: Register,
+pub(crate) struct Line {
+    pub(crate) from: Register,
+    pub(crate) to: f64,
+    pub(crate) steepness: Register,
+    pub(crate) rise: Register,
     /// The sum with it.
-    pub(super) value: Register,
+    pub(crate) value: Register,
 }
 
 impl Lines {
     /// The operation whose result is the value.
-    pub(super) fn value(&self) -> Register {
+    pub(crate) fn value(&self) -> Register {
         self.lines.last().map_or(self.first, |line| line.value)
     }
 
@@ -204,36 +212,36 @@ impl Lines {
 
 /// A state that is carried from sample to sample.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Carried {
-    pub(super) name: String,
-    pub(super) start: f64,
+pub(crate) struct Carried {
+    pub(crate) name: String,
+    pub(crate) start: f64,
     /// Its next value.
-    pub(super) update: Register,
+    pub(crate) update: Register,
 }
 
 /// What an effect does at a sample.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Program {
-    pub(super) ops: Vec<Op>,
+pub(crate) struct Program {
+    pub(crate) ops: Vec<Op>,
     /// Whether an operation's result is the same at every sample.
-    pub(super) once: Vec<bool>,
-    pub(super) states: Vec<Carried>,
+    pub(crate) once: Vec<bool>,
+    pub(crate) states: Vec<Carried>,
     /// Memories for delayed signals.
-    pub(super) lines: usize,
+    pub(crate) lines: usize,
     /// Which operations make tables.
-    pub(super) tables: Vec<Lines>,
-    pub(super) value: Register,
+    pub(crate) tables: Vec<Lines>,
+    pub(crate) value: Register,
 }
 
 /// Appends operations, each one once.
 #[derive(Debug, Default)]
-pub(super) struct Builder {
+pub(crate) struct Builder {
     ops: Vec<Op>,
     tables: Vec<Lines>,
 }
 
 impl Builder {
-    pub(super) fn push(&mut self, op: Op) -> Register {
+    pub(crate) fn push(&mut self, op: Op) -> Register {
         if let Some(same) = self.ops.iter().position(|known| *known == op) {
             return same;
         }
@@ -241,7 +249,7 @@ impl Builder {
         self.ops.len() - 1
     }
 
-    pub(super) fn delayed(
+    pub(crate) fn delayed(
         &mut self,
         signal: Register,
         delay: Register,
@@ -270,12 +278,12 @@ impl Builder {
         })
     }
 
-    pub(super) fn is_once(&self, register: Register) -> bool {
+    pub(crate) fn is_once(&self, register: Register) -> bool {
         once(&self.ops).get(register).copied().unwrap_or(false)
     }
 
     /// Says that operations make a table.
-    pub(super) fn is_table(&mut self, table: Lines) {
+    pub(crate) fn is_table(&mut self, table: Lines) {
         let steady = |r: Register| self.is_once(r);
         if steady(table.first) && table.lines.iter().all(|line| steady(line.rise)) {
             self.tables.push(table);
@@ -283,7 +291,7 @@ impl Builder {
     }
 
     /// The number that a register holds, if it is one that was written down.
-    pub(super) fn number(&self, register: Register) -> Option<f64> {
+    pub(crate) fn number(&self, register: Register) -> Option<f64> {
         match self.ops.get(register)? {
             Op::Number(value) => Some(*value),
             Op::Unary(Unary::Negative, x) => self.number(*x).map(|x| -x),
@@ -291,12 +299,12 @@ impl Builder {
         }
     }
 
-    pub(super) fn is_number(&self, register: Register) -> bool {
+    pub(crate) fn is_number(&self, register: Register) -> bool {
         self.number(register).is_some()
     }
 
     /// Leaves out what has no influence on `value`, and numbers the rest anew.
-    pub(super) fn finish(self, value: Register, states: Vec<Carried>) -> Program {
+    pub(crate) fn finish(self, value: Register, states: Vec<Carried>) -> Program {
         let mut alive = vec![false; self.ops.len()];
         let mut pending = vec![value];
         while let Some(register) = pending.pop() {
@@ -392,7 +400,7 @@ fn once(ops: &[Op]) -> Vec<bool> {
 
 impl Program {
     /// What has to be computed at every sample if tables are looked up.
-    pub(super) fn needed(&self) -> Vec<bool> {
+    pub(crate) fn needed(&self) -> Vec<bool> {
         let mut needed = vec![false; self.ops.len()];
         let updates = self.states.iter().map(|state| state.update);
         let mut pending: Vec<Register> = updates.chain([self.value]).collect();
@@ -409,18 +417,18 @@ impl Program {
     }
 
     /// The table whose value an operation is.
-    pub(super) fn table_at(&self, register: Register) -> Option<usize> {
+    pub(crate) fn table_at(&self, register: Register) -> Option<usize> {
         let mut tables = self.tables.iter();
         tables.position(|table| table.value() == register)
     }
 
-    pub(super) fn reads(&self, op: Op) -> bool {
+    pub(crate) fn reads(&self, op: Op) -> bool {
         self.ops.contains(&op)
     }
 
     /// Whether parameter `index` enters a comparison other than through a
     /// state: then the output changes in steps with it.
-    pub(super) fn is_compared(&self, index: usize) -> bool {
+    pub(crate) fn is_compared(&self, index: usize) -> bool {
         let mut depends = vec![false; self.ops.len()];
         for (register, op) in self.ops.iter().enumerate() {
             depends[register] =
@@ -447,7 +455,7 @@ fn holds<T: Real>(x: T) -> bool {
 
 impl Unary {
     #[inline]
-    pub(super) fn of<T: Real>(self, x: T) -> T {
+    pub(crate) fn of<T: Real>(self, x: T) -> T {
         match self {
             Self::Negative => -x,
             Self::Abs => x.abs(),
@@ -463,7 +471,7 @@ impl Unary {
 
 impl Binary {
     #[inline]
-    pub(super) fn of<T: Real>(self, x: T, y: T) -> T {
+    pub(crate) fn of<T: Real>(self, x: T, y: T) -> T {
         // Derivatives have no part in comparisons, `==` of dual numbers does.
         let equal = || x.partial_cmp(&y) == Some(Ordering::Equal);
         match self {
@@ -487,6 +495,6 @@ impl Binary {
 
 /// `then` where `condition` holds.
 #[inline]
-pub(super) fn select<T: Real>(condition: T, then: T, otherwise: T) -> T {
+pub(crate) fn select<T: Real>(condition: T, then: T, otherwise: T) -> T {
     if holds(condition) { then } else { otherwise }
 }

@@ -205,6 +205,10 @@ impl Writer {
                 Signal::Flow => quote!(at.flow),
                 Signal::Arrived => quote!(at.arrived),
                 Signal::Relaxation => quote!(flow.relaxation),
+                Signal::Before => quote!(flow.before),
+                Signal::Next => quote!(flow.next),
+                Signal::Released => quote!(flow.released),
+                Signal::Present => quote!(at.present),
                 Signal::Channel => {
                     quote!(
                         at.channels

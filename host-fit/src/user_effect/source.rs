@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub(crate) struct Source {
     pub(crate) name: String,
     place: SourcePlace,
-    summary: String,
+    pub(super) summary: String,
     #[serde(default, rename = "source", skip_serializing_if = "Option::is_none")]
     reference: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]

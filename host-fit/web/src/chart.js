@@ -72,7 +72,10 @@ export class Chart {
     this.charts = document.createElement("div");
     this.charts.className = "charts";
     this.charts.style.minHeight = `${HEIGHT + (payload.runs.length ? RESIDUAL : 0)}px`;
-    this.element.append(heading, figureButtons(this), this.readout, this.charts);
+    this.legend = document.createElement("ul");
+    this.legend.className = "legend";
+    this.element.append(heading, figureButtons(this), this.legend, this.readout, this.charts);
+    this.relabel();
     this.read(null);
     this.sized = new ResizeObserver(() => this.resize());
     this.sized.observe(this.charts);
@@ -126,6 +129,7 @@ export class Chart {
 
   /** Other curves are to be drawn: at once, or when it is looked at. */
   renew() {
+    this.relabel();
     this.destroyPlots();
     if (this.visible) this.build();
   }
@@ -135,6 +139,34 @@ export class Chart {
     if (!run && !this.best) return;
     this.best = run && new Pyramid(run);
     this.renew();
+  }
+
+  /** What the legend says: the curves that are on. @returns {{name: string, kind: string, colour: string, dash?: number[], band?: boolean}[]} */
+  shown() {
+    const { record, payload } = this;
+    const repeats = record.low && record.high && !record.sd;
+    return [
+      ...(this.on("measured") ? [{ name: "measured", kind: "measured", colour: "--ink" }] : []),
+      ...payload.runs.flatMap((name, i) =>
+        record.runs[i] && this.on(`run${i}`) ? [{ name, kind: `s${i % 6}`, colour: `--s${i % 6}`, dash: DASHES[i % DASHES.length] }] : [],
+      ),
+      ...((record.sd || record.low) && this.on("scatter")
+        ? [{ name: repeats ? "range over repeats" : "scatter: ± 2 standard errors or range", kind: "scatter", colour: "--band", band: true }]
+        : []),
+    ];
+  }
+
+  /** Writes the legend anew. */
+  relabel() {
+    this.legend.replaceChildren(
+      ...this.shown().map(({ name, kind }) => {
+        const item = document.createElement("li");
+        const swatch = document.createElement("i");
+        swatch.className = `swatch ${kind}`;
+        item.append(swatch, name);
+        return item;
+      }),
+    );
   }
 
   /** @param {string} key */

@@ -26,6 +26,7 @@
  * @property {string[]} runs names of the models
  * @property {number[]=} off runs that are not shown at first
  * @property {Coordinate[]} coordinates
+ * @property {number[]=} view what is in view at first, from and to, s since a record's start
  *
  * @typedef {object} Series
  * @property {string} name

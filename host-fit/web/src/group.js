@@ -4,7 +4,11 @@ import { Bars } from "./bars.js";
 import { Chart } from "./chart.js";
 import { floats, unpack } from "./data.js";
 import { significant } from "./number.js";
+import { svgOf } from "./save.js";
 import { View } from "./view.js";
+
+/** Width of a chart that is printed, pixels. */
+const PAPER = 960;
 
 export class Group {
   /** @param {HTMLElement} element @param {import("./data.js").Payload} payload */
@@ -13,7 +17,7 @@ export class Group {
     this.payload = payload;
     const longest = Math.max(...payload.records.map((r) => r.n * r.period));
     const finest = Math.max(...payload.records.map((r) => 8 * r.period));
-    this.view = new View(element.id, longest, finest, payload.off?.map((i) => `run${i}`));
+    this.view = new View(element.id, longest, finest, payload.off?.map((i) => `run${i}`), payload.view);
     element.append(this.toolbar());
     this.charts = payload.records.map((packed, index) => {
       const chart = new Chart(unpack(packed), index, payload, this.view);
@@ -60,7 +64,7 @@ export class Group {
       button("▶", "later (Page Down)", () => this.view.pan(0.5)),
       button("+", "zoom in (+)", () => this.view.zoom(0.5)),
       button("−", "zoom out (−)", () => this.view.zoom(2)),
-      button("whole", "whole records (Home)", () => this.view.whole()),
+      button("whole record", "whole record (Home)", () => this.view.whole()),
     );
     this.stretch = document.createElement("output");
     this.stretch.className = "stretch";
@@ -162,7 +166,15 @@ export class Group {
     this.charts.forEach((chart) => chart.restyle());
   }
 
-  drawAll() {
-    this.charts.forEach((chart) => chart.seen(true));
+  /** Puts every chart on the page as SVG, which printers keep, or takes those away. @param {boolean} on */
+  paper(on) {
+    for (const chart of this.charts) {
+      chart.element.querySelector(".paper")?.remove();
+      if (!on) continue;
+      const paper = document.createElement("div");
+      paper.className = "paper";
+      paper.innerHTML = svgOf(chart, PAPER).svg;
+      chart.element.append(paper);
+    }
   }
 }

@@ -69,8 +69,26 @@ export function figureButtons(chart) {
   return buttons(() => ({ name: chart.record.name, ...svgOf(chart) }));
 }
 
-/** The chart as it is on the screen, as SVG: drawn once more by the same code, onto a context that writes SVG. @param {import("./chart.js").Chart} chart */
-export function svgOf(chart) {
+/** The legend of a chart as SVG, below its title. @param {import("./chart.js").Chart} chart @param {CSSStyleDeclaration} style @param {CanvasRenderingContext2D} measure @param {number} width */
+function legendOf(chart, style, measure, width) {
+  const value = (/** @type {string} */ name) => style.getPropertyValue(name).trim();
+  measure.font = "13px Helvetica, Arial, sans-serif";
+  let [x, y] = [10, 42];
+  const parts = chart.shown().map(({ name, colour, dash, band }) => {
+    const wide = 34 + measure.measureText(name).width;
+    if (x > 10 && x + wide > width - 10) [x, y] = [10, y + 20];
+    const sample = band
+      ? `<rect x="${x}" y="${y - 9}" width="24" height="10" fill="${value("--band")}" stroke="${value("--floor")}"/>`
+      : `<path d="M${x} ${y - 4}h24" stroke="${value(colour)}" stroke-width="2.5" stroke-dasharray="${(dash ?? []).join(" ")}"/>`;
+    const text = `<text x="${x + 30}" y="${y}" fill="${value("--ink")}" style="font:13px Helvetica, Arial, sans-serif">${escape(name)}</text>`;
+    x += wide + 18;
+    return sample + text;
+  });
+  return { text: parts.join(""), height: y - 20 };
+}
+
+/** The chart as it is on the screen, as SVG: drawn once more by the same code, onto a context that writes SVG. @param {import("./chart.js").Chart} chart @param {number=} wide pixels; as on the screen if left out */
+export function svgOf(chart, wide) {
   const target = document.createElement("div");
   target.style.cssText = "position:absolute;left:-9999px;top:0";
   document.body.append(target);
@@ -88,24 +106,25 @@ export function svgOf(chart) {
         return drawn.at(-1);
       }
     );
-    const width = chart.charts.clientWidth || 900;
+    const width = wide ?? (chart.charts.clientWidth || 900);
     const plots = chart.plotsOf(target, width);
     chart.fill(plots);
     const scale = devicePixelRatio;
-    let height = 30;
+    const style = getComputedStyle(document.documentElement);
+    const [paper, ink] = ["--paper", "--ink"].map((name) => style.getPropertyValue(name).trim());
+    const legend = legendOf(chart, style, measure, width);
+    let height = 30 + legend.height;
     const parts = plots.map((plot, i) => {
       const part = `<g transform="translate(0 ${height}) scale(${1 / scale})">${drawn[i].text(`p${i}`)}</g>`;
       height += plot.height;
       return part;
     });
     plots.forEach((plot) => plot.destroy());
-    const style = getComputedStyle(document.documentElement);
-    const [paper, ink] = ["--paper", "--ink"].map((name) => style.getPropertyValue(name).trim());
     const title = chart.element.querySelector("h3")?.textContent ?? "";
     const svg =
       `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}">` +
       `<title>${escape(title)}</title><rect width="100%" height="100%" fill="${paper}"/>` +
-      `<text x="10" y="20" fill="${ink}" style="font:600 15px Helvetica, Arial, sans-serif">${escape(title)}</text>${parts.join("")}</svg>`;
+      `<text x="10" y="20" fill="${ink}" style="font:600 15px Helvetica, Arial, sans-serif">${escape(title)}</text>${legend.text}${parts.join("")}</svg>`;
     return { svg, width, height };
   } finally {
     canvas.getContext = getContext;

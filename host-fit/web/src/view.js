@@ -8,13 +8,17 @@ export class View {
   /**
    * @param {string} id of the group @param {number} length of the longest record, s @param {number} finest s
    * @param {string[]=} off what is switched off at first
+   * @param {number[]=} view what is in view at first, from and to, s; everything if left out
    */
-  constructor(id, length, finest, off = []) {
+  constructor(id, length, finest, off = [], view = []) {
     this.id = id;
     this.length = length;
     this.finest = finest;
-    this.from = 0;
-    this.to = length;
+    const [from = 0, to = length] = view;
+    /** @type {[number, number]} */
+    this.start = to > from ? [Math.max(0, from), Math.min(length, to)] : [0, length];
+    this.from = this.start[0];
+    this.to = this.start[1];
     this.first = off.join();
     this.off = new Set(off);
     /** @type {Lit} */
@@ -87,7 +91,8 @@ export class View {
   words() {
     const words = [];
     const digits = (/** @type {number} */ v) => String(Number(v.toFixed(6)));
-    if (this.from > 0 || this.to < this.length) words.push(`${this.id}.t=${digits(this.from)}..${digits(this.to)}`);
+    const moved = Math.abs(this.from - this.start[0]) + Math.abs(this.to - this.start[1]) > 1e-9;
+    if (moved) words.push(`${this.id}.t=${digits(this.from)}..${digits(this.to)}`);
     if ([...this.off].join() !== this.first) words.push(`${this.id}.off=${[...this.off].map(encodeURIComponent).join(",")}`);
     if (this.lit) words.push(`${this.id}.bar=${this.lit.coordinate}:${this.lit.bin}`);
     return words;

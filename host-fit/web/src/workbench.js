@@ -137,8 +137,12 @@ function drawModel(s) {
 /** @param {State} s @param {string} text @param {object} request @param {Record<string, any>=} attributes */
 const does = (s, text, request, attributes = {}) => button(text, () => run(request), { disabled: s.work !== null, ...attributes });
 
-/** @param {string} headline @param {string} meaning */
-const verdict = (headline, meaning) => el("div", { class: "verdict finding" }, el("p", { class: "headline" }, headline), el("p", {}, meaning));
+/** An answer as a card: verdict, evidence, confidence, notes. @param {import("./bench/server.js").Answer} answer */
+const verdict = ({ tone, verdict, evidence, confidence, notes }) =>
+  el("div", { class: `verdict ${tone}` },
+    el("p", { class: "headline" }, verdict),
+    el("dl", {}, ...[["Evidence", evidence], ["Confidence", confidence]].flatMap(([name, text]) => (text ? [el("dt", {}, name), el("dd", {}, text)] : []))),
+    ...(notes.length ? [el("details", {}, el("summary", {}, `${notes.length} note${notes.length === 1 ? "" : "s"}`), el("ul", {}, ...notes.map((note) => el("li", {}, note))))] : []));
 
 /** @param {State} s */
 function drawDiagnosis(s) {
@@ -146,11 +150,11 @@ function drawDiagnosis(s) {
   if (model === null) return;
   const diagnose = does(s, found ? "Diagnose again" : "Diagnose", { command: "diagnose", model }, { id: "diagnose" });
   if (!found) {
-    place("missing").replaceChildren(el("p", {}, "Every effect of the catalogue is refitted with everything else and judged on the held-out records."), diagnose);
+    place("missing").replaceChildren(el("p", {}, "Every effect of the catalogue is refitted with everything else and judged on the validation records."), diagnose);
     return;
   }
   const parameters = (/** @type {Candidate} */ c) =>
-    Object.entries(c.parameters).map(([name, p]) => `${name} ${significant(p.value, 3)} ${p.unit === "-" ? "" : p.unit} (${significant(p.low, 3)} to ${significant(p.high, 3)})`).join("; ") +
+    Object.entries(c.parameters).map(([name, p]) => `${name} ${significant(p.value, 3)}${p.unit === "-" ? "" : ` ${p.unit}`} (${significant(p.low, 3)} to ${significant(p.high, 3)})`).join("; ") +
     (c.confounded_with.length ? `; or ${c.confounded_with.join(", ")}` : "");
   const has = s.model?.effects ?? [];
   const missing = found.missing.filter((effect) => !has.includes(effect));
@@ -158,19 +162,19 @@ function drawDiagnosis(s) {
     c.effect,
     `${c.error_reduction_percent.toFixed(1).replace("-", "−")} %`,
     !c.refitted ? "–" : c.p_value < 0.001 ? "< 0.001" : significant(c.p_value, 2),
-    c.significant ? "yes" : "no",
+    found.outcomes[c.effect] ?? "",
     parameters(c),
     does(s, "Add", { command: "extend", model, options: { effect: c.effect } }, { "aria-label": `add ${c.effect}`, disabled: s.work !== null || has.includes(c.effect) }),
   ];
   place("missing").replaceChildren(
-    verdict(found.headline, found.meaning),
+    verdict(found.answer),
     ...(missing.length ? [el("p", { class: "actions" }, does(s, `Add what is missing: ${missing.join(", ")}`, { command: "extend", model, options: { effect: missing } }, { class: "primary", id: "add-missing" }))] : []),
     ...(found.ranking.length ? [
       picture(found.picture),
-      table(["effect", "error falls", "p", "counts", "parameters (95 % interval)", ""], found.ranking.map(row), (i) => i === 1 || i === 2),
+      table(["effect", "error falls", "p", "outcome", "parameters (95 % interval)", ""], found.ranking.map(row), (i) => i === 1 || i === 2),
     ] : []),
     ...(found.experiment && found.experiment_picture ? [
-      el("h3", {}, `The experiment that tells apart ${found.experiment.effects.join(", ")}`),
+      el("h3", {}, `Experiment that distinguishes ${found.experiment.effects.join(", ")}`),
       el("p", {}, found.experiment.description),
       picture(found.experiment_picture),
     ] : []),
@@ -187,14 +191,14 @@ function drawDiscovery(s) {
   const discover = does(s, found ? "Discover again" : "Discover", { command: "discover", model }, { id: "discover" });
   place("discovery").replaceChildren(
     ...(found ? [
-      verdict(found.headline, found.meaning),
+      verdict(found.answer),
       ...found.terms.flatMap((term) => [
         el("h3", {}, term.title),
         picture(term.picture),
-        el("p", {}, term.is_formula ? "As a formula: " : "No formula does as well; as a table: ", el("code", {}, term.formula)),
+        el("p", {}, term.is_formula ? "As a formula: " : "No formula fits equally well; as a table: ", el("code", {}, term.formula)),
         el("p", {}, button("Open its effect file", () => editor.edit(term.file), { "aria-label": `Open its effect file: ${term.effect}` })),
       ]),
-    ] : [el("p", {}, "Curves of every coordinate at every place are fitted with everything else; one counts if the held-out error falls by more than chance and than the flow’s own memory manages.")]),
+    ] : [el("p", {}, "Curves of every coordinate at every place are fitted with everything else; one is kept if the validation error falls significantly and by more than additional lags do.")]),
     el("p", { class: "actions" }, discover,
       ...(found ? [el("a", { href: fileOf("discovery", model), download: "discovery.html" }, "download discovery.html")] : [])),
   );

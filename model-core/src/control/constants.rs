@@ -63,7 +63,8 @@ impl fmt::Display for Unusable {
         match self {
             Self::Constant(name) => write!(f, "`{name}` of the tracking law is out of range"),
             Self::LookAhead => f.write_str(
-                "the look-ahead memory is shorter than delay, valve and half a hold time; enlarge it",
+                "delay, valve and half a hold time together are more samples than the law can look ahead; \
+                 take shorter hold times, or a model with a longer sample period",
             ),
             Self::AveragedModel => f.write_str(
                 "the tracking law needs a full model; identify without averaging",

@@ -11,6 +11,7 @@ mod constants;
 mod correction;
 pub mod golden;
 pub mod hold;
+pub mod period;
 pub mod pulses;
 pub mod reference;
 pub mod tracking;

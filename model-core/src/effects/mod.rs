@@ -10,6 +10,7 @@ pub mod attachment_hysteresis;
 mod bench;
 pub mod bouc_wen_hysteresis;
 pub mod constant_delay;
+pub mod dispersed_delay;
 pub mod dry_friction;
 pub mod echo_path;
 pub mod edge_dependent_delay;
@@ -18,6 +19,7 @@ pub mod free_stream_variation;
 pub mod hot_film_lag;
 pub mod hot_film_nonlinearity;
 pub mod input_nonlinearity;
+pub mod lagging_drive;
 pub mod level_rate;
 pub mod plenum_droop;
 pub mod quadratic_drag;
@@ -190,6 +192,8 @@ catalogue! {
     echo_path::EchoPath: EchoPath<T, LONGEST_BUFFER>,
     starting_vortex::StartingVortex: StartingVortex<T>,
     stopping_vortex::StoppingVortex: StoppingVortex<T>,
+    dispersed_delay::DispersedDelay: DispersedDelay<T>,
+    lagging_drive::LaggingDrive: LaggingDrive<T>,
     attachment_hysteresis::AttachmentHysteresis: AttachmentHysteresis<T>,
     amplitude_saturation::AmplitudeSaturation: AmplitudeSaturation<T>,
     bouc_wen_hysteresis::BoucWenHysteresis: BoucWenHysteresis<T>,
@@ -221,9 +225,24 @@ pub const LEVEL_RATE: &Spec = &<LevelRate<f64> as Physics<f64>>::SPEC;
 /// The card of a slow wake: a third one.
 pub const SLOW_WAKE: &Spec = &<SlowWake<f64> as Physics<f64>>::SPEC;
 
+/// The card of a delay that turbulence spreads.
+pub const DISPERSED_DELAY: &Spec = &<DispersedDelay<f64> as Physics<f64>>::SPEC;
+
+/// The card of a drive that lags the jets, at first in the wrong direction.
+pub const LAGGING_DRIVE: &Spec = &<LaggingDrive<f64> as Physics<f64>>::SPEC;
+
+/// Base terms in the path of the jets: a search tries each from all starting values of its card.
+pub const PATH_TERMS: [&Spec; 2] = [DISPERSED_DELAY, LAGGING_DRIVE];
+
 /// The nuisances that a base model may have, after all effects but those that resist a motion: a rate is that of
 /// all that drives the flow.
-pub const NUISANCES: [&Spec; 3] = [SLOW_WAKE, LEVEL_RATE, ZERO_OFFSET];
+pub const NUISANCES: [&Spec; 5] = [
+    DISPERSED_DELAY,
+    LAGGING_DRIVE,
+    SLOW_WAKE,
+    LEVEL_RATE,
+    ZERO_OFFSET,
+];
 
 /// How many of `specs` a model can lack.
 const fn lacking(specs: &[Spec]) -> usize {
@@ -323,6 +342,8 @@ mod tests {
         assert_eq!(
             names,
             [
+                "dispersed-delay",
+                "lagging-drive",
                 "slow-wake",
                 "level-rate",
                 "zero-offset",

@@ -1,15 +1,16 @@
-//! Tables of numbers as text: whatever separates their columns, marks their decimals and precedes their rows.
+//! Rows of cells in lines of text: what separates the cells, which line is the first row, and what the columns are called.
 
-use super::problem::ImportProblem;
-use super::source::{Exactness, Source, Variable, fault};
-use crate::error::{DataError, DataProblem, FilePlace, printable};
-use crate::rows::printed_unit;
+use std::borrow::Cow;
 
-/// Lines among which the first row of numbers has to be.
+use super::cell::{Cell, Decimals, is_unit};
+use super::stamp::Stamp;
+
+/// Lines among which the first row has to be.
 const HEAD: usize = 400;
 
+/// What stands between the cells of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Separator {
+pub(super) enum Separator {
     Tab,
     Semicolon,
     Comma,
@@ -19,7 +20,7 @@ enum Separator {
 impl Separator {
     const ALL: [Self; 4] = [Self::Tab, Self::Semicolon, Self::Comma, Self::Blanks];
 
-    fn words(self) -> &'static str {
+    pub(super) fn words(self) -> &'static str {
         match self {
             Self::Tab => "tabs",
             Self::Semicolon => "semicolons",
@@ -28,29 +29,48 @@ impl Separator {
         }
     }
 
-    /// The cells of a line, trimmed and without quotes. Programs that end each row with a separator make no empty column of it.
-    fn split(self, line: &str) -> Vec<&str> {
-        let mut cells: Vec<&str> = match self {
-            Self::Blanks => line.split_whitespace().collect(),
-            Self::Tab => line.split('\t').collect(),
-            Self::Semicolon => line.split(';').collect(),
-            Self::Comma => line.split(',').collect(),
+    /// The cells of a line, trimmed and without quotes. A separator within quotes is none.
+    pub(super) fn split<'a>(self, line: &'a str, cells: &mut Vec<&'a str>) {
+        cells.clear();
+        let mut is_quoted = false;
+        let quotes = line.contains('"');
+        let mut parts = |is_separator: &dyn Fn(char) -> bool| {
+            if quotes {
+                cells.extend(line.split(|c: char| {
+                    is_quoted ^= c == '"';
+                    !is_quoted && is_separator(c)
+                }));
+            } else {
+                cells.extend(line.split(is_separator));
+            }
         };
-        if cells.len() > 2 && cells.last().is_some_and(|c| c.trim().is_empty()) {
-            cells.pop();
+        match self {
+            Self::Tab => parts(&|c| c == '\t'),
+            Self::Semicolon => parts(&|c| c == ';'),
+            Self::Comma => parts(&|c| c == ','),
+            Self::Blanks => {
+                parts(&char::is_whitespace);
+                cells.retain(|cell| !cell.is_empty());
+                merge(line, cells);
+            }
         }
-        for cell in &mut cells {
+        for cell in cells {
             *cell = bare(cell);
         }
-        cells
     }
 
-    /// Cells of a header, whose names may hold the separator within quotes.
+    /// The cells of a header, in which a quote may stand within quotes.
     fn split_header(self, line: &str) -> Vec<String> {
         let delimiter = match self {
             Self::Comma => b',',
             Self::Semicolon => b';',
-            _ => return self.split(line).into_iter().map(str::to_owned).collect(),
+            Self::Tab => b'\t',
+            Self::Blanks => {
+                return line
+                    .split_whitespace()
+                    .map(|cell| bare(cell).to_owned())
+                    .collect();
+            }
         };
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
@@ -58,15 +78,10 @@ impl Separator {
             .flexible(true)
             .from_reader(line.as_bytes());
         let mut record = csv::StringRecord::new();
-        let read = reader.read_record(&mut record);
-        let mut cells: Vec<String> = match read {
+        match reader.read_record(&mut record) {
             Ok(true) => record.iter().map(|c| bare(c).to_owned()).collect(),
-            _ => return self.split(line).into_iter().map(str::to_owned).collect(),
-        };
-        if cells.len() > 2 && cells.last().is_some_and(String::is_empty) {
-            cells.pop();
+            _ => Vec::new(),
         }
-        cells
     }
 }
 
@@ -76,199 +91,250 @@ fn bare(cell: &str) -> &str {
     inner.map_or(cell, str::trim)
 }
 
-/// The number in a cell, with a decimal point or a decimal comma.
-fn number(cell: &str) -> Option<f64> {
-    // `parse` would take these for numbers, and a header may well read `inf`.
-    if !cell.bytes().any(|b| b.is_ascii_digit()) {
-        return match cell {
-            "NaN" | "nan" | "NAN" => Some(f64::NAN),
-            _ => None,
+/// Joins what blanks part in a cell: a date and its clock time, that and AM or PM, a number and its unit.
+fn merge<'a>(line: &'a str, cells: &mut Vec<&'a str>) {
+    // Cells up to `kept` are done.
+    let mut kept = 0;
+    for at in 1..cells.len() {
+        let (before, cell) = (cells[kept], cells[at]);
+        let is_half = ["AM", "PM"].iter().any(|h| cell.eq_ignore_ascii_case(h));
+        let belongs = match before.contains([':', '-', '/', '.']) {
+            true if cell.contains(':') => Stamp::is_date(before) && Stamp::is_clock(cell),
+            true if is_half => Stamp::of(before).is_some(),
+            _ => false,
         };
-    }
-    match cell.split_once(',') {
-        None => cell.parse().ok(),
-        Some((whole, rest)) if !whole.contains('.') && !rest.contains(['.', ',']) => {
-            format!("{whole}.{rest}").parse().ok()
-        }
-        Some(_) => None,
-    }
-}
-
-/// The columns of a table.
-pub(super) fn variables(bytes: &[u8]) -> Result<Source, DataError> {
-    let text = decode(bytes)?;
-    let lines: Vec<&str> = text.lines().collect();
-    let (separator, first) = first_row(&lines).ok_or_else(|| fault(ImportProblem::NoTable))?;
-    let width = separator.split(lines[first]).len();
-    let (names, units) = header(&lines[..first], separator, width);
-    let place = |line: usize, column: Option<&str>| {
-        let place = FilePlace::default().at_line(line as u64 + 1);
-        match column {
-            Some(name) => place.in_column(name),
-            None => place,
-        }
-    };
-    for (i, name) in names.iter().enumerate() {
-        if names.iter().take(i).any(|n| n == name) {
-            let header = place(first.saturating_sub(1), Some(name));
-            return Err(header.error(DataProblem::DoubledColumn));
-        }
-    }
-    let mut source = Source::new(String::new());
-    let mut columns = vec![(Vec::new(), Vec::new()); width];
-    let mut decimal_comma = false;
-    for (at, line) in lines.iter().enumerate().skip(first) {
-        if line.trim().is_empty() {
-            continue;
-        }
-        let cells = separator.split(line);
-        if cells.len() != width {
-            return Err(place(at, None).error(DataProblem::RowLength {
-                expected: width,
-                found: cells.len(),
-            }));
-        }
-        for ((cell, name), (values, exact)) in cells.iter().zip(&names).zip(&mut columns) {
-            let value = number(cell).ok_or_else(|| {
-                place(at, Some(name)).error(match cell.is_empty() {
-                    true => DataProblem::MissingValue,
-                    false => DataProblem::NotANumber(printable(cell)),
-                })
-            })?;
-            values.push(value);
-            if cell.contains(',') {
-                decimal_comma = true;
-                exact.push(printed_unit(cell.replace(',', ".").as_bytes()));
-            } else {
-                exact.push(printed_unit(cell.as_bytes()));
+        let is_number =
+            |text| matches!(Cell::of(text, Decimals::Each), Cell::Number(n) if n.unit.is_none());
+        let start = before.as_ptr() as usize - line.as_ptr() as usize;
+        let end = cell.as_ptr() as usize - line.as_ptr() as usize + cell.len();
+        match line.get(start..end) {
+            Some(whole) if belongs || (is_unit(cell) && is_number(before)) => cells[kept] = whole,
+            _ => {
+                kept += 1;
+                cells[kept] = cell;
             }
         }
-        source.lines.push(at as u64 + 1);
     }
-    let decimals = if decimal_comma { "commas" } else { "points" };
-    source.dialect = format!(
-        "table separated by {}, decimal {decimals}",
-        separator.words()
-    );
-    let described = names.into_iter().zip(units).zip(columns);
-    source.variables = described
-        .map(|((name, unit), (values, exact))| Variable {
-            name,
-            unit,
-            values,
-            exactness: Exactness::Printed(exact),
-        })
-        .collect();
-    Ok(source)
+    cells.truncate(kept + 1);
 }
 
-/// UTF-8, UTF-16 with its mark, or else Latin-1, in which old instruments write `°C` and `µs`.
-fn decode(bytes: &[u8]) -> Result<String, DataError> {
-    let wide = |from: fn([u8; 2]) -> u16| {
-        let units = bytes.chunks_exact(2).skip(1).map(|b| from([b[0], b[1]]));
-        char::decode_utf16(units)
-            .map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER))
-            .collect()
-    };
-    if bytes.starts_with(b"\xff\xfe") {
-        return Ok(wide(u16::from_le_bytes));
-    }
-    if bytes.starts_with(b"\xfe\xff") {
-        return Ok(wide(u16::from_be_bytes));
-    }
-    if bytes.contains(&0) {
-        return Err(FilePlace::default().error(DataProblem::NotText));
-    }
-    let text = match std::str::from_utf8(bytes) {
-        Ok(text) => text.to_owned(),
-        Err(_) => bytes.iter().map(|&b| char::from(b)).collect(),
-    };
-    Ok(match text.strip_prefix('\u{feff}') {
-        Some(rest) => rest.to_owned(),
-        None => text,
-    })
+/// How the rows of a text stand in its lines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Rows {
+    pub(super) separator: Separator,
+    /// Index of the first row's line.
+    pub(super) first: usize,
+    /// Cells of a row.
+    pub(super) width: usize,
 }
 
-/// How columns are separated, and the first row of numbers: the first one that is followed by another like it.
-fn first_row(lines: &[&str]) -> Option<(Separator, usize)> {
-    let numbers = |separator: Separator, line: &str| -> Option<usize> {
-        let cells = separator.split(line);
-        let all = cells.len() >= 2 && cells.iter().all(|c| number(c).is_some());
-        all.then_some(cells.len())
-    };
-    let mut found: Option<(Separator, usize)> = None;
-    for separator in Separator::ALL {
-        let mut rows = lines.iter().take(HEAD).enumerate();
-        let mut before: Option<(usize, usize)> = None;
-        let row = rows.find_map(|(at, line)| {
+/// How much of a line is a row of a table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Likeness {
+    None,
+    /// Some cells hold text.
+    Partial,
+    /// Every cell holds a value or nothing.
+    Whole,
+}
+
+impl Rows {
+    /// The first row is the first line that is followed by another like it. Lines of values only are preferred to lines
+    /// with some text.
+    pub(super) fn find(lines: &[&str]) -> Option<Self> {
+        let found = Self::first_of(lines, Likeness::Whole);
+        let mut rows = found.or_else(|| Self::first_of(lines, Likeness::Partial))?;
+        // Rows with text may stand above the first one without.
+        let mut cells = Vec::new();
+        for at in (0..rows.first).rev() {
+            let line = lines.get(at).copied().unwrap_or_default();
             if line.trim().is_empty() {
-                return None;
+                continue;
             }
-            let width = numbers(separator, line);
-            match (before, width) {
-                (Some((start, w)), Some(width)) if w == width => return Some(start),
-                _ => before = width.map(|w| (at, w)),
+            rows.separator.split(line, &mut cells);
+            if cells.len() != rows.width || likeness(rows.separator, &cells) == Likeness::None {
+                break;
             }
-            None
-        });
-        // The earliest table wins; of two separators that fit equally, the first in the list, so that `1,5;2,5` is two numbers.
-        if let Some(row) = row
-            && found.is_none_or(|(_, at)| row < at)
+            rows.first = at;
+        }
+        Some(rows)
+    }
+
+    fn first_of(lines: &[&str], least: Likeness) -> Option<Self> {
+        let mut found: Option<Self> = None;
+        let mut cells = Vec::new();
+        for separator in Separator::ALL {
+            let mut before: Option<(usize, usize)> = None;
+            for (at, line) in lines.iter().enumerate().take(HEAD) {
+                // The earliest table wins; of two separators that fit equally, the first in the list, so that `1,5;2,5` is two
+                // numbers.
+                if found.is_some_and(|rows| at > rows.first) && before.is_none() {
+                    break;
+                }
+                if line.trim().is_empty() || is_comment(line) {
+                    continue;
+                }
+                separator.split(line, &mut cells);
+                let fits = likeness(separator, &cells) >= least;
+                match before {
+                    Some((first, width)) if fits && width == cells.len() => {
+                        if found.is_none_or(|rows| first < rows.first) {
+                            found = Some(Self {
+                                separator,
+                                first,
+                                width,
+                            });
+                        }
+                        break;
+                    }
+                    _ => before = fits.then_some((at, cells.len())),
+                }
+            }
+        }
+        found
+    }
+
+    /// The line that is most like a row though none is followed by another: its index and its first cell that is no value.
+    pub(super) fn nearest<'a>(lines: &[&'a str]) -> Option<(usize, Cow<'a, str>)> {
+        let mut best: Option<(usize, usize, &str)> = None;
+        let mut cells = Vec::new();
+        for separator in Separator::ALL {
+            for (at, line) in lines.iter().enumerate().take(HEAD) {
+                separator.split(line, &mut cells);
+                let is_value = |cell: &&&str| Cell::of(cell, Decimals::Each).is_value();
+                let values = cells.iter().filter(is_value).count();
+                let text = cells
+                    .iter()
+                    .find(|cell| !is_value(cell) && !cell.is_empty());
+                if values > best.map_or(0, |(most, ..)| most)
+                    && cells.len() >= 2
+                    && let Some(text) = text
+                {
+                    best = Some((values, at, text));
+                }
+            }
+        }
+        best.map(|(_, at, text)| (at, Cow::Borrowed(text)))
+    }
+
+    /// Names and units from the lines above the rows.
+    pub(super) fn header(self, lines: &[&str]) -> (Vec<String>, Vec<Option<String>>) {
+        let width = self.width;
+        let marks = |c: char| matches!(c, '#' | '%') || c.is_whitespace();
+        let joined = self.joined_stamp(lines);
+        let cells = |line: &&str| -> Option<Vec<String>> {
+            let line = match self.separator {
+                Separator::Tab => line.trim_start_matches(['#', '%']),
+                _ => line.trim_start_matches(marks),
+            };
+            let mut cells = self.separator.split_header(line);
+            while cells.len() > width && cells.last().is_some_and(String::is_empty) {
+                cells.pop();
+            }
+            if let Some(at) = joined
+                && cells.len() == width + 1
+            {
+                let second = cells.remove(at + 1);
+                if let Some(first) = cells.get_mut(at) {
+                    *first = format!("{first} {second}");
+                }
+            }
+            // Programs number the rows without a name for that.
+            if cells.len() + 1 == width && cells.iter().all(|c| is_name(c)) {
+                cells.insert(0, String::new());
+            }
+            (cells.len() == width).then_some(cells)
+        };
+        let mut candidates = lines
+            .iter()
+            .take(self.first)
+            .rev()
+            .filter(|l| !l.trim().is_empty())
+            .take(2)
+            .map(cells);
+        let (last, before) = (candidates.next().flatten(), candidates.next().flatten());
+        let numbered = || (1..=width).map(|i| format!("column {i}")).collect();
+        // A line of units stands between the names and the rows.
+        if let (Some(units), Some(names)) = (&last, &before)
+            && units.iter().all(|u| u.is_empty() || is_header_unit(u))
+            && names.iter().all(|n| !n.is_empty())
         {
-            found = Some((separator, row));
+            let units = units.iter().map(|u| {
+                let u = u.trim_matches(['[', ']', '(', ')']);
+                (!u.is_empty()).then(|| u.to_owned())
+            });
+            return (names.clone(), units.collect());
         }
-    }
-    found
-}
-
-/// Names and units from the lines above the rows.
-fn header(
-    above: &[&str],
-    separator: Separator,
-    width: usize,
-) -> (Vec<String>, Vec<Option<String>>) {
-    let marks = |c: char| matches!(c, '#' | '%') || c.is_whitespace();
-    let cells = |line: &&&str| -> Option<Vec<String>> {
-        let cells = separator.split_header(line.trim_start_matches(marks));
-        (cells.len() == width).then_some(cells)
-    };
-    let mut candidates = above
-        .iter()
-        .rev()
-        .filter(|l| !l.trim().is_empty())
-        .take(2)
-        .map(|line| cells(&line));
-    let (last, before) = (candidates.next().flatten(), candidates.next().flatten());
-    let numbered = || (1..=width).map(|i| format!("column {i}")).collect();
-    // A line of units stands between the names and the rows.
-    if let (Some(units), Some(names)) = (&last, &before)
-        && units.iter().all(|u| u.is_empty() || is_unit(u))
-        && names.iter().all(|n| !n.is_empty())
-    {
-        let units = units.iter().map(|u| {
-            let u = u.trim_matches(['[', ']', '(', ')']);
-            (!u.is_empty()).then(|| u.to_owned())
+        let names: Vec<String> = last.unwrap_or_else(numbered);
+        let split = names.iter().enumerate().map(|(i, text)| {
+            let (name, unit) = name_and_unit(text);
+            match name.is_empty() {
+                true => (format!("column {}", i + 1), unit),
+                false => (name.to_owned(), unit),
+            }
         });
-        return (names.clone(), units.collect());
+        split.unzip()
     }
-    let names: Vec<String> = last.unwrap_or_else(numbered);
-    let split = names.iter().enumerate().map(|(i, text)| {
-        let (name, unit) = name_and_unit(text);
-        match name.is_empty() {
-            true => (format!("column {}", i + 1), unit),
-            false => (name.to_owned(), unit),
+
+    /// The column whose cells are a date and a clock time that blanks part.
+    fn joined_stamp(self, lines: &[&str]) -> Option<usize> {
+        let mut cells = Vec::new();
+        self.separator.split(lines.get(self.first)?, &mut cells);
+        let is_joined = |cell: &&str| cell.contains(' ') && Stamp::of(cell).is_some();
+        match self.separator {
+            Separator::Blanks => cells.iter().position(is_joined),
+            _ => None,
         }
-    });
-    split.unzip()
+    }
 }
 
-fn is_unit(text: &str) -> bool {
+/// Whether a line is a remark of the program that wrote it.
+pub(super) fn is_comment(line: &str) -> bool {
+    line.trim_start().starts_with(['#', '%'])
+}
+
+/// Whether a cell of a header can be a name.
+fn is_name(cell: &str) -> bool {
+    cell.contains(|c: char| c.is_alphabetic())
+        && !matches!(
+            Cell::of(cell, Decimals::Each),
+            Cell::Number(_) | Cell::Stamp(_)
+        )
+}
+
+fn likeness(separator: Separator, cells: &[&str]) -> Likeness {
+    let (mut values, mut measured, mut texts) = (0, 0, 0);
+    for text in cells {
+        match Cell::of(text, Decimals::Each) {
+            // `0,5 100,2` is two numbers that a blank parts.
+            Cell::Number(n)
+                if n.is_grouped && separator == Separator::Comma && text.contains(' ') =>
+            {
+                texts += 1;
+            }
+            Cell::Number(_) | Cell::Stamp(_) => {
+                values += 1;
+                measured += 1;
+            }
+            Cell::Switch(_) | Cell::Missing => values += 1,
+            Cell::Empty => {}
+            Cell::Text => texts += 1,
+        }
+    }
+    // A row of two columns may have one value: the other is written on change only.
+    let fewest = if cells.len() == 2 && texts == 0 { 1 } else { 2 };
+    if cells.len() < 2 || values < fewest || measured == 0 || texts > values {
+        Likeness::None
+    } else if texts > 0 {
+        Likeness::Partial
+    } else {
+        Likeness::Whole
+    }
+}
+
+fn is_header_unit(text: &str) -> bool {
     let bracketed = |open, close| text.starts_with(open) && text.ends_with(close);
-    const KNOWN: [&str; 18] = [
-        "s", "ms", "us", "µs", "min", "h", "V", "mV", "A", "mA", "Pa", "bar", "mbar", "m/s", "K",
-        "°C", "N", "-",
-    ];
-    bracketed('[', ']') || bracketed('(', ')') || KNOWN.contains(&text)
+    bracketed('[', ']') || bracketed('(', ')') || text == "-" || is_unit(text)
 }
 
 /// `u_inf [m/s]`, `u_inf (m/s)`, `u_inf in m/s` and `u_inf / m/s` in two.
@@ -288,102 +354,5 @@ fn name_and_unit(text: &str) -> (&str, Option<String>) {
     match found {
         Some((name, unit)) if !name.is_empty() && !unit.is_empty() => (name, Some(unit.to_owned())),
         _ => (text.trim(), None),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn read(text: &str) -> Source {
-        variables(text.as_bytes()).expect("a table")
-    }
-
-    #[track_caller]
-    fn expect(source: &Source, names: &[&str], last: &[f64]) {
-        let found: Vec<&str> = source.variables.iter().map(|v| v.name.as_str()).collect();
-        assert_eq!(found, names);
-        let values: Vec<f64> = source
-            .variables
-            .iter()
-            .filter_map(|v| v.values.last().copied())
-            .collect();
-        assert_eq!(values, last);
-    }
-
-    #[test]
-    fn dialects_are_told_apart() {
-        let german = read("Zeit [ms];Ventil;tau / Pa\r\n0,0;0;1,25\r\n1,0;5;-1,5e-3\r\n");
-        expect(&german, &["Zeit", "Ventil", "tau"], &[1.0, 5.0, -1.5e-3]);
-        assert_eq!(german.variables[0].unit.as_deref(), Some("ms"));
-        assert_eq!(german.variables[2].unit.as_deref(), Some("Pa"));
-        assert!(
-            german.dialect.contains("semicolons") && german.dialect.contains("decimal commas"),
-            "{}",
-            german.dialect
-        );
-        let tabs = read("\u{feff}t\tu (V)\ty\n0,000\t0\t0,5\n0,001\t1\t0,6\n");
-        expect(&tabs, &["t", "u", "y"], &[0.001, 1.0, 0.6]);
-        let plain = read("t,u,y\n0,0,1\n0.5,1,2\n");
-        expect(&plain, &["t", "u", "y"], &[0.5, 1.0, 2.0]);
-        let blanks = read("% t u y\n 0.0  0 1\n 0.1  1 2\n");
-        expect(&blanks, &["t", "u", "y"], &[0.1, 1.0, 2.0]);
-        let quoted = read("\"t\",\"a, b\"\n0,1\n1,2\n");
-        expect(&quoted, &["t", "a, b"], &[1.0, 2.0]);
-    }
-
-    #[test]
-    fn what_precedes_the_rows_is_passed_over() {
-        let lab = read(
-            "LabVIEW Measurement\nChannels\t3\n\nTime\tValve\tShear\ns\tV\tPa\n0\t0\t1\n1\t5\t2\n2\t5\t3\n",
-        );
-        expect(&lab, &["Time", "Valve", "Shear"], &[2.0, 5.0, 3.0]);
-        assert_eq!(lab.variables[1].unit.as_deref(), Some("V"));
-        assert_eq!(lab.lines, [6, 7, 8]);
-        let bare = read("0 1\n1 2\n");
-        expect(&bare, &["column 1", "column 2"], &[1.0, 2.0]);
-    }
-
-    #[test]
-    fn wide_and_old_encodings_are_read() {
-        let text = "t [µs];T [°C]\n0;20\n1;21\n";
-        let latin: Vec<u8> = text.chars().map(|c| c as u32 as u8).collect();
-        let wide: Vec<u8> = std::iter::once(0xfeff)
-            .chain(text.encode_utf16())
-            .flat_map(u16::to_le_bytes)
-            .collect();
-        for bytes in [text.as_bytes(), &latin, &wide] {
-            let source = variables(bytes).expect("a table");
-            expect(&source, &["t", "T"], &[1.0, 21.0]);
-            assert_eq!(source.variables[0].unit.as_deref(), Some("µs"));
-        }
-    }
-
-    #[test]
-    fn faults_name_line_and_column() {
-        let message = |text: &str| {
-            let fault = variables(text.as_bytes()).expect_err("a fault");
-            fault.to_string()
-        };
-        for (text, parts) in [
-            ("t;u\n0;1\n1;1\n2\n", ["line 4", "2 names"]),
-            (
-                "t;u;y\n0;1;1\n1;1;1\n2;;1\n",
-                ["line 4, column `u`", "missing"],
-            ),
-            ("t;u\n0;1\n1;1\n2;on\n", ["line 4, column `u`", "`on`"]),
-            (
-                "t;u\n0;1\n1;1\n2;1.000,5\n",
-                ["line 4, column `u`", "thousands"],
-            ),
-            ("t;t\n0;1\n1;1\n", ["line 1, column `t`", "twice"]),
-            ("nothing here", ["header", "no rows of numbers"]),
-            ("t;u\n0;1\n1;1;3\n", ["header", "no rows"]),
-        ] {
-            let found = message(text);
-            for part in parts {
-                assert!(found.contains(part), "{text:?}: {found}");
-            }
-        }
     }
 }

@@ -5,12 +5,15 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::names::{
+    COMMANDS, CONTROLLER_OUTPUTS, OUTPUTS, PROCESS_VALUES, TIMES, find, is_in_percent, known_as,
+    only_other, only_switch,
+};
 use super::problem::ImportProblem;
-use super::source::{Exactness, Source, Variable};
+use super::source::{Source, Variable};
 use crate::error::{DataError, DataProblem, FilePlace};
 use crate::folder::mapping_of;
 use crate::record::{Origin, RESERVED, Record, Use};
-use crate::sampling::PrintedTimes;
 
 /// How a file's variables become a record. Kept in `dataset.toml` as the record's `[record.from]`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -22,9 +25,12 @@ pub struct Mapping {
     /// Seconds in one unit of the time; none: as its header says, otherwise 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub t_scale: Option<f64>,
-    /// Sampling period, s, in place of a time.
+    /// Sampling period, s, in place of a time, or to check it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
+    /// The rows are a sampling period apart, whatever the file's time says.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub ignore_time: bool,
     /// The command; none: found by its name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub u: Option<String>,
@@ -62,13 +68,6 @@ pub(super) struct Mapped {
     pub(super) units: BTreeMap<String, String>,
 }
 
-/// Names by which a variable is known, in lower case.
-const TIMES: [&str; 7] = ["t", "time", "zeit", "temps", "tout", "x_value", "time_s"];
-const COMMANDS: [&str; 8] = [
-    "u", "input", "command", "valve", "actuator", "ventil", "cmd", "stell",
-];
-const OUTPUTS: [&str; 6] = ["y", "output", "shear", "friction", "sensor", "response"];
-
 impl Mapping {
     /// The mapping that an imported data set was made with.
     ///
@@ -76,6 +75,92 @@ impl Mapping {
     /// [`DataError`] when there is no readable `dataset.toml`, or it holds no mapping.
     pub fn of(folder: &Path) -> Result<Self, DataError> {
         mapping_of(folder)
+    }
+
+    /// The command and the output, by option, by usual name, or because no other variable fits.
+    fn command_and_output<'a>(
+        &self,
+        source: &'a Source,
+        file: &FilePlace,
+        remarks: &mut Vec<String>,
+    ) -> Result<(&'a Variable, &'a Variable), DataError> {
+        let named = |wanted: &Option<String>, known: &[&str]| match wanted {
+            Some(name) => find(source, name, file).map(Some),
+            None => known_as(source, known, file),
+        };
+        // A variable that is known as something else is no candidate.
+        let time = match &self.t {
+            Some(name) => source.get(name),
+            None => known_as(source, &TIMES, &FilePlace::default())
+                .ok()
+                .flatten(),
+        };
+        let is_controlled = known_as(source, &PROCESS_VALUES, file)?.is_some();
+        let mut u = named(&self.u, &COMMANDS)?;
+        if u.is_none() && is_controlled {
+            u = known_as(source, &CONTROLLER_OUTPUTS, file)?;
+        }
+        let y = named(&self.y, &OUTPUTS)?;
+        let which = |what, option| {
+            let found = source.listed();
+            let problem = ImportProblem::Which {
+                what,
+                option,
+                found,
+            };
+            file.clone().error(problem.into())
+        };
+        let taken: Vec<&Variable> = time.into_iter().chain(y).collect();
+        let (u, by_value) = match u {
+            Some(u) => (u, false),
+            None => match only_switch(source, &taken) {
+                Some(u) => (u, true),
+                None => return Err(which("the command u", "u")),
+            },
+        };
+        if by_value {
+            remarks.push(format!(
+                "u is `{}`, the only on/off column; --u names another",
+                u.name
+            ));
+        }
+        remarks.extend(u.notes.iter().cloned());
+        let taken: Vec<&Variable> = time.into_iter().chain([u]).collect();
+        let y = match y {
+            Some(y) => y,
+            None => match only_other(source, &taken) {
+                Some(y) => {
+                    remarks.push(format!("y is `{}`, the only other column", y.name));
+                    y
+                }
+                None => return Err(which("the output y", "y")),
+            },
+        };
+        remarks.extend(y.notes.iter().cloned());
+        Ok((u, y))
+    }
+
+    /// The factor of the command: a command in percent is one of 0 to 1 unless a factor is given.
+    fn scale_of_command(
+        &self,
+        u: &Variable,
+        values: &[f64],
+        remarks: &mut Vec<String>,
+    ) -> Option<f64> {
+        let is_percent = match u.unit.as_deref() {
+            Some(unit) => unit == "%",
+            None => is_in_percent(&u.name),
+        };
+        if self.u_scale.is_some() || !is_percent {
+            return self.u_scale;
+        }
+        let largest = values.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        if largest <= 1.0 {
+            remarks.push("u is said to be in % and stays below 1: it is kept as it is".to_owned());
+            return None;
+        }
+        remarks.push("u is in %: 100 % is u = 1 (--u-scale 1 keeps the percentages)".to_owned());
+        Some(0.01)
     }
 
     fn check(&self) -> Result<(), ImportProblem> {
@@ -110,20 +195,11 @@ impl Mapping {
         let at = FilePlace::file(source.path());
         let fault = |problem: ImportProblem| at.clone().error(problem.into());
         self.check().map_err(&fault)?;
-        let of = |wanted: &Option<String>, known: &[&str], what, option| match wanted {
-            Some(name) => find(source, name),
-            None => known_as(source, known).ok_or_else(|| ImportProblem::Which {
-                what,
-                option,
-                found: source.listed(),
-            }),
-        };
-        let u = of(&self.u, &COMMANDS, "the command u", "u").map_err(&fault)?;
-        let y = of(&self.y, &OUTPUTS, "the output y", "y").map_err(&fault)?;
+        let mut remarks = source.remarks.clone();
+        let (u, y) = self.command_and_output(source, &at, &mut remarks)?;
         let mut mapping = self.clone();
         mapping.u = Some(u.name.clone());
         mapping.y = Some(y.name.clone());
-        let mut remarks = Vec::new();
         let mut units = BTreeMap::new();
         let origin = Origin {
             file: Some(source.path().to_path_buf()),
@@ -142,67 +218,19 @@ impl Mapping {
                 },
             }
         };
-        if y.values.len() != u.values.len() {
-            return Err(place(y, 0).whole().error(DataProblem::UnequalLengths {
-                expected: u.values.len(),
-                found: y.values.len(),
-            }));
-        }
         let n = u.values.len();
+        same_length(y, n, &place)?;
 
-        let time = match (&self.t, self.period_s) {
-            (Some(name), _) => Some(find(source, name).map_err(&fault)?),
-            (None, Some(_)) => None,
-            (None, None) => known_as(source, &TIMES).filter(|t| t.values.len() == n),
-        };
-        let (t0, sample_period_s) = match (time, self.period_s.or_else(|| stated_period(source))) {
-            (Some(t), _) => {
-                mapping.t = Some(t.name.clone());
-                let scale = match (self.t_scale, t.unit.as_deref()) {
-                    (Some(scale), _) => scale,
-                    (None, Some(unit)) => seconds(unit).ok_or_else(|| {
-                        let why = format!(
-                            "the unit `{unit}` of the time is not known here; give the seconds in it with --t-scale"
-                        );
-                        fault(ImportProblem::Unusable(why))
-                    })?,
-                    (None, None) => 1.0,
-                };
-                if scale != 1.0 {
-                    mapping.t_scale = Some(scale);
-                }
-                if t.values.len() != n {
-                    return Err(place(t, 0).whole().error(DataProblem::UnequalLengths {
-                        expected: n,
-                        found: t.values.len(),
-                    }));
-                }
-                finite(t, &place)?;
-                let times = scaled_times(t, scale);
-                let period = times
-                    .period(self.period_s)
-                    .map_err(|f| place(t, f.row).error(f.problem))?;
-                (times.time.first().copied().unwrap_or(0.0), period)
-            }
-            (None, Some(period)) => {
-                mapping.period_s = Some(period);
-                (0.0, period)
-            }
-            (None, None) => return Err(fault(ImportProblem::NoTime(source.listed()))),
-        };
-
-        for variable in [u, y] {
-            finite(variable, &place)?;
-        }
+        let timing = self.timing(source, n, &place, &mut mapping, &mut remarks)?;
+        finite(y, &place)?;
+        let values = held(u, &place, &mut remarks)?;
+        let u_scale = self.scale_of_command(u, &values, &mut remarks);
+        mapping.u_scale = u_scale;
         let line = |scale: Option<f64>, offset: Option<f64>| {
             let (scale, offset) = (scale.unwrap_or(1.0), offset.unwrap_or(0.0));
             move |v: &f64| scale * v + offset
         };
-        let mut command: Vec<f64> = u
-            .values
-            .iter()
-            .map(line(self.u_scale, self.u_offset))
-            .collect();
+        let mut command: Vec<f64> = values.iter().map(line(u_scale, self.u_offset)).collect();
         if let Some(threshold) = self.u_threshold {
             let low = command.iter().copied().fold(f64::INFINITY, f64::min);
             let high = command.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -232,15 +260,15 @@ impl Mapping {
             .iter()
             .map(line(self.y_scale, self.y_offset))
             .collect();
-        let mut record = Record::new(name, role, sample_period_s, command, output);
-        record.t0 = t0;
+        let mut record = Record::new(name, role, timing.period_s, command, output);
+        record.t0 = timing.t0;
 
-        let taken = [Some(u), Some(y), time];
-        let taken = |v: &Variable| taken.iter().flatten().any(|t| t.name == v.name);
+        let taken: Vec<&Variable> = [u, y].into_iter().chain(timing.variables).collect();
+        let taken = |v: &Variable| taken.iter().any(|t| t.name == v.name);
         let chosen: Vec<&Variable> = match &self.channels {
             Some(names) => names
                 .iter()
-                .map(|name| find(source, name).map_err(&fault))
+                .map(|name| find(source, name, &at))
                 .collect::<Result<_, _>>()?,
             None => {
                 let fits = |v: &&Variable| v.values.len() == n && !taken(v);
@@ -252,24 +280,28 @@ impl Mapping {
             if taken(variable) {
                 continue;
             }
-            if variable.values.len() != n {
-                return Err(place(variable, 0)
-                    .whole()
-                    .error(DataProblem::UnequalLengths {
-                        expected: n,
-                        found: variable.values.len(),
-                    }));
+            same_length(variable, n, &place)?;
+            if variable.stamped.is_some() {
+                remarks.push(format!(
+                    "`{}` is left out: a time beside the time",
+                    variable.name
+                ));
+                continue;
             }
             if let Err(error) = finite(variable, &place) {
                 if self.channels.is_some() {
                     return Err(error);
                 }
+                let line = error.place.line.map(|line| format!("line {line}: "));
                 remarks.push(format!(
-                    "`{}` is left out: {}",
-                    variable.name, error.problem
+                    "`{}` is left out: {}{}",
+                    variable.name,
+                    line.unwrap_or_default(),
+                    error.problem
                 ));
                 continue;
             }
+            remarks.extend(variable.notes.iter().cloned());
             let values = variable.values.iter();
             match variable.name.as_str() {
                 "y_sd" => record.y_sd = Some(values.map(|v| v * scale.abs()).collect()),
@@ -301,6 +333,8 @@ impl Mapping {
         if let (Some(unit), None) = (&y.unit, self.y_scale) {
             units.insert("y".to_owned(), unit.clone());
         }
+        let unread = source.unread.iter();
+        remarks.extend(unread.map(|u| format!("`{}` is left out: {}", u.name, u.words())));
         let passed_over = source.skipped.iter();
         remarks.extend(passed_over.map(|(name, why)| format!("`{name}` is left out: {why}")));
         Ok(Mapped {
@@ -313,91 +347,66 @@ impl Mapping {
     }
 }
 
-fn find<'a>(source: &'a Source, name: &str) -> Result<&'a Variable, ImportProblem> {
-    if let Some(found) = source.get(name) {
-        return Ok(found);
+/// Refuses a variable that is not as long as the command.
+pub(super) fn same_length(
+    variable: &Variable,
+    n: usize,
+    place: &dyn Fn(&Variable, usize) -> FilePlace,
+) -> Result<(), DataError> {
+    match variable.values.len() == n {
+        true => Ok(()),
+        false => Err(place(variable, 0)
+            .whole()
+            .error(DataProblem::UnequalLengths {
+                expected: n,
+                found: variable.values.len(),
+            })),
     }
-    if let Some((_, why)) = source.skipped.iter().find(|(n, _)| n == name) {
-        return Err(ImportProblem::Unusable(format!(
-            "the variable `{name}` is {why}"
-        )));
-    }
-    Err(ImportProblem::NoVariable {
-        wanted: name.to_owned(),
-        found: source.listed(),
-    })
 }
 
-/// The one variable that goes by a known name, alone or as the field of a structure; an earlier name wins.
-fn known_as<'a>(source: &'a Source, known: &[&str]) -> Option<&'a Variable> {
-    known.iter().find_map(|name| {
-        let is_it = |v: &&Variable| {
-            let last = v.name.rsplit('.').next().unwrap_or_default();
-            // `T` is a temperature, `Time` a time.
-            let same = match name.len() {
-                1 => last == *name,
-                _ => last.eq_ignore_ascii_case(name),
-            };
-            v.values.len() > 1 && same
-        };
-        let mut found = source.variables.iter().filter(is_it);
-        found.next().filter(|_| found.next().is_none())
-    })
-}
-
-/// The sampling period that a scalar of the file states.
-fn stated_period(source: &Source) -> Option<f64> {
-    let scalar = |name: &str| {
-        let is_it = |v: &&Variable| v.name.rsplit('.').next() == Some(name);
-        match source.variables.iter().find(is_it)?.values.as_slice() {
-            &[value] if value.is_finite() && value > 0.0 => Some(value),
-            _ => None,
-        }
-    };
-    ["Ts", "dt", "sample_period_s"]
-        .into_iter()
-        .find_map(scalar)
-        .or_else(|| Some(1.0 / ["fs", "Fs"].into_iter().find_map(scalar)?))
-}
-
-/// Seconds in a unit of time.
-fn seconds(unit: &str) -> Option<f64> {
-    Some(match unit {
-        "s" | "sec" | "S" | "seconds" => 1.0,
-        "ms" | "msec" => 1e-3,
-        "us" | "µs" | "μs" => 1e-6,
-        "ns" => 1e-9,
-        "min" => 60.0,
-        "h" => 3600.0,
-        _ => return None,
-    })
-}
-
-fn scaled_times(t: &Variable, scale: f64) -> PrintedTimes {
-    // Milliseconds divide exactly where a multiplication by 0.001 would not.
-    let whole = (1.0 / scale).round();
-    let by = |v: f64| match (whole * scale - 1.0).abs() < 1e-12 && whole > 1.0 {
-        true => v / whole,
-        false => v * scale,
-    };
-    let time: Vec<f64> = t.values.iter().map(|&v| by(v)).collect();
-    let unit = match &t.exactness {
-        Exactness::Printed(units) => units.iter().map(|u| u * scale).collect(),
-        // A clock that was added up is off by more than the last bit of one value.
-        Exactness::Relative(share) => time.iter().map(|v| 8.0 * share * v.abs()).collect(),
-    };
-    PrintedTimes { time, unit }
-}
-
-fn finite(
+/// Refuses a variable with a value that is missing or not finite.
+pub(super) fn finite(
     variable: &Variable,
     place: &dyn Fn(&Variable, usize) -> FilePlace,
 ) -> Result<(), DataError> {
     match variable.values.iter().position(|v| !v.is_finite()) {
         None => Ok(()),
+        Some(k) if variable.blanks.contains(&k) => {
+            Err(place(variable, k).error(ImportProblem::Unread(String::new()).into()))
+        }
         Some(k) => {
             let value = variable.values.get(k).copied().unwrap_or(f64::NAN);
             Err(place(variable, k).error(DataProblem::NotFinite(value)))
+        }
+    }
+}
+
+/// A command that is written when it changes: an empty cell keeps the value before it.
+fn held(
+    u: &Variable,
+    place: &dyn Fn(&Variable, usize) -> FilePlace,
+    remarks: &mut Vec<String>,
+) -> Result<Vec<f64>, DataError> {
+    let mut values = u.values.clone();
+    for &row in &u.blanks {
+        let before = row.checked_sub(1).and_then(|k| values.get(k)).copied();
+        let (Some(before), Some(value)) = (before, values.get_mut(row)) else {
+            return Err(place(u, row).error(ImportProblem::NoFirstCommand.into()));
+        };
+        *value = before;
+    }
+    if !u.blanks.is_empty() {
+        remarks.push(format!(
+            "u is written on change only: an empty cell keeps the value before it ({} of {} cells)",
+            u.blanks.len(),
+            values.len()
+        ));
+    }
+    match values.iter().position(|v| !v.is_finite()) {
+        None => Ok(values),
+        Some(k) => {
+            let value = values.get(k).copied().unwrap_or(f64::NAN);
+            Err(place(u, k).error(DataProblem::NotFinite(value)))
         }
     }
 }

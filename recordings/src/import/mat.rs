@@ -9,7 +9,7 @@ use std::io::Read;
 use flate2::read::ZlibDecoder;
 
 use super::problem::ImportProblem;
-use super::source::{LARGEST, Notation, Source, damaged, fault};
+use super::source::{Budget, Notation, Source, damaged, fault};
 use crate::error::DataError;
 
 const HEADER: usize = 128;
@@ -39,40 +39,57 @@ fn order(bytes: &[u8]) -> Option<Order> {
 }
 
 /// The variables of a file.
-pub(super) fn variables(bytes: &[u8]) -> Result<Source, DataError> {
+pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, DataError> {
     let order = order(bytes).ok_or_else(|| fault(ImportProblem::NoMatlab))?;
     let mut source = Source::new("MATLAB file");
     let mut rest = Elements {
         bytes: bytes.get(HEADER..).unwrap_or_default(),
         order,
     };
-    let mut budget = LARGEST;
     while let Some(element) = rest.next()? {
         match element.kind {
             COMPRESSED => {
-                let mut inner = Vec::new();
-                ZlibDecoder::new(element.data)
-                    .take(budget + 1)
-                    .read_to_end(&mut inner)
-                    .map_err(|_| damaged("a packed variable cannot be unpacked"))?;
-                budget = budget
-                    .checked_sub(inner.len() as u64)
-                    .ok_or_else(|| fault(ImportProblem::TooLarge(LARGEST >> 20)))?;
-                let mut inner = Elements {
+                let inner = unpacked(element.data, order, budget)?;
+                let mut elements = Elements {
                     bytes: &inner,
                     order,
                 };
-                if let Some(element) = inner.next()?
+                if let Some(element) = elements.next()?
                     && element.kind == MATRIX
                 {
-                    matrix(&mut source, element.data, order, None, 0)?;
+                    matrix(&mut source, budget, element.data, order, None, 0)?;
                 }
+                budget.give(inner.len() as u64);
             }
-            MATRIX => matrix(&mut source, element.data, order, None, 0)?,
+            MATRIX => matrix(&mut source, budget, element.data, order, None, 0)?,
             _ => {}
         }
     }
     Ok(source)
+}
+
+/// A packed variable, unpacked. Its tag, which comes first, says how long it is.
+fn unpacked(packed: &[u8], order: Order, budget: &mut Budget) -> Result<Vec<u8>, DataError> {
+    const TAG: usize = 8;
+    let broken = |_| damaged("a packed variable cannot be unpacked");
+    let mut decoder = ZlibDecoder::new(packed);
+    let mut inner = Vec::with_capacity(TAG);
+    (&mut decoder)
+        .take(TAG as u64)
+        .read_to_end(&mut inner)
+        .map_err(broken)?;
+    let stated =
+        word(&inner, 4, order).ok_or_else(|| damaged("a packed variable cannot be unpacked"))?;
+    let length = u64::from(stated).div_ceil(8) * 8;
+    budget.take(TAG as u64 + length, || "a packed variable".to_owned())?;
+    // What is there is less where the file lies.
+    decoder
+        .take(length)
+        .read_to_end(&mut inner)
+        .map_err(broken)?;
+    budget.give(TAG as u64 + length);
+    budget.take(inner.len() as u64, || "a packed variable".to_owned())?;
+    Ok(inner)
 }
 
 struct Element<'a> {
@@ -131,6 +148,7 @@ fn word(bytes: &[u8], at: usize, order: Order) -> Option<u32> {
 /// One array; `named` where the name is that of a field.
 fn matrix(
     source: &mut Source,
+    budget: &mut Budget,
     data: &[u8],
     order: Order,
     named: Option<&str>,
@@ -177,7 +195,7 @@ fn matrix(
                 let element = parts.required()?;
                 if element.kind == MATRIX {
                     let path = format!("{name}.{}", text(field));
-                    matrix(source, element.data, order, Some(&path), depth + 1)?;
+                    matrix(source, budget, element.data, order, Some(&path), depth + 1)?;
                 }
             }
         }
@@ -194,6 +212,7 @@ fn matrix(
             if count.checked_mul(size) != Some(stored.data.len()) {
                 return Err(damaged("an array with fewer numbers than it says"));
             }
+            budget.take_array(name, count)?;
             let rows = shape.first().copied().unwrap_or(1);
             let at = |row: usize, column: usize| -> f64 {
                 let start = (column * rows + row) * size;

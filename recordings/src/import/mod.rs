@@ -3,27 +3,36 @@
 //! A [`Source`] is a file's variables, whatever the format; a [`Mapping`] says which of them is what. The data set that comes
 //! of it is checked as any other, and its `dataset.toml` keeps the mapping.
 
+mod cell;
+mod column;
 mod delimited;
+mod labelled;
 mod mapping;
 mod mat;
+mod names;
 mod npy;
 mod open;
 pub(crate) mod problem;
 mod source;
+mod stamp;
+mod text;
+mod timing;
 
 pub use mapping::Mapping;
 pub use problem::ImportProblem;
 pub use source::{Source, Variable};
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::{DataError, DataProblem, FilePlace};
 use crate::output::OutputError;
 use crate::record::{Origin, Record, Use};
-use crate::set::DataSet;
+use crate::set::MANIFEST;
+use crate::set::{DataSet, unite_periods};
 
 /// Where a record came from, as `dataset.toml` keeps it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -47,8 +56,11 @@ pub struct Import {
     pub title: Option<String>,
     /// Names of records (files without their ending) to hold out.
     pub validate: Vec<String>,
-    /// From this time of each record on, s, its samples become a held-out record of their own.
+    /// From this time of each record on, s, its samples are held out: they become a validation record, which the samples
+    /// before them lead up to.
     pub hold_out_from_s: Option<f64>,
+    /// Command before the first sample of every record; none: its first value.
+    pub u_before: Option<f64>,
     /// The input has levels between 0 and 1.
     pub graded: bool,
 }
@@ -62,6 +74,8 @@ pub struct ImportedFile {
     pub dialect: String,
     /// Samples.
     pub samples: usize,
+    /// Sampling period as the file says it, s.
+    pub sample_period_s: f64,
     /// The variables that were taken, and what was done with them.
     pub mapping: Mapping,
     /// What should be known: variables left out, a command that looks like a voltage.
@@ -75,7 +89,10 @@ pub struct Imported {
     pub set: DataSet,
     /// What became of each file.
     pub files: Vec<ImportedFile>,
+    /// What should be known of the data set as a whole.
+    pub remarks: Vec<String>,
     from: Vec<From>,
+    sources: Vec<PathBuf>,
 }
 
 impl Imported {
@@ -86,6 +103,89 @@ impl Imported {
     pub fn save(&self, folder: &Path) -> Result<(), OutputError> {
         self.set.save_from(folder, &self.from)
     }
+
+    /// Refuses to replace a data set or a file in `folder`. With `force` only the files that were imported are safe.
+    ///
+    /// # Errors
+    /// [`DataError`] naming what would be replaced.
+    pub fn refuse_to_replace(&self, folder: &Path, force: bool) -> Result<(), DataError> {
+        let manifest = folder.join(MANIFEST);
+        let files = self.set.file_names();
+        let mut targets = files.iter().map(|name| folder.join(name));
+        let is_source = |target: &PathBuf| {
+            let real = target.canonicalize();
+            real.is_ok_and(|real| {
+                self.sources
+                    .iter()
+                    .any(|s| s.canonicalize().is_ok_and(|s| s == real))
+            })
+        };
+        if let Some(target) = targets.clone().find(is_source) {
+            return Err(FilePlace::file(&target).error(ImportProblem::ReplacesSource.into()));
+        }
+        if force {
+            return Ok(());
+        }
+        if manifest.exists() {
+            return Err(FilePlace::file(folder).error(ImportProblem::ReplacesSet.into()));
+        }
+        match targets.find(|target| target.exists()) {
+            Some(target) => Err(FilePlace::file(&target).error(ImportProblem::ReplacesFile.into())),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Endings of files that are tables or arrays …
+const TABLES: [&str; 5] = ["csv", "tsv", "mat", "npy", "npz"];
+/// … and of files that may be, taken from a folder that has none of the others.
+const TEXTS: [&str; 3] = ["txt", "dat", "log"];
+
+/// The files to import: those named, and for a folder those in it that can be tables, by name.
+///
+/// # Errors
+/// [`DataError`] when a folder cannot be read, is a data set already, or holds no such file.
+pub fn files_of(paths: &[&Path]) -> Result<Vec<PathBuf>, DataError> {
+    let mut files = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            files.push(path.to_path_buf());
+            continue;
+        }
+        if path.join(MANIFEST).exists() {
+            return Err(FilePlace::file(path).error(ImportProblem::IsDataSet.into()));
+        }
+        let unreadable = |e| DataError::unreadable(path, e);
+        let mut inside = Vec::new();
+        for entry in fs::read_dir(path).map_err(unreadable)? {
+            let file = entry.map_err(unreadable)?.path();
+            let name = file
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .to_lowercase();
+            if file.is_file() && !name.starts_with('.') && !name.starts_with("readme") {
+                inside.push(file);
+            }
+        }
+        inside.sort();
+        let ending_in = |endings: &[&str]| -> Vec<PathBuf> {
+            let fits = |file: &&PathBuf| {
+                let ending = file.extension().unwrap_or_default();
+                endings.iter().any(|e| ending.eq_ignore_ascii_case(e))
+            };
+            inside.iter().filter(fits).cloned().collect()
+        };
+        let mut found = ending_in(&TABLES);
+        if found.is_empty() {
+            found = ending_in(&TEXTS);
+        }
+        if found.is_empty() {
+            return Err(FilePlace::file(path).error(ImportProblem::NothingInFolder.into()));
+        }
+        files.append(&mut found);
+    }
+    Ok(files)
 }
 
 /// Makes a data set of files, one record of each.
@@ -98,18 +198,21 @@ pub fn import(files: &[&Path], request: &Import) -> Result<Imported, DataError> 
     let mut from: Vec<From> = Vec::new();
     let mut told = Vec::new();
     for path in files {
-        let source = Source::open(path)?;
+        let kept = records.iter().map(Record::bytes).sum();
+        let source = Source::open_beside(path, kept)?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let name = unused(&stem, &records);
         let role = match request.validate.iter().any(|v| *v == stem) {
             true => Use::Validate,
             false => Use::Identify,
         };
-        let mapped = request.mapping.record(&source, &name, role)?;
+        let mut mapped = request.mapping.record(&source, &name, role)?;
+        mapped.record.u_before = request.u_before;
         told.push(ImportedFile {
             name,
             dialect: source.dialect.clone(),
             samples: mapped.record.len(),
+            sample_period_s: mapped.record.sample_period_s,
             mapping: mapped.mapping.clone(),
             remarks: mapped.remarks,
         });
@@ -134,6 +237,14 @@ pub fn import(files: &[&Path], request: &Import) -> Result<Imported, DataError> 
             from.push(came_from.clone());
         }
     }
+    let mut remarks = Vec::new();
+    if let Some(one) = unite_periods(&mut records) {
+        remarks.push(format!(
+            "The records' sampling periods differ by less than a sample over their length ({} to {} s): all get the mean, {} s.",
+            one.shortest, one.longest, one.mean
+        ));
+    }
+    remarks.extend(nothing_held_out(&records));
     let whole = FilePlace::default();
     let set = DataSet::assemble(request.title.clone(), records, origins, &whole)?;
     if !request.graded {
@@ -145,11 +256,33 @@ pub fn import(files: &[&Path], request: &Import) -> Result<Imported, DataError> 
     Ok(Imported {
         set,
         files: told,
+        remarks,
         from,
+        sources: files.iter().map(|path| path.to_path_buf()).collect(),
     })
 }
 
-/// A record in two: what is learnt from, and what is held out.
+/// What to do where no record is for validation.
+fn nothing_held_out(records: &[Record]) -> Option<String> {
+    if records.iter().any(|r| r.role == Use::Validate) {
+        return None;
+    }
+    let shortest = records.iter().min_by_key(|r| r.len())?;
+    let from = shortest.time(shortest.len() * 7 / 10);
+    let from: f64 = format!("{from:.1e}").parse().unwrap_or(from);
+    let tail = format!("the end of each record with --hold-out-from {from}");
+    let how = match records {
+        [_] => tail,
+        [.., last] => format!("a file with --validate {}, or {tail}", last.name),
+        [] => return None,
+    };
+    Some(format!(
+        "Nothing is held out: models will be judged on the data they are fitted to. Hold out {how}."
+    ))
+}
+
+/// A record in two: one of the samples before `time` to fit, and the whole as a validation record in which they lead up to
+/// those that are judged.
 fn parts(
     record: Record,
     origin: Origin,
@@ -159,20 +292,24 @@ fn parts(
 ) -> Result<Vec<(Record, Origin)>, DataError> {
     let at = ((time - record.t0) / record.sample_period_s).round();
     if !(at >= 2.0 && at + 2.0 <= record.len() as f64) {
-        let problem = ImportProblem::SplitOutside(time);
+        let problem = ImportProblem::SplitOutside {
+            time,
+            from: record.t0,
+            to: record.time(record.len().saturating_sub(1)),
+        };
         return Err(FilePlace::file(path).error(problem.into()));
     }
     let at = at as usize;
-    let (first, mut second) = (record.part(0, at), record.part(at, record.len()));
-    second.role = Use::Validate;
-    second.name = unused(&format!("{}-held-out", record.name), before);
-    let cut = |lines: &[u64]| Origin {
+    let first = record.part(0, at);
+    let head = Origin {
         file: origin.file.clone(),
-        lines: lines.to_vec(),
+        lines: origin.lines.iter().take(at).copied().collect(),
     };
-    let split = at.min(origin.lines.len());
-    let (head, tail) = origin.lines.split_at(split);
-    Ok(vec![(first, cut(head)), (second, cut(tail))])
+    let mut second = record;
+    second.role = Use::Validate;
+    second.lead = at;
+    second.name = unused(&format!("{}-held-out", second.name), before);
+    Ok(vec![(first, head), (second, origin)])
 }
 
 fn unused(name: &str, records: &[Record]) -> String {

@@ -7,23 +7,22 @@ use std::io::{Cursor, Read};
 use std::path::Path;
 
 use super::problem::ImportProblem;
-use super::source::{LARGEST, Notation, Source, damaged, fault};
-use crate::error::DataError;
+use super::source::{Budget, Notation, Source, damaged, fault};
+use crate::error::{DataError, printable};
 
 /// The array of one `.npy`, named by the file.
-pub(super) fn single(path: &Path, bytes: &[u8]) -> Result<Source, DataError> {
+pub(super) fn single(path: &Path, bytes: &[u8], budget: &mut Budget) -> Result<Source, DataError> {
     let mut source = Source::new("NumPy array");
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    array(&mut source, &stem, bytes)?;
+    array(&mut source, budget, &stem, bytes)?;
     Ok(source)
 }
 
 /// The arrays of an `.npz`.
-pub(super) fn archive(bytes: &[u8]) -> Result<Source, DataError> {
+pub(super) fn archive(bytes: &[u8], budget: &mut Budget) -> Result<Source, DataError> {
     let broken = || damaged("the archive cannot be unpacked");
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|_| broken())?;
     let mut source = Source::new("NumPy archive");
-    let mut budget = LARGEST;
     let mut arrays = 0;
     for index in 0..archive.len() {
         let file = archive.by_index(index).map_err(|_| broken())?;
@@ -32,14 +31,16 @@ pub(super) fn archive(bytes: &[u8]) -> Result<Source, DataError> {
             continue;
         };
         arrays += 1;
-        let mut content = Vec::new();
-        file.take(budget + 1)
+        let size = file.size();
+        let what = || format!("`{}`", printable(&name));
+        budget.take(size, what)?;
+        let mut content = Vec::with_capacity(usize::try_from(size).unwrap_or(0));
+        // No more than is stated.
+        file.take(size)
             .read_to_end(&mut content)
             .map_err(|_| broken())?;
-        budget = budget
-            .checked_sub(content.len() as u64)
-            .ok_or_else(|| fault(ImportProblem::TooLarge(LARGEST >> 20)))?;
-        array(&mut source, &name, &content)?;
+        array(&mut source, budget, &name, &content)?;
+        budget.give(size);
     }
     if arrays == 0 {
         return Err(fault(ImportProblem::NoArrays));
@@ -47,7 +48,12 @@ pub(super) fn archive(bytes: &[u8]) -> Result<Source, DataError> {
     Ok(source)
 }
 
-fn array(source: &mut Source, name: &str, bytes: &[u8]) -> Result<(), DataError> {
+fn array(
+    source: &mut Source,
+    budget: &mut Budget,
+    name: &str,
+    bytes: &[u8],
+) -> Result<(), DataError> {
     let broken = || damaged("the header of an array");
     let bad = |why: &str| (name.to_owned(), why.to_owned());
     let byte = |at: usize| bytes.get(at).copied().map(usize::from);
@@ -97,6 +103,7 @@ fn array(source: &mut Source, name: &str, bytes: &[u8]) -> Result<(), DataError>
     if count == 0 {
         return Ok(());
     }
+    budget.take_array(name, count)?;
     let at = |row: usize, column: usize| -> f64 {
         let index = match shape.as_slice() {
             [rows, _] if fortran.starts_with("True") => column * rows + row,

@@ -1,5 +1,7 @@
 //! What can be wrong with a file that is to be imported, and what to do about it.
 
+use crate::memory::TooMuch;
+
 /// Kinds of fault of an import; each message ends with the remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -28,16 +30,33 @@ pub enum ImportProblem {
     /// Damaged or cut short.
     #[error("is damaged or cut short ({0}); copy or save it again")]
     Damaged(&'static str),
-    /// Beyond what is read at once.
+    /// Beyond the memory that may be used.
+    #[error(transparent)]
+    Memory(#[from] TooMuch),
+    /// More columns than any table has.
     #[error(
-        "holds more than {0} MB, more than is read at once; save fewer variables, or phase-average with `host-fit average`"
+        "the rows have {0} cells, and 16384 are the most (a spreadsheet's); a table has a row for each sample and a column for \
+         each signal: turn it over, or save fewer columns"
     )]
-    TooLarge(u64),
+    TooWide(usize),
     /// Nothing that could be a table of numbers.
     #[error(
         "no rows of numbers were found; a table needs a header line and rows of at least two numbers, separated by commas, semicolons, tabs or blanks"
     )]
     NoTable,
+    /// A line that is nearly a row of a table.
+    #[error(
+        "no rows of numbers were found; this line comes closest, but its cell `{0}` is no number, date, time or on/off word; correct it, or write a header line and rows of at least two numbers, separated by commas, semicolons, tabs or blanks"
+    )]
+    NearlyRow(String),
+    /// A cell of a column that is needed.
+    #[error("{}", unread(.0))]
+    Unread(String),
+    /// A command that is written on change only and has no first value.
+    #[error(
+        "the first value of u is missing, and what is written on change only needs one; write it into this cell"
+    )]
+    NoFirstCommand,
     /// A variable that was asked for is not there.
     #[error("no variable `{wanted}`; the file has {found}", wanted = .wanted, found = .found)]
     NoVariable {
@@ -89,9 +108,48 @@ pub enum ImportProblem {
     #[error("a channel cannot be named {0} here; leave it out, or rename it in the file")]
     ChannelName(String),
     /// A hold-out time outside the record.
-    #[error("--hold-out-from {0} s lies outside the record; give a time within it")]
-    SplitOutside(f64),
+    #[error(
+        "--hold-out-from {time} s lies outside the record, which goes from {from} to {to} s; give a time within it"
+    )]
+    SplitOutside {
+        /// The time asked for, s.
+        time: f64,
+        /// Time of the first sample, s.
+        from: f64,
+        /// Time of the last sample, s.
+        to: f64,
+    },
+    /// A folder that is a data set.
+    #[error(
+        "is a data set already; give it to the other commands as it is, or name the files to import"
+    )]
+    IsDataSet,
+    /// A folder without files to import.
+    #[error(
+        "the folder holds no .csv, .tsv, .txt, .dat, .log, .mat, .npy or .npz file; name the files to import"
+    )]
+    NothingInFolder,
+    /// The output is a data set already.
+    #[error("holds a data set already; name another folder with -o, or replace it with --force")]
+    ReplacesSet,
+    /// A file of the output is there already.
+    #[error("is there already; name another folder with -o, or replace the file with --force")]
+    ReplacesFile,
+    /// A file of the output is one of the files that are read.
+    #[error("is read and would be replaced by its own import; name another folder with -o")]
+    ReplacesSource,
     /// A data set that was not imported.
     #[error("holds no [record.from]: it was not made by `host-fit import`; name one that was")]
     NoMapping,
+}
+
+/// What a cell holds that cannot be read, and what to do.
+fn unread(text: &str) -> String {
+    if text.is_empty() {
+        return "the cell is empty; fill it in, or split the record there".to_owned();
+    }
+    format!(
+        "`{text}` is not a number, a date or time, or one of on/off, true/false, yes/no, open/closed; correct the cell, \
+         or split the file there"
+    )
 }

@@ -3,10 +3,48 @@
 use std::path::{Path, PathBuf};
 
 use super::problem::ImportProblem;
+use super::stamp::Stamped;
 use crate::error::{DataError, FilePlace, printable};
+use crate::memory;
 
-/// The most that is read of one file, also of what is packed inside it, bytes.
-pub(super) const LARGEST: u64 = 2 << 30;
+/// Bytes of memory that a column takes for each of its values, with its own copy in a record.
+pub(super) const VALUE: u64 = 16;
+
+/// The memory that reading takes so far.
+#[derive(Debug)]
+pub(super) struct Budget {
+    taken: u64,
+}
+
+impl Budget {
+    /// So much is taken before.
+    pub(super) fn with(taken: u64) -> Self {
+        Self { taken }
+    }
+
+    /// Takes more, before it is allocated.
+    pub(super) fn take(&mut self, bytes: u64, what: impl Fn() -> String) -> Result<(), DataError> {
+        const REMEDY: &str = "save fewer variables, or phase-average with `host-fit average`";
+        let taken = self.taken.saturating_add(bytes);
+        // Said only where it is needed.
+        if taken > memory::limit() {
+            memory::allow(taken, &what(), REMEDY).map_err(|error| fault(error.into()))?;
+        }
+        self.taken = taken;
+        Ok(())
+    }
+
+    /// Takes what an array with so many values takes.
+    pub(super) fn take_array(&mut self, name: &str, count: usize) -> Result<(), DataError> {
+        let bytes = (count as u64).saturating_mul(VALUE);
+        self.take(bytes, || format!("the array `{}`", printable(name)))
+    }
+
+    /// Gives back.
+    pub(super) fn give(&mut self, bytes: u64) {
+        self.taken = self.taken.saturating_sub(bytes);
+    }
+}
 
 /// How exactly the values of a variable stand in the file: what a time may be wrong by.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +65,38 @@ pub struct Variable {
     /// Its values.
     pub values: Vec<f64>,
     pub(super) exactness: Exactness,
+    /// Rows in which its cell is empty; their values are NaN.
+    pub(super) blanks: Vec<usize>,
+    /// What its cells are where they are dates or clock times.
+    pub(super) stamped: Option<Stamped>,
+    /// How its cells were understood, for the user.
+    pub(super) notes: Vec<String>,
+}
+
+/// A column of a text table with a cell that cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Unread {
+    pub(super) name: String,
+    /// Where the first such cell stands.
+    pub(super) line: u64,
+    /// What it holds.
+    pub(super) text: String,
+}
+
+impl Unread {
+    /// In words, for a column that is not needed.
+    pub(super) fn words(&self) -> String {
+        match self.text.is_empty() {
+            true => format!("its cell in line {} is empty", self.line),
+            false => format!("its cell in line {} reads `{}`", self.line, self.text),
+        }
+    }
+
+    /// The fault of a column of `file` that is needed.
+    pub(super) fn error(&self, file: &FilePlace) -> DataError {
+        let here = file.clone().at_line(self.line).in_column(&self.name);
+        here.error(ImportProblem::Unread(self.text.clone()).into())
+    }
 }
 
 /// A file's variables.
@@ -37,8 +107,12 @@ pub struct Source {
     pub variables: Vec<Variable>,
     /// Variables that hold no column of numbers: name and why.
     pub skipped: Vec<(String, String)>,
+    /// Columns of a text table that cannot be read.
+    pub(super) unread: Vec<Unread>,
     /// How the file was understood, in words.
     pub dialect: String,
+    /// Lines that were passed over, and notations that can be read in two ways.
+    pub(super) remarks: Vec<String>,
     /// The line of each sample; none for binary files.
     pub(super) lines: Vec<u64>,
 }
@@ -49,6 +123,8 @@ impl Source {
             path: PathBuf::new(),
             variables: Vec::new(),
             skipped: Vec::new(),
+            unread: Vec::new(),
+            remarks: Vec::new(),
             dialect: dialect.into(),
             lines: Vec::new(),
         }
@@ -80,6 +156,8 @@ impl Source {
         }
         let skipped = self.skipped.iter().take(MOST);
         list.extend(skipped.map(|(name, why)| format!("`{}` (unusable: {why})", printable(name))));
+        let unread = self.unread.iter().take(MOST);
+        list.extend(unread.map(|u| format!("`{}` (unusable: {})", printable(&u.name), u.words())));
         match list.is_empty() {
             true => "no variable at all".to_owned(),
             false => list.join(", "),
@@ -104,6 +182,9 @@ impl Source {
                 unit: None,
                 values,
                 exactness: Exactness::Relative(exactness),
+                blanks: Vec::new(),
+                stamped: None,
+                notes: Vec::new(),
             });
         };
         match (long.as_slice(), shape) {

@@ -6,7 +6,7 @@ use closed_loop::{
 };
 use firmware_sim::bench::{Disturbed, Lost};
 use firmware_sim::instrument::{Converter, Noise, NoiseSignal};
-use firmware_sim::plant::{BasePlant, FlowDelay, PlantSpec, Rig};
+use firmware_sim::plant::{BasePlant, FlowDelay, PlantSpec, Rig, SAMPLE_PERIOD_S as PERIOD_S};
 use host_fit::design::{TrackRequest, track};
 use host_fit::model::{Delay, Model, Track};
 use host_fit::ring::Ring;
@@ -45,7 +45,7 @@ impl Bench {
             separate_s: slower * drawn.separate_s,
             ..drawn
         };
-        let per_sample = |time_s: f64| (-0.001 / (0.9 * time_s)).exp();
+        let per_sample = |time_s: f64| (-PERIOD_S / (0.9 * time_s)).exp();
         let (attached, separated) = (per_sample(base.attach_s), per_sample(base.separate_s));
         let (floor, rise, rate) = match base.delay {
             FlowDelay::StateDependent {
@@ -148,10 +148,18 @@ impl Bench {
     fn floor(&self, goal: f64, switches_per_s: f64) -> Figures {
         let at = |frequency: f64| {
             let (mut low, mut high) = (0.0, 1.0);
-            let mut best = self.run(OpenLoop::square(frequency, 0.5, TIMES), goal, goal);
+            let mut best = self.run(
+                OpenLoop::square(frequency, 0.5, TIMES, PERIOD_S),
+                goal,
+                goal,
+            );
             for _ in 0..8 {
                 let duty = 0.5 * (low + high);
-                let figures = self.run(OpenLoop::square(frequency, duty, TIMES), goal, goal);
+                let figures = self.run(
+                    OpenLoop::square(frequency, duty, TIMES, PERIOD_S),
+                    goal,
+                    goal,
+                );
                 if figures.offset.abs() < best.offset.abs() {
                     best = figures;
                 }
@@ -188,7 +196,7 @@ impl Bench {
     }
 
     fn pulse_width(&self, gains: Gains, smith: bool) -> PulseWidth {
-        let controller = PulseWidth::new(gains, 20.0, TIMES);
+        let controller = PulseWidth::new(gains, 20.0, TIMES, PERIOD_S);
         if !smith {
             return controller;
         }
@@ -269,10 +277,10 @@ fn hold_closely(benches: &[Bench], level: f64) {
             Some(b.run(OpenLoop::steady(), g, g))
         }),
         ("open loop 4 Hz 50 %", |b, g| {
-            Some(b.run(OpenLoop::square(4.0, 0.5, TIMES), g, g))
+            Some(b.run(OpenLoop::square(4.0, 0.5, TIMES, PERIOD_S), g, g))
         }),
         ("open loop 4 Hz 80 %", |b, g| {
-            Some(b.run(OpenLoop::square(4.0, 0.8, TIMES), g, g))
+            Some(b.run(OpenLoop::square(4.0, 0.8, TIMES, PERIOD_S), g, g))
         }),
         ("relay, hysteresis +-0.02", |b, g| Some(b.relay(g))),
         ("the same, its reference trimmed", |b, g| {
@@ -308,10 +316,10 @@ fn hold_closely(benches: &[Bench], level: f64) {
 fn air_at_equal_mean(benches: &[Bench]) {
     let contenders: [(&str, Run); 6] = [
         ("open loop 4 Hz 50 %", |b, _| {
-            Some(b.run(OpenLoop::square(4.0, 0.5, TIMES), 0.0, 0.0))
+            Some(b.run(OpenLoop::square(4.0, 0.5, TIMES, PERIOD_S), 0.0, 0.0))
         }),
         ("open loop 4 Hz 80 %", |b, _| {
-            Some(b.run(OpenLoop::square(4.0, 0.8, TIMES), 0.0, 0.0))
+            Some(b.run(OpenLoop::square(4.0, 0.8, TIMES, PERIOD_S), 0.0, 0.0))
         }),
         ("relay at 0.5", |b, g| Some(b.relay(0.5 * g))),
         ("relay at 0.8", |b, g| Some(b.relay(0.8 * g))),

@@ -22,12 +22,18 @@ enum Task {
         /// This model instead of the usual cases.
         #[arg(long)]
         model: Option<PathBuf>,
+        /// Cases at these loop periods, s, instead of the usual ones.
+        #[arg(long, value_delimiter = ',', conflicts_with = "model")]
+        periods: Vec<f64>,
     },
     /// Runs the cases.
     Run {
         /// This model instead of the usual cases.
         #[arg(long)]
         model: Option<PathBuf>,
+        /// Cases at these loop periods, s, instead of the usual ones.
+        #[arg(long, value_delimiter = ',', conflicts_with = "model")]
+        periods: Vec<f64>,
         /// A board at this serial device; else the command behind `--` starts QEMU.
         #[arg(long)]
         serial: Option<String>,
@@ -51,9 +57,14 @@ enum Task {
 
 fn main() -> Result<()> {
     match Task::parse() {
-        Task::Constants { folder, model } => cases::write(&chosen(model)?, &folder),
+        Task::Constants {
+            folder,
+            model,
+            periods,
+        } => cases::write(&chosen(model, &periods)?, &folder),
         Task::Run {
             model,
+            periods,
             serial,
             steps,
             lose,
@@ -61,7 +72,7 @@ fn main() -> Result<()> {
             report,
             qemu,
         } => {
-            let mut cases = chosen(model)?;
+            let mut cases = chosen(model, &periods)?;
             for case in &mut cases {
                 case.steps = steps.unwrap_or(case.steps);
             }
@@ -80,9 +91,10 @@ fn main() -> Result<()> {
     }
 }
 
-fn chosen(model: Option<PathBuf>) -> Result<Vec<Case>> {
+fn chosen(model: Option<PathBuf>, periods_s: &[f64]) -> Result<Vec<Case>> {
     match model {
-        None => cases::all(),
+        None if periods_s.is_empty() => cases::all(),
+        None => cases::at(periods_s),
         Some(path) => Ok(vec![Case::new("on_board", Model::load(&path)?)]),
     }
 }

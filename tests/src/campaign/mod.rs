@@ -9,6 +9,7 @@ mod calibration;
 mod case;
 mod counts;
 mod ledger;
+pub mod literature;
 mod program;
 mod row;
 mod run;

@@ -275,6 +275,7 @@ fn guess(case: &Case, plan: &RigPlan) -> Option<Model> {
             averaged_model: false,
         },
         start: Start::Rest,
+        command: Default::default(),
         grading: model_core::recursion::Grading::Proportional,
         constant: 0.0,
         state_lags: vec![1],

@@ -5,7 +5,9 @@ use anyhow::{Context, Result};
 use host_fit::codegen::generate;
 use host_fit::design::{TrackRequest, track};
 use host_fit::model::{Law, Model};
+use host_fit::terms::Units;
 use host_fit::user_effect::Definition;
+use model_core::control::period::loop_period_us;
 use model_core::effect::{Place, Spec};
 use model_core::effects::{LAWS, NUISANCES, SPECS};
 use std::path::Path;
@@ -94,6 +96,74 @@ pub fn all() -> Result<Vec<Case>> {
     Ok(cases)
 }
 
+/// Cases at other loop periods: a relay, the tracking law alone and with an effect at each place, pulses, a user's own
+/// effects, all on a rig whose times are as much longer as the period is, and a model whose effects keep their times in
+/// seconds. The laws are designed anew at each period. Names end in the period in µs.
+///
+/// # Errors
+/// A bundled model file that cannot be read, a period that is no loop's, or no law for a model.
+pub fn at(periods_s: &[f64]) -> Result<Vec<Case>> {
+    // The boards' own model has this name.
+    let full = Model::from_toml(bundled!("full"), "full.toml")?;
+    let mut cases = vec![Case::new("full", full).short()];
+    for period_s in periods_s {
+        let us = loop_period_us(*period_s)
+            .with_context(|| format!("a sample every {period_s} s is no loop"))?;
+        for (name, model) in slower(*period_s)? {
+            cases.push(Case::new(&format!("{name}_{us}us"), model).short());
+        }
+    }
+    // As the board counts them.
+    cases.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(cases)
+}
+
+/// The models of [`at`] for one period.
+fn slower(period_s: f64) -> Result<Vec<(&'static str, Model)>> {
+    let read = |text, name| Model::from_toml(text, name).map_err(anyhow::Error::from);
+    let full = read(bundled!("full"), "full.toml")?;
+    let clock = Units {
+        time: period_s / full.sample_period_s,
+        ..Units::NONE
+    };
+    let on_clock = |model: &Model| Model {
+        // Not 0.0010000000000000002.
+        sample_period_s: period_s,
+        ..clock.model_out(model)
+    };
+    let base = Model {
+        law: None,
+        ..on_clock(&full)
+    };
+    let mut seconds = base.clone();
+    for name in [
+        "valve-lag",
+        "plenum-droop",
+        "hot-film-lag",
+        "vortex-shedding",
+    ] {
+        let spec = SPECS.iter().find(|spec| spec.name == name);
+        seconds = with_effect(
+            &seconds,
+            spec.with_context(|| format!("no effect `{name}`"))?,
+        );
+    }
+    Ok(vec![
+        ("relay", base),
+        ("seconds", seconds),
+        ("tracking", designed(on_clock(&full))?),
+        (
+            "effects",
+            designed(on_clock(&read(bundled!("effects"), "effects.toml")?))?,
+        ),
+        (
+            "pulses",
+            on_clock(&read(bundled!("averaged"), "averaged.toml")?),
+        ),
+        ("own", on_clock(&read(bundled!("own"), "own.toml")?)),
+    ])
+}
+
 /// Every effect and delay law that a model can have, those of base models among them.
 fn known() -> impl Iterator<Item = &'static Spec> {
     let effects = SPECS.iter().filter(|spec| spec.place != Place::Delay);
@@ -144,8 +214,8 @@ fn slightly_negative(base: &Model) -> Model {
 /// `model` with a law that holds half its friction.
 fn designed(mut model: Model) -> Result<Model> {
     let request = TrackRequest {
-        min_on_s: 0.02,
-        min_off_s: 0.02,
+        min_on_s: 20.0 * model.sample_period_s,
+        min_off_s: 20.0 * model.sample_period_s,
         ..TrackRequest::holding(0.5)
     };
     model.law = Some(Law::Track(track(&model, &request)?.law));
@@ -212,6 +282,18 @@ mod tests {
         for case in cases.iter().filter(|case| case.name.starts_with("effect_")) {
             assert_ne!(predictions(&case.model), bare, "{}", case.name);
         }
+    }
+
+    /// Effects that keep their times in seconds are other ones to a slower clock.
+    #[test]
+    fn effects_in_seconds_follow_the_clock() {
+        let cases = at(&[2e-4, 1e-3, 0.01, 0.1]).expect("cases");
+        let predicted = |us: u32| {
+            let name = format!("seconds_{us}us");
+            let case = cases.iter().find(|case| case.name == name);
+            predictions(&case.expect("a case").model)
+        };
+        assert_ne!(predicted(1000), predicted(10_000));
     }
 
     /// What is said of a board's memory before a build, against what the build takes.

@@ -69,6 +69,7 @@ where
     };
     let law: Driven<D, _, _, _, _, AHEAD> = Driven::new(design, prepared, at_rest, mean);
     let references: Vec<f32> = memory.references();
-    let mut controller: Controller<_> = armed(settings(&references), law);
+    let mut controller: Controller<_> =
+        armed(settings(&references, model.sample_period_s as f32), law);
     Box::new(move |counts, channel| step(&mut controller, counts, channel))
 }

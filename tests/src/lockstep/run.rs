@@ -21,7 +21,8 @@ pub struct Measured {
     pub friction: f64,
 }
 
-/// A rig with both sides of the bilinear class and the paper's delay law.
+/// A rig with both sides of the bilinear class and the paper's delay law. Its millisecond is a sample of the loop,
+/// whatever the loop's period: the delay is longer than a batch.
 fn plant() -> Result<Rig> {
     let base = BasePlant {
         attach_s: 0.055,

@@ -4,6 +4,7 @@
 mod bench;
 mod files;
 mod pictures;
+mod print;
 mod report;
 mod speed;
 mod terms;

@@ -198,7 +198,7 @@ fn the_experiment_that_tells_is_drawn_and_saved() {
         &mut b,
         &page,
         300,
-        "document.getElementById('work').hidden && document.querySelector('#missing h3')?.textContent.startsWith('The experiment that tells apart')",
+        "document.getElementById('work').hidden && document.querySelector('#missing h3')?.textContent.startsWith('Experiment that distinguishes')",
     );
     steps.done("diagnosed");
     act(

@@ -1,4 +1,5 @@
 use super::*;
+use crate::intake::{LARGEST, LARGEST_FILE};
 use axum::body::{Body, to_bytes};
 use axum::http::{Method, Request};
 use proptest::prelude::*;

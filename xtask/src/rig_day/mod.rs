@@ -7,7 +7,7 @@ mod picture;
 
 use crate::Task;
 use crate::firmware::Chosen;
-use crate::shell::{cargo, root, run, target};
+use crate::shell::{program, root, target};
 use anyhow::{Context, Result, bail, ensure};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -104,13 +104,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         watched: [seconds, learn],
         law,
     } = form;
-    run(&mut cargo(&[
-        "build",
-        "--release",
-        "--quiet",
-        "--package",
-        "host-fit",
-    ]))?;
+    let program = program()?.get_program().into();
     let folder = target().join("rig-day");
     if folder.exists() {
         std::fs::remove_dir_all(&folder)?;
@@ -118,7 +112,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
     std::fs::create_dir_all(folder.join("commands"))?;
     let mut day = Day {
         folder,
-        program: target().join("release/host-fit"),
+        program,
         page: String::new(),
         started: Instant::now(),
         times: Vec::new(),
@@ -235,7 +229,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         day.quietly(&words(&["simulate", &model, &record, "-o", &run]))?;
     }
 
-    day.say("## 4. The law before and after the effect was known\n\nThe same goal for both models. A law is also tried on plants with effects that this rig was not found to have; where one of them loses attachment, only `--force` writes the law. The firmware is built with model and rig, and refuses a rig that contradicts the model.");
+    day.say("## 4. The law before and after the effect was known\n\nThe same goal for both models. Each law is tried on its model and on every flow that the records leave possible; these decide. Effects at their worst, which the records exclude, are tried as well and warn. The firmware is built with model and rig, and refuses a rig that contradicts the model.");
     let mut rms = Vec::new();
     for (name, model) in [("before", "model.toml"), ("after", "better.toml")] {
         let controlled = format!("{name}.toml");
@@ -244,6 +238,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
             &words(&[
                 "design",
                 model,
+                "set",
                 "-o",
                 &controlled,
                 "--target",
@@ -254,7 +249,6 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
                 "0.02",
                 "--rig",
                 "rig.toml",
-                "--force",
             ]),
         )?;
         day.firmware(name, Some(&controlled), true)?;

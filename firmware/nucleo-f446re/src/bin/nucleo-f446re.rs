@@ -15,12 +15,8 @@ use stm32f4xx_hal::pac::{CorePeripherals, Peripherals};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-/// The watchdog's patience: 20 samples, 20 ms at least; its own clock may be 50 % off.
-const PATIENCE_MS: u32 = if on_board::PERIOD_US > 1000 {
-    20 * on_board::PERIOD_US / 1000
-} else {
-    20
-};
+/// The watchdog's patience; its own clock may be 50 % off.
+const PATIENCE_MS: u32 = on_board::PATIENCE_US.div_ceil(1000);
 
 #[entry]
 fn main() -> ! {

@@ -33,8 +33,8 @@ use wire::Outbox;
 const TICKS_PER_SAMPLE: u32 = 25 * on_board::PERIOD_US;
 /// Instructions, at 32 ns each.
 const TWO_AND_A_HALF_PERIODS: u32 = TICKS_PER_SAMPLE / 2 * 5 * 40 / 32;
-/// The watchdog waits twice 10 samples.
-const PATIENCE: u32 = 10 * TICKS_PER_SAMPLE;
+/// The watchdog waits twice so many ticks.
+const PATIENCE: u32 = 25 * on_board::PATIENCE_US / 2;
 
 /// What is to be damaged at the next start; RAM survives a restart.
 #[unsafe(link_section = ".uninit.damage")]

@@ -83,7 +83,14 @@ fn main() -> ! {
     let mut outbox = Outbox::new();
     loop {
         to_rig.send(&[valve.get().into()]);
-        let [button, low, mixed, high] = core::array::from_fn(|_| to_rig.wait());
+        // A real line brings a hundred bytes in a long period: here they come while the board waits for the rig.
+        let [button, low, mixed, high] = core::array::from_fn(|_| {
+            to_rig.wait_beside(|| {
+                if let Some(byte) = line.receive() {
+                    desk.receive(byte, rig.controller(), &mut outbox);
+                }
+            })
+        });
         if button == PRESSED {
             cortex_m::peripheral::SCB::sys_reset();
         }

@@ -13,10 +13,6 @@ use wire::reply::{Answer, Phase, Reply, Status};
 use wire::request::{Ask, Request, checksum};
 use wire::samples::{Sample, Samples};
 
-const BOARD: super::Board = super::Board {
-    period_us: 1000,
-    model: full::CHECKSUM,
-};
 const US: u32 = 11;
 
 /// A board on the table: what it is told, and what came of it.
@@ -39,11 +35,19 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
+        Self::every(1000)
+    }
+
+    /// A board with a sample every `period_us`.
+    fn every(period_us: u32) -> Self {
         let model = full::model();
         let law = Driven::new(RELAY, model, full::state(&model), MovingAverage::new());
         Self {
             controller: Controller::new(SETTINGS, law),
-            desk: Desk::new(BOARD),
+            desk: Desk::new(super::Board {
+                period_us,
+                model: full::CHECKSUM,
+            }),
             outbox: Outbox::new(),
             line: 11,
             receiver: Receiver::new(),
@@ -320,6 +324,47 @@ fn the_line_is_the_operators_again_after_frames() {
     bench.text.clear();
     bench.run(20, false);
     assert!(bench.text.starts_with(b"disarmed"), "{:?}", bench.text);
+}
+
+/// A host that dies is lost after half a second, or ten samples where those are longer, at any period.
+#[test]
+fn a_dead_host_is_lost_after_a_time_and_not_after_samples() {
+    for (period_us, samples) in [(200, 2500), (1000, 500), (10_000, 50), (100_000, 10)] {
+        let mut bench = Bench::every(period_us);
+        bench.line = 1 << 10;
+        bench.play(&[0, 100_000, 10], 1);
+        bench.run(samples - 1, false);
+        assert!(bench.controller.is_open(), "{period_us}");
+        bench.run(1, false);
+        let mode = bench.controller.mode();
+        assert_eq!(mode, Mode::Faulted(Fault::Link), "{period_us}");
+    }
+}
+
+/// What is streamed is on its way after a tenth of a second, however few samples those are.
+#[test]
+fn no_sample_of_the_stream_waits_longer_than_a_tenth_of_a_second() {
+    for (period_us, waiting) in [
+        (200, 24),
+        (1000, 24),
+        (10_000, 10),
+        (50_000, 2),
+        (100_000, 1),
+    ] {
+        let mut bench = Bench::every(period_us);
+        bench.line = 1 << 10;
+        bench.play(&[0, 100, 10], 1);
+        let mut most = 0;
+        for k in 1..100 {
+            if k % 5 == 0 {
+                bench.ask(US, Ask::Alive);
+            }
+            bench.run(1, false);
+            most = most.max(k - bench.samples.len());
+        }
+        // The frame goes out with its last sample.
+        assert_eq!(most, waiting - 1, "{period_us}");
+    }
 }
 
 /// Whatever comes over the line, the valve is open only while somebody has armed

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{Words, lines};
-use host_fit::delay::{EdgeDelay, Spread};
+use host_fit::delay::{DeadTime, DelayMethod, DelayStudy, DelayVerdict, EdgeDelay, Spread};
 use host_fit::steps::DelayReport;
 
 impl Words for DelayReport {
@@ -16,22 +16,27 @@ impl Words for DelayReport {
 
 fn study_words(report: &DelayReport) -> String {
     let study = &report.study;
+    let period = report.sample_period_s;
     let mut text = String::new();
     // Writing to a String cannot fail.
     let _ = writeln!(
         text,
-        "{:<12} {:>16} {:>16}  not measured",
+        "Delays in samples of {period} s: mean ± standard error (edges measured)"
+    );
+    let _ = writeln!(
+        text,
+        "{:<12} {:>18} {:>18}  not measured",
         "record", "rising", "falling"
     );
     for name in &report.records {
         let of: Vec<&EdgeDelay> = study.edges.iter().filter(|e| e.record == *name).collect();
         let side = |rising: bool| -> String {
-            let delays: Vec<f64> = of
-                .iter()
-                .filter(|e| e.edge.rising == rising)
-                .filter_map(|e| Some(e.onset.ok()?.delay))
+            let mine = of.iter().filter(|e| e.edge.rising == rising);
+            let delays: Vec<(f64, f64)> = mine
+                .filter_map(|e| e.onset.ok())
+                .map(|o| (o.delay, o.standard_error))
                 .collect();
-            spread_words(&delays)
+            mean_words(&delays)
         };
         let mut reasons: Vec<(&str, usize)> = Vec::new();
         for reason in of.iter().filter_map(|e| e.onset.err()) {
@@ -43,7 +48,7 @@ fn study_words(report: &DelayReport) -> String {
         let reasons: Vec<String> = reasons.iter().map(|(r, n)| format!("{n} {r}")).collect();
         let _ = writeln!(
             text,
-            "{:<12} {:>16} {:>16}  {}",
+            "{:<12} {:>18} {:>18}  {}",
             name,
             side(true),
             side(false),
@@ -54,35 +59,21 @@ fn study_words(report: &DelayReport) -> String {
             }
         );
     }
-    if let Some(law) = &study.law {
-        let _ = writeln!(
-            text,
-            "law (2): h = p0 + p1·exp(−p2·ỹ), {} edges, residual {:.2} samples, explains {:.0} %",
-            law.edges,
-            law.residual_sd,
-            100.0 * law.explained
-        );
-        for (name, e) in [("p0", law.p0), ("p1", law.p1), ("p2", law.p2)] {
-            let _ = writeln!(
-                text,
-                "  {name} = {:.3}  (95 %: {:.3} … {:.3})",
-                e.value, e.low, e.high
-            );
-        }
-        if !law.outliers.is_empty() {
-            let _ = writeln!(text, "  {} edge(s) far off set aside", law.outliers.len());
-        }
-    }
+    text.push_str(&dead_time_words(study, period));
+    law_words(&mut text, study);
     if let Some(s) = &study.statistics {
         let r = |r: Option<f64>| r.map_or_else(|| "n/a".into(), |r| format!("{r:.2}"));
-        let _ = writeln!(
-            text,
-            "edges: mean {:.2}, sd {:.2} samples; correlation with the command {}, with ỹ {}",
-            s.all.mean,
-            s.all.sd,
-            r(s.correlation_input),
-            r(s.correlation_output)
-        );
+        if s.all.count > 1 {
+            let _ = writeln!(
+                text,
+                "edges: mean {:.2}, scatter {:.2} samples ({:.4} s); correlation with the command {}, with ỹ {}",
+                s.all.mean,
+                s.all.sd,
+                s.all.sd * period,
+                r(s.correlation_input),
+                r(s.correlation_output)
+            );
+        }
         if let Some(q) = &s.sequence {
             let Spread { mean, sd, .. } = q.spread;
             let _ = writeln!(
@@ -97,12 +88,117 @@ fn study_words(report: &DelayReport) -> String {
     text
 }
 
-fn spread_words(delays: &[f64]) -> String {
+/// The dead time of all edges with its interval, in both units, and where it comes from.
+fn dead_time_words(study: &DelayStudy, period: f64) -> String {
+    let mut text = String::new();
+    let both = |time: DeadTime| {
+        let seconds = time.scaled(period);
+        format!(
+            "{:.1} samples (95 %: {:.1} … {:.1}) = {} s (95 %: {} … {})",
+            time.samples,
+            time.low,
+            time.high,
+            brief(seconds.samples),
+            brief(seconds.low),
+            brief(seconds.high)
+        )
+    };
+    let Some(dead_time) = study.dead_time else {
+        text.push_str("Dead time: no response to an edge was found in the identify records.\n");
+        return text;
+    };
+    let _ = writeln!(text, "Dead time: {}", both(dead_time));
+    let how = match (study.plant, study.method) {
+        (Some(plant), DelayMethod::Trajectory) => {
+            let (on, off) = (plant.time_constants_on, plant.time_constants_off);
+            let order = if plant.order == 1 {
+                "first order"
+            } else {
+                "second order"
+            };
+            let sum = if (on - off).abs() < 1e-6 * on {
+                format!("{on:.1} samples, {} s", brief(on * period))
+            } else {
+                format!(
+                    "{on:.1} samples with the command on, {off:.1} off ({} and {} s)",
+                    brief(on * period),
+                    brief(off * period)
+                )
+            };
+            format!(
+                "from {}, {order} (sum of time constants {sum}); the interval covers both orders",
+                study.method.words()
+            )
+        }
+        (_, DelayMethod::Window) => format!(
+            "from {}; one plant with one dead time does not describe the records",
+            study.method.words()
+        ),
+        _ => format!(
+            "from {}; one plant does not describe the records. The interval covers other choices of --reach ({} samples, {} s, here)",
+            study.method.words(),
+            study.reach,
+            brief(study.reach as f64 * period)
+        ),
+    };
+    let _ = writeln!(text, "  {how}");
+    if let (Some(rising), Some(falling)) = (study.rising, study.falling)
+        && (rising.high < falling.low || falling.high < rising.low)
+    {
+        let _ = writeln!(text, "  rising edges: {}", both(rising));
+        let _ = writeln!(text, "  falling edges: {}", both(falling));
+    }
+    text
+}
+
+fn law_words(text: &mut String, study: &DelayStudy) {
+    if let Some(law) = &study.law {
+        let _ = writeln!(
+            text,
+            "law (2): h = p0 + p1·exp(−p2·ỹ), {} edges, residual {:.2} samples, explains {:.0} %",
+            law.edges,
+            law.residual_sd,
+            100.0 * law.explained
+        );
+        for (name, e, unit) in [
+            ("p0", law.p0, "samples"),
+            ("p1", law.p1, "samples"),
+            ("p2", law.p2, "1/unit of y"),
+        ] {
+            let _ = writeln!(
+                text,
+                "  {name} = {:.3} {unit}  (95 %: {:.3} … {:.3})",
+                e.value, e.low, e.high
+            );
+        }
+        if !law.outliers.is_empty() {
+            let _ = writeln!(text, "  {} edge(s) far off set aside", law.outliers.len());
+        }
+    } else if let Some(reason) = &study.law_not_kept {
+        let otherwise = match study.verdict {
+            DelayVerdict::EdgeDependent | DelayVerdict::EdgeAndStateDependent => "",
+            _ => " The delay is constant.",
+        };
+        let _ = writeln!(text, "law (2) is not kept: {reason}.{otherwise}");
+    }
+}
+
+/// Three significant figures.
+fn brief(value: f64) -> String {
+    host_fit::picture::significant(value, 3)
+}
+
+/// Mean and standard error of some delays, each with its own standard error; never 0: edges share a clock.
+fn mean_words(delays: &[(f64, f64)]) -> String {
     if delays.is_empty() {
         return "–".into();
     }
     let n = delays.len() as f64;
-    let mean = delays.iter().sum::<f64>() / n;
-    let sd = (delays.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)).sqrt();
-    format!("{mean:.1} ± {sd:.1} ({})", delays.len())
+    let mean = delays.iter().map(|d| d.0).sum::<f64>() / n;
+    let scatter = delays.iter().map(|d| (d.0 - mean).powi(2)).sum::<f64>();
+    let scatter = (scatter / (n - 1.0).max(1.0) / n).sqrt();
+    // What the edges share is in every one of their errors.
+    let shared = delays.iter().map(|d| d.1).fold(f64::INFINITY, f64::min);
+    let error = scatter.max(shared).max(0.1);
+    format!("{mean:.1} ± {error:.1} ({})", delays.len())
 }

@@ -1,15 +1,16 @@
 //! A control law in words.
 
 use super::Words;
-use closed_loop::Figures;
-use host_fit::design::{Optimum, Proof, RULES, TrackDesign};
+use closed_loop::{Figures, span};
+use host_fit::design::{Case, CaseGroup, Margin, Optimum, Proof, RULES, TrackDesign, judged};
 use host_fit::steps::{Design, DesignOutcome};
 
 impl Words for Design {
     fn words(&self) -> String {
+        let period_s = self.model.sample_period_s;
         match &self.outcome {
-            DesignOutcome::Track(design) => track_words(design),
-            DesignOutcome::Maximise(optimum) => optimum_words(optimum),
+            DesignOutcome::Track(design) => track_words(design, period_s),
+            DesignOutcome::Maximise(optimum) => optimum_words(optimum, period_s),
         }
     }
 }
@@ -20,19 +21,39 @@ impl Words for Proof {
     }
 }
 
-fn track_words(design: &TrackDesign) -> String {
+/// So many samples as a time, ms, without the digits that a product of decimals adds.
+fn milliseconds(samples: f64, period_s: f64) -> f64 {
+    (1e6 * samples * period_s).round() / 1e3
+}
+
+/// How long a run of so many samples is, in words: whole minutes, else seconds.
+fn duration(samples: usize, period_s: f64) -> String {
+    let seconds = 1e-3 * milliseconds(span(samples, period_s) as f64, period_s);
+    let minutes = seconds / 60.0;
+    if minutes == 4.0 {
+        "four minutes".to_owned()
+    } else if minutes >= 10.0 {
+        format!("{minutes:.0} minutes")
+    } else {
+        format!("{seconds} s")
+    }
+}
+
+fn track_words(design: &TrackDesign, period_s: f64) -> String {
     let law = &design.law;
+    let ms = |samples: u32| milliseconds(samples.into(), period_s);
     let mut text = format!(
         "holds {} of the interval ({:.3}, {:.3}); duty {:.3} on the model, u_eq = {:.3}\n\
-         shortest times {} ms open, {} ms closed; looks up to {} ms ahead",
-        law.reference,
-        law.reachable[0],
-        law.reachable[1],
+         shortest times {} ms open, {} ms closed; looks up to {} ms ahead{}",
+        design.target,
+        design.reachable[0],
+        design.reachable[1],
         design.duty,
         design.equivalent_duty,
-        law.hold.on,
-        law.hold.off,
-        law.look_ahead
+        ms(law.hold.on),
+        ms(law.hold.off),
+        ms(law.look_ahead.into()),
+        every(period_s)
     );
     for remark in &design.remarks {
         text.push_str("\nnote: ");
@@ -41,39 +62,55 @@ fn track_words(design: &TrackDesign) -> String {
     text
 }
 
-fn optimum_words(optimum: &Optimum) -> String {
+/// The loop's period; the usual one is not said.
+fn every(period_s: f64) -> String {
+    let period = milliseconds(1.0, period_s);
+    if period == 1.0 {
+        String::new()
+    } else {
+        format!("; a sample every {period} ms")
+    }
+}
+
+fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
     let law = &optimum.law;
+    let ms = |samples: u32| milliseconds(samples.into(), period_s);
     let mut text = if law.period == 1 {
-        format!("best: steady blowing, mean friction {:.3}", optimum.mean)
+        format!("best: steady blowing, mean y {:.3}", optimum.mean)
     } else {
         let pulses: Vec<String> = law
             .pulses
             .iter()
-            .map(|(first, length)| format!("{length} ms from {first} ms"))
+            .map(|(first, length)| format!("{} ms from {} ms", ms(*length), ms(*first)))
             .collect();
         format!(
-            "best: period {} ms, open {}; mean friction {:.3} with {:.1} % of the air ({} under steady blowing)",
-            law.period,
+            "best: period {} ms, open {}; mean y {:.3} with {:.1} % of the air ({} under steady blowing){}",
+            ms(law.period),
             pulses.join(" and "),
             optimum.mean,
             100.0 * optimum.duty,
             optimum
                 .steady_mean
-                .map_or("the model grows".to_owned(), |mean| format!("{mean:.3}"))
+                .map_or("the model diverges".to_owned(), |mean| format!("{mean:.3}")),
+            every(period_s)
         )
     };
     text.push_str(&format!(
-        "\nafter four minutes {:.3}; with the period 2 % off {:.3}; pole moduli {:.5} closed, {:.5} open",
-        optimum.mean_after_minutes, optimum.mean_detuned, optimum.moduli[0], optimum.moduli[1]
+        "\nafter {} {:.3}; with the period 2 % off {:.3}; pole moduli {:.5} closed, {:.5} open",
+        duration(RULES.long_until, period_s),
+        optimum.mean_after_minutes,
+        optimum.mean_detuned,
+        optimum.moduli[0],
+        optimum.moduli[1]
     ));
     if optimum.mean_detuned < 0.9 * optimum.mean {
         text.push_str(
-            "\nnote: a sharp resonance of the model; try it on the rig before relying on it",
+            "\nnote: the optimum sits on a sharp resonance of the model; try it on the rig first",
         );
     }
     if let Some(mean) = optimum.refused_mean {
         text.push_str(&format!(
-            "\nrefused: {} pulse trains that looked better (up to {mean:.3}) but grow in a long run: instabilities of the model",
+            "\nrejected: {} pulse trains with a higher mean (up to {mean:.3}) that diverge in a long run: instabilities of the model",
             optimum.refused
         ));
     }
@@ -87,9 +124,9 @@ fn optimum_words(optimum: &Optimum) -> String {
             100.0 * planned.duty,
             planned.steady_value,
             match planned.cycle_s {
-                None => "planning again and again, the valve comes to rest or the model grows".to_owned(),
+                None => "replanned, the valve comes to rest or the model diverges".to_owned(),
                 Some(cycle_s) => format!(
-                    "planning again and again runs into a cycle of {:.0} ms ({:.0} % of it irregular), tried with the others",
+                    "replanned, it ends in a cycle of {:.0} ms ({:.0} % of it irregular), which was tried with the others",
                     1000.0 * cycle_s,
                     100.0 * planned.irregular
                 ),
@@ -97,20 +134,58 @@ fn optimum_words(optimum: &Optimum) -> String {
         ));
     }
     match &optimum.outside {
-        None => text.push_str("\nnote: the model file says nothing of what was recorded; the optimum may be an extrapolation"),
-        Some(outside) if outside.is_inside() => text.push_str("\ninside what was recorded"),
+        None => text.push_str("\nnote: the model file has no training envelope; the optimum may be an extrapolation"),
+        Some(outside) if outside.is_inside() => text.push_str("\ninside the training envelope"),
         Some(outside) => text.push_str(&format!(
-            "\noutside what was recorded: friction by {:.3}, duty by {:.3}, on-times by a factor {:.2}",
+            "\noutside the training envelope: y by {:.3}, duty by {:.3}, on-times by a factor {:.2}",
             outside.friction, outside.duty, outside.on_time_factor
         )),
     }
     text
 }
 
+impl Words for Margin {
+    fn words(&self) -> String {
+        let percent = |share: f64, open: bool| {
+            let sign = if share < 0.0 { "−" } else { "+" };
+            let beyond = if open { " or more" } else { "" };
+            format!("{sign}{:.0}{beyond}", (100.0 * share.abs()).floor())
+        };
+        let each = self.intervals.iter().map(|interval| {
+            let [low, high] = interval.open;
+            format!(
+                "{} {} … {} %",
+                interval.error,
+                percent(interval.low, low),
+                percent(interval.high, high)
+            )
+        });
+        format!(
+            "robustness margin, one error at a time: {}. Inside it attachment is kept and the rms error stays below twice {:.3}",
+            each.collect::<Vec<_>>().join(", "),
+            self.rms
+        )
+    }
+}
+
+/// How likely a case is, in a few letters.
+fn likelihood(case: &Case) -> String {
+    match (case.group, case.p_value) {
+        (CaseGroup::Model, _) => "model".to_owned(),
+        (CaseGroup::Unseen, _) => "unseen".to_owned(),
+        (_, Some(p)) => format!("p {p:.3}"),
+        (_, None) => "stress".to_owned(),
+    }
+}
+
 fn case_table(proof: &Proof) -> String {
+    let period_s = proof.trace.sample_period_s;
+    let [from, until] = [RULES.trial_from, RULES.trial]
+        .map(|n| 1e-3 * milliseconds(span(n, period_s) as f64, period_s));
     let mut text = format!(
-        "{:<44} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>7} {:>6}  attachment",
-        "in the loop, from 4 s to 12 s",
+        "{:<44} {:>7} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>7} {:>6}  attachment",
+        format!("in the loop, from {from} s to {until} s"),
+        "likely",
         "mean",
         "rms",
         "offset",
@@ -120,35 +195,28 @@ fn case_table(proof: &Proof) -> String {
         "settle",
         "steady"
     );
-    let mut line = |name: &str, f: &Figures, steady: Option<f64>, kept: Option<bool>| {
+    let mut line = |name: &str, likely: &str, f: &Figures, rest: [&str; 2]| {
         let settling = f
             .settling_s
             .map_or("never".to_owned(), |s| format!("{s:.2} s"));
-        let steady = steady.map_or(String::new(), |s| format!("{s:.3}"));
-        let kept = match kept {
-            Some(true) => "kept",
-            Some(false) => "LOST",
-            None => "",
-        };
         let name: String = name.chars().take(44).collect();
+        let [steady, kept] = rest;
         text.push_str(&format!(
-            "\n{name:<44} {:>6.3} {:>6.3} {:>+7.3} {:>6.3} {:>6.1} {:>6.3} {settling:>7} {steady:>6}  {kept}",
+            "\n{name:<44} {likely:>7} {:>6.3} {:>6.3} {:>+7.3} {:>6.3} {:>6.1} {:>6.3} {settling:>7} {steady:>6}  {kept}",
             f.mean, f.rms, f.offset, f.peak_to_peak, f.switches_per_s, f.air
         ));
     };
     for case in &proof.cases {
+        let kept = if case.kept { "kept" } else { "LOST" };
+        let steady = format!("{:.3}", case.steady);
         line(
             &case.name,
+            &likelihood(case),
             &case.figures,
-            Some(case.steady),
-            Some(case.kept),
+            [&steady, kept],
         );
     }
-    line(
-        proof.compared_name,
-        &Figures::of(&proof.compared, RULES.trial_from),
-        None,
-        None,
-    );
+    line(proof.compared_name, "", &judged(&proof.compared), ["", ""]);
+    text.push_str("\nCases `model` and `p` (one-sided p-value on the records) decide. Cases `unseen` (excluded by the records, but too small for a diagnosis) and `stress` (outside the records) only warn");
     text
 }

@@ -1,20 +1,22 @@
 //! A diagnosis in words.
 
 use super::{Words, aligned, lines, short};
-use host_fit::diagnose::{ParameterEstimate, Ranked, Rung};
+use host_fit::diagnose::{Diagnosis, ParameterEstimate, RULES, Ranked, Rung};
 use host_fit::residual::Failures;
 use host_fit::steps::{Finding, Terms};
+use model_core::effects::spec;
 
 impl Words for Finding {
     fn words(&self) -> String {
-        let mut told = vec![self.headline.clone(), self.meaning.clone()];
+        let mut told = vec![self.answer.words()];
+        told.push(format!("\n{}", ladder_table(&self.diagnosis.ladder)));
+        if !self.diagnosis.ranking.is_empty() {
+            told.push(format!("\n{}", ranking_table(&self.diagnosis)));
+        }
+        told.push("\nwhere the model fails".to_owned());
         told.extend(self.failures.iter().flat_map(Failures::describe));
         told.extend(self.unstable.clone());
         told.extend(self.detectable.iter().map(|d| format!("  {}", d.words)));
-        told.push(format!("\n{}", ladder_table(&self.diagnosis.ladder)));
-        if !self.diagnosis.ranking.is_empty() {
-            told.push(format!("\n{}", ranking_table(&self.diagnosis.ranking)));
-        }
         if !self.diagnosis.not_tried.is_empty() {
             told.push("\nnot tried".to_owned());
             let each = self.diagnosis.not_tried.iter();
@@ -26,7 +28,7 @@ impl Words for Finding {
 
 impl Words for Terms {
     fn words(&self) -> String {
-        let mut told = vec![self.headline.clone(), self.meaning.clone()];
+        let mut told = vec![self.answer.words()];
         told.push(format!("\n{}", ladder_table(&self.discovery.ladder)));
         for term in &self.discovery.terms {
             let head = [
@@ -51,7 +53,7 @@ impl Words for Terms {
     }
 }
 
-pub(in super::super) fn ladder_rows(ladder: &[Rung]) -> Vec<Vec<String>> {
+pub(crate) fn ladder_rows(ladder: &[Rung]) -> Vec<Vec<String>> {
     let row = |rung: &Rung| {
         vec![
             rung.step.clone(),
@@ -64,73 +66,121 @@ pub(in super::super) fn ladder_rows(ladder: &[Rung]) -> Vec<Vec<String>> {
     ladder.iter().map(row).collect()
 }
 
-/// The ladder of held-out errors as an aligned table.
-pub(crate) fn ladder_table(ladder: &[Rung]) -> String {
-    let head = ["held-out error, step by step", "RMSE", "FIT %", "noise"];
+/// The ladder of validation errors as an aligned table.
+fn ladder_table(ladder: &[Rung]) -> String {
+    let head = ["validation error, step by step", "RMSE", "FIT %", "noise"];
     aligned(&head, &ladder_rows(ladder), 1)
 }
 
-/// `name = value unit (low … high)`.
-fn estimate_words(name: &str, p: &ParameterEstimate) -> String {
+/// `name value unit (low … high)`, or that the records do not identify it: its interval spans its whole range, or a
+/// factor of more than a hundred.
+fn estimate_words(effect: &str, name: &str, p: &ParameterEstimate) -> String {
+    const FACTOR: f64 = 100.0;
     let unit = if p.unit == "-" { "" } else { p.unit.as_str() };
     let space = if unit.is_empty() { "" } else { " " };
-    format!(
-        "{name} {}{space}{unit} ({} … {})",
-        short(p.value),
-        short(p.low),
-        short(p.high)
-    )
+    let card = spec(effect).and_then(|s| s.parameters.iter().find(|card| card.name == name));
+    let wide = p.low > 0.0 && p.high > FACTOR * p.low;
+    let whole = card.is_some_and(|card| {
+        let dimensionless = p.unit == "-";
+        dimensionless && p.low <= card.low && p.high >= card.high
+    });
+    let known = p.low.is_finite() && p.high.is_finite() && !wide && !whole;
+    let interval = match known {
+        true => format!("{} … {}", short(p.low), short(p.high)),
+        false => "not identifiable".to_owned(),
+    };
+    format!("{name} {}{space}{unit} ({interval})", short(p.value))
 }
 
-pub(in super::super) fn ranking_rows(ranked: &[Ranked]) -> Vec<Vec<String>> {
+/// A share in percent with one decimal; never "−0.0".
+fn percent(value: f64) -> String {
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    let rounded = (10.0 * value).round() / 10.0;
+    let sign = if rounded < 0.0 { "−" } else { "" };
+    format!("{sign}{:.1} %", rounded.abs())
+}
+
+/// What became of a candidate, with the reason.
+fn outcome(r: &Ranked, diagnosis: &Diagnosis) -> String {
+    if diagnosis.missing.contains(&r.effect) {
+        return "named".to_owned();
+    }
+    if diagnosis.stand_ins.contains(&r.effect) {
+        return "surrogate".to_owned();
+    }
+    let set = diagnosis.sets.iter().find(|set| set.contains(&r.effect));
+    if let Some(first) = set.and_then(|set| set.first()) {
+        return format!("not distinguishable from {first}");
+    }
+    if !r.refitted {
+        return "screened only".to_owned();
+    }
+    if r.p_value > RULES.level {
+        return "not significant".to_owned();
+    }
+    if !r.significant {
+        return "below the practical margin".to_owned();
+    }
+    match diagnosis.missing.as_slice() {
+        [] => "significant, but explains too little".to_owned(),
+        named => format!("imitates {}", named.join(" and ")),
+    }
+}
+
+/// The candidates, the named ones first: effect, outcome, fall of the error, what chance alone reaches, p, parameters.
+pub(crate) fn ranking_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     let row = |r: &Ranked| {
+        // Parameters of a candidate that does nothing say nothing.
+        let telling = r.significant || diagnosis.missing.contains(&r.effect);
         let parameters: Vec<String> = r
             .parameters
             .iter()
-            .map(|(name, p)| estimate_words(name, p))
+            .filter(|_| telling)
+            .map(|(name, p)| estimate_words(&r.effect, name, p))
             .collect();
-        let mut said = parameters.join(", ");
-        if !r.confounded_with.is_empty() {
-            said.push_str(&format!("; or {}", r.confounded_with.join(", ")));
-        }
         vec![
             r.effect.clone(),
-            if r.significant { "yes" } else { "no" }.to_owned(),
-            format!("{:.1} %", r.error_reduction_percent),
-            format!("{:.1} %", r.by_chance_percent),
-            format!("{:.3}", r.p_value),
-            said,
+            outcome(r, diagnosis),
+            percent(r.error_reduction_percent),
+            percent(r.by_chance_percent),
+            if r.refitted {
+                format!("{:.3}", r.p_value)
+            } else {
+                "–".to_owned()
+            },
+            parameters.join(", "),
         ]
     };
-    ranked.iter().map(row).collect()
+    named_first(diagnosis).into_iter().map(row).collect()
 }
 
-fn ranking_table(ranked: &[Ranked]) -> String {
-    // Parameters of effects that do nothing say nothing.
-    let shown = ranking_rows(ranked)
-        .into_iter()
-        .zip(ranked)
-        .map(|(mut row, entry)| {
-            if !entry.significant
-                && let Some(last) = row.last_mut()
-            {
-                last.clear();
-            }
-            row.swap(4, 5);
-            let parameters = row.remove(4);
-            row.push(parameters);
-            row
-        })
-        .collect::<Vec<_>>();
+/// The ranking with the named effects first, then the surrogates, then the rest, each in their order.
+pub(crate) fn named_first(diagnosis: &Diagnosis) -> Vec<&Ranked> {
+    let mut all: Vec<&Ranked> = diagnosis.ranking.iter().collect();
+    all.sort_by_key(|r| {
+        let named = diagnosis.missing.iter().position(|name| *name == r.effect);
+        let surrogate = diagnosis.stand_ins.contains(&r.effect);
+        match (named, surrogate) {
+            (Some(place), _) => place,
+            (None, true) => diagnosis.missing.len(),
+            (None, false) => diagnosis.missing.len() + 1,
+        }
+    });
+    all
+}
+
+fn ranking_table(diagnosis: &Diagnosis) -> String {
     let head = [
-        "each effect alone",
-        "counts",
+        "each candidate alone",
+        "outcome",
         "error falls",
-        "by chance",
+        "5 % level",
         "p",
         "parameters (95 % interval)",
     ];
-    aligned_last_left(&head, &shown)
+    aligned_last_left(&head, &ranking_rows(diagnosis))
 }
 
 /// As [`aligned`], with words in the last column.
@@ -140,7 +190,7 @@ fn aligned_last_left(head: &[&str], rows: &[Vec<String>]) -> String {
         .iter()
         .map(|row| row.iter().take(cut).cloned().collect())
         .collect();
-    let table = aligned(head.get(..cut).unwrap_or(head), &numbers, 1);
+    let table = aligned(head.get(..cut).unwrap_or(head), &numbers, 2);
     let last = head
         .last()
         .map(|cell| (*cell).to_owned())

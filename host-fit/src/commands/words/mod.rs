@@ -4,8 +4,7 @@ mod delay;
 mod design;
 mod finding;
 
-pub(crate) use finding::ladder_table;
-pub(super) use finding::{ladder_rows, ranking_rows};
+pub(crate) use finding::{ladder_rows, named_first, ranking_rows};
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -18,8 +17,8 @@ use host_fit::model::{Delay, Law, Model, TransportLaw};
 use host_fit::picture::significant;
 use host_fit::rules::Rulebook;
 use host_fit::steps::{
-    Average, BoardConstants, Comparison, EffectEntry, Extension, Identification, ImportedSet,
-    Simulation,
+    Average, Beside, BoardConstants, Comparison, EffectEntry, Extension, Identification,
+    ImportedSet, NamedComparison, SideBySide, Simulation,
 };
 
 use model_core::effect::Unit;
@@ -49,13 +48,14 @@ impl Words for ImportedSet {
             let taken = &file.mapping;
             let time = match &taken.t {
                 Some(t) => format!("t is `{t}`"),
-                None => format!("{} s per sample", self.sample_period_s),
+                None => "t is the row".to_owned(),
             };
             let mut text = format!(
-                "{}: {}, {} samples; {time}, u is `{}`, y is `{}`",
+                "{}: {}; {} samples, {} s apart; {time}, u is `{}`, y is `{}`",
                 file.name,
                 file.dialect,
                 file.samples,
+                file.sample_period_s,
                 name(&taken.u),
                 name(&taken.y),
             );
@@ -64,7 +64,14 @@ impl Words for ImportedSet {
             }
             text
         });
-        lines(each.chain([format!("hash {}", self.hash)]))
+        let period = self.sample_period_s;
+        let rate: f64 = format!("{:.3e}", 1.0 / period)
+            .parse()
+            .unwrap_or(1.0 / period);
+        let rate = format!("sampling period {period} s ({rate} Hz)");
+        let remarks = self.remarks.iter().cloned();
+        let end = [rate].into_iter().chain(remarks);
+        lines(each.chain(end).chain([format!("hash {}", self.hash)]))
     }
 }
 
@@ -107,6 +114,8 @@ impl Words for AverageSummary {
 impl Words for Identification {
     fn words(&self) -> String {
         let mut told = vec![
+            self.answer.words(),
+            String::new(),
             describe(&self.model),
             format!(
                 "state lags {:?}, product lags {:?}",
@@ -124,8 +133,21 @@ impl Words for Identification {
         told.extend(self.refinement.as_ref().map(refinement_words));
         told.extend(self.remarks.iter().cloned());
         told.push(table(&self.scores));
+        told.extend(beside_words(&self.beside));
         lines(told)
     }
+}
+
+/// The baselines, and which samples were scored.
+fn beside_words(beside: &Beside) -> Vec<String> {
+    let mut told = beside.words.clone();
+    if beside.scored_samples < beside.samples {
+        told.push(format!(
+            "{} of {} samples are scored",
+            beside.scored_samples, beside.samples
+        ));
+    }
+    told
 }
 
 fn refinement_words(refinement: &Refinement) -> String {
@@ -135,7 +157,7 @@ fn refinement_words(refinement: &Refinement) -> String {
         pair(refinement.identify)
     );
     if let Some(validate) = refinement.validate {
-        text.push_str(&format!(", held-out ε {}", pair(validate)));
+        text.push_str(&format!(", validation ε {}", pair(validate)));
     }
     text.push_str(if refinement.kept {
         "; kept"
@@ -147,16 +169,67 @@ fn refinement_words(refinement: &Refinement) -> String {
 
 impl Words for Comparison {
     fn words(&self) -> String {
-        let table = std::iter::once(table(&self.scores));
-        lines(table.chain(self.words.iter().cloned()))
+        let table = [format!("{}\n", self.answer.words()), table(&self.scores)].into_iter();
+        let beside = beside_words(&self.beside).into_iter();
+        lines(table.chain(beside).chain(self.words.iter().cloned()))
     }
+}
+
+impl Words for SideBySide {
+    fn words(&self) -> String {
+        let rows: Vec<Vec<String>> = side_by_side_rows(self);
+        let table = aligned(&SIDE_BY_SIDE, &rows, 1);
+        let baselines = self.models.first();
+        let beside = baselines
+            .into_iter()
+            .flat_map(|m| beside_words(&m.comparison.beside));
+        let answer = format!("{}\n", self.answer.words());
+        lines([answer, table].into_iter().chain(beside))
+    }
+}
+
+/// The head of [`side_by_side_rows`].
+pub(crate) const SIDE_BY_SIDE: [&str; 7] = [
+    "model",
+    "FIT %, estimation",
+    "FIT %, validation",
+    "RMSE",
+    "noise",
+    "RMSE / noise",
+    "parameters",
+];
+
+/// A row for each model; errors are those of the validation records where there are any.
+pub(crate) fn side_by_side_rows(found: &SideBySide) -> Vec<Vec<String>> {
+    let none = || "–".to_owned();
+    let row = |named: &NamedComparison| {
+        let scores = &named.comparison.scores;
+        let fit =
+            |of: Option<&Indicators>| of.map_or_else(none, |of| format!("{:.2}", of.fit_percent));
+        let judged = scores.held_out();
+        let noise = judged.and_then(|of| of.noise_rmse);
+        let ratio = judged.zip(noise).filter(|(_, noise)| *noise > 0.0);
+        vec![
+            named.model.clone(),
+            fit(scores.identify.as_ref()),
+            fit(scores.validate.as_ref()),
+            judged.map_or_else(none, |of| format!("{:.5}", of.rmse)),
+            noise.map_or_else(none, |noise| format!("{noise:.5}")),
+            ratio.map_or_else(none, |(of, noise)| format!("{:.2}", of.rmse / noise)),
+            named.parameters.to_string(),
+        ]
+    };
+    found.models.iter().map(row).collect()
 }
 
 impl Words for Extension {
     fn words(&self) -> String {
-        let mut told = vec![describe(&self.model)];
+        let mut told = vec![self.answer.words(), String::new(), describe(&self.model)];
         if self.dropped_lags {
-            told.push("the leanest structure (one lag each) with the effect fits as well as the given one: it is kept".to_owned());
+            told.push(
+                "With the effect, one lag of each kind fits equally well, so the model has fewer lags than the given one."
+                    .to_owned(),
+            );
         }
         if !self.parameters.is_empty() {
             told.push(parameter_table(&self.parameters));
@@ -182,7 +255,7 @@ fn parameter_table(parameters: &BTreeMap<String, ParameterEstimate>) -> String {
     aligned(&["parameter", "unit", "value", "95 % interval"], &rows, 2)
 }
 
-/// RMSE before → after → noise floor, record by record, the held-out ones and all together.
+/// RMSE before → after → noise level, record by record and together.
 fn changes(before: Option<&Scores>, after: &Scores) -> String {
     let row = |name: &str, before: Option<&Indicators>, after: &Indicators| {
         vec![
@@ -218,7 +291,7 @@ fn changes(before: Option<&Scores>, after: &Scores) -> String {
             "RMSE before",
             "",
             "RMSE after",
-            "noise floor",
+            "noise level",
         ],
         &rows,
         2,
@@ -274,6 +347,14 @@ impl Words for EffectEntry {
             self.summary.to_owned(),
             self.equation.to_owned(),
         ];
+        let parts = [
+            ("records show", self.shows.as_deref()),
+            ("bench check", self.check),
+            ("confused with", self.confused_with),
+        ];
+        for (label, text) in parts {
+            told.extend(text.map(|text| format!("{label}: {text}")));
+        }
         if let Some(channel) = self.channel {
             told.push(format!("needs the measured channel `{channel}`"));
         }
@@ -367,7 +448,8 @@ fn law_in_words(law: &TransportLaw) -> String {
         };
         words = words.replacen("{}", &value, 1);
     }
-    words
+    // A negative coefficient after a plus.
+    words.replace("+ −", "− ")
 }
 
 const HEAD: [&str; 8] = [

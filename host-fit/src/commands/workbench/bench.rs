@@ -9,13 +9,13 @@ use host_fit::model::Model;
 use host_fit::picture::{Ladder, LadderStep, ladder, packed, workbench_page};
 use host_fit::steps::{self, Comparison, ImportedSet};
 use serde_json::{Value, json};
-use workbench::{Bench, Download, Node, Project, Refusal, Work};
+use workbench::{Bench, Download, Node, Project, Refusal, Work, beneath};
 
 use super::data::{Data, Uploads};
 use super::own::OwnEffects;
 use super::request::Line;
-use crate::commands::page;
 use crate::commands::words::{describe, score_rows};
+use crate::commands::{page, paragraph};
 
 /// A project, the data set, and the models that are made of it.
 pub(super) struct ModelBench {
@@ -58,7 +58,7 @@ const BODY: &str = include_str!("page.html");
 impl ModelBench {
     /// Opens the project in `folder` on a data set; without one, on the one that was imported into the project, if any.
     pub(super) fn open(dataset: Option<&Path>, folder: &Path) -> anyhow::Result<Self> {
-        let imported = folder.join(super::IMPORTED);
+        let imported = beneath(folder, Path::new(super::IMPORTED))?;
         let path = match dataset {
             Some(path) => Some(path.to_owned()),
             None => imported.exists().then_some(imported),
@@ -82,7 +82,10 @@ impl ModelBench {
         let known = {
             let project = lock(&self.project);
             let mut nodes = project.nodes().iter();
-            let same = |node: &&Node| Model::load(&project.path(node)).is_ok_and(|m| m == model);
+            let same = |node: &&Node| {
+                let path = project.path(node);
+                path.is_ok_and(|path| Model::load(&path).is_ok_and(|m| m == model))
+            };
             nodes.find(same).map(|node| node.id)
         };
         match known {
@@ -110,9 +113,9 @@ impl ModelBench {
     pub(super) fn take(&self, found: &ImportedSet, command: &str) -> Result<(), Refusal> {
         // Models of another data set are in the way; that is to be known before anything is written.
         lock(&self.project).set_data(&found.hash)?;
-        let folder = self.folder.join(super::IMPORTED);
+        let folder = beneath(&self.folder, Path::new(super::IMPORTED))?;
         found.imported.save(&folder)?;
-        let data = Data::load(&folder).map_err(|e| Refusal(format!("{e:#}")))?;
+        let data = Data::load(&folder).map_err(|e| Refusal(paragraph(&e)))?;
         *lock(&self.data) = Some(Arc::new(data));
         Ok(lock(&self.project).note(command)?)
     }
@@ -124,7 +127,8 @@ impl ModelBench {
         let finite = |value: f64| value.is_finite().then_some(value);
         let mut project = lock(&self.project);
         let file = project.next_file();
-        made.model.save(&project.folder().join(&file))?;
+        made.model
+            .save(&beneath(project.folder(), Path::new(&file))?)?;
         let id = project.add(Node {
             id: 0,
             parent: made.from,
@@ -172,7 +176,7 @@ impl ModelBench {
     /// Where a model's file lies.
     pub(super) fn path(&self, id: u32) -> Result<PathBuf, Refusal> {
         let project = lock(&self.project);
-        Ok(project.path(project.node(id)?))
+        Ok(project.path(project.node(id)?)?)
     }
 
     /// A model with its free runs.
@@ -188,18 +192,19 @@ impl ModelBench {
     }
 
     /// A file beside a model: what came of a step on it.
-    pub(super) fn beside(&self, what: &str, id: u32, ending: &str) -> PathBuf {
-        self.folder.join(format!("{what}-{id}.{ending}"))
+    pub(super) fn beside(&self, what: &str, id: u32, ending: &str) -> Result<PathBuf, Refusal> {
+        let name = format!("{what}-{id}.{ending}");
+        Ok(beneath(&self.folder, Path::new(&name))?)
     }
 
     /// What was kept of a step on a model; none where it was not done.
     fn kept(&self, what: &str, id: Option<u32>) -> Value {
-        let read = id.and_then(|id| std::fs::read(self.beside(what, id, "json")).ok());
+        let read = id.and_then(|id| std::fs::read(self.beside(what, id, "json").ok()?).ok());
         let read = read.and_then(|text| serde_json::from_slice(&text).ok());
         read.unwrap_or_default()
     }
 
-    /// The held-out error from the first model of a branch to this one.
+    /// The validation error from the first model of a branch to this one.
     fn ladder(&self, id: u32) -> String {
         let project = lock(&self.project);
         let mut path = Vec::new();
@@ -220,7 +225,7 @@ impl ModelBench {
             })
             .collect();
         ladder(&Ladder {
-            title: "Held-out error, step by step",
+            title: "Validation error, step by step",
             y_unit: "y",
             steps: &steps,
             records: &[],
@@ -350,7 +355,7 @@ impl Bench for ModelBench {
         let path = self.path(model)?;
         let written = |what: &str, name: String, kind: &'static str| {
             let ending = name.rsplit('.').next().unwrap_or_default();
-            let content = std::fs::read(self.beside(what, model, ending));
+            let content = std::fs::read(self.beside(what, model, ending)?);
             let content = content.map_err(|_| Refusal(format!("model {model} has no {what}")))?;
             Ok(Download {
                 name,

@@ -7,7 +7,7 @@ use host_fit::data::{DataSet, Record};
 use host_fit::excitation::Excitation;
 use host_fit::output::write_atomic;
 use serde_json::{Value, json};
-use workbench::Refusal;
+use workbench::{Refusal, beneath};
 
 use crate::commands::words::role_name;
 
@@ -48,9 +48,17 @@ impl Data {
 /// The files that were uploaded into a project.
 pub(super) struct Uploads(PathBuf);
 
+/// Their folder in the project.
+const UPLOADS: &str = "uploads";
+
 impl Uploads {
     pub(super) fn of(project: &Path) -> Self {
-        Self(project.join("uploads"))
+        Self(project.join(UPLOADS))
+    }
+
+    /// The project.
+    fn project(&self) -> &Path {
+        self.0.parent().unwrap_or(&self.0)
     }
 
     /// Names of the files, sorted.
@@ -68,7 +76,7 @@ impl Uploads {
         }
     }
 
-    /// Keeps a file and tells what is in it; one that cannot be read is not kept.
+    /// Keeps a file and tells what is in it; one that cannot be read is not kept, and leaves the one of its name alone.
     pub(super) fn keep(&self, name: &str, bytes: &[u8]) -> Result<Value, Refusal> {
         let plain = |c: char| c.is_alphanumeric() || "-_. +()".contains(c);
         if name.is_empty() || name.len() > 120 || name.starts_with('.') || !name.chars().all(plain)
@@ -76,29 +84,30 @@ impl Uploads {
             let why = "a file's name may have letters, digits, spaces and -_.+(); rename it";
             return Err(Refusal(why.to_owned()));
         }
+        let path = beneath(self.project(), &Path::new(UPLOADS).join(name))?;
+        let source = Source::read(&path, bytes)?;
         std::fs::create_dir_all(&self.0)?;
-        let path = self.0.join(name);
         write_atomic(&path, |out| out.write_all(bytes))?;
-        let told = self.inspect(name);
-        if told.is_err() {
-            std::fs::remove_file(path)?;
-        }
-        told
+        Ok(told(name, &source))
     }
 
     /// The variables of a file.
     pub(super) fn inspect(&self, name: &str) -> Result<Value, Refusal> {
-        let source = Source::open(&self.path(name)?)?;
-        let variables = source.variables.iter();
-        let told =
-            variables.map(|v| json!({"name": v.name, "unit": v.unit, "samples": v.values.len()}));
-        Ok(json!({
-            "name": name,
-            "dialect": source.dialect,
-            "variables": told.collect::<Vec<_>>(),
-            "skipped": source.skipped,
-        }))
+        Ok(told(name, &Source::open(&self.path(name)?)?))
     }
+}
+
+/// What is in a file.
+fn told(name: &str, source: &Source) -> Value {
+    let variables = source.variables.iter();
+    let told =
+        variables.map(|v| json!({"name": v.name, "unit": v.unit, "samples": v.values.len()}));
+    json!({
+        "name": name,
+        "dialect": source.dialect,
+        "variables": told.collect::<Vec<_>>(),
+        "skipped": source.skipped,
+    })
 }
 
 #[cfg(test)]
@@ -125,8 +134,33 @@ mod tests {
         }
         let told = uploads.keep("Messung 1.csv", csv).unwrap();
         assert_eq!(told["variables"][1]["name"], "u");
-        assert!(uploads.keep("notes.csv", b"no table").is_err());
+        for name in ["notes.csv", "Messung 1.csv"] {
+            assert!(uploads.keep(name, b"no table").is_err());
+        }
+        assert_eq!(
+            std::fs::read(uploads.path("Messung 1.csv").unwrap()).unwrap(),
+            csv
+        );
         assert_eq!(uploads.names(), ["Messung 1.csv"]);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_among_the_uploads_lead_nowhere() {
+        use std::os::unix::fs::symlink;
+        let (folder, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let uploads = Uploads::of(folder.path());
+        let csv = b"t,u,y\n0.0,0,0.1\n0.001,1,0.2\n";
+        uploads.keep("run.csv", csv).unwrap();
+        let victim = other.path().join("victim.csv");
+        std::fs::write(&victim, csv).unwrap();
+        symlink(&victim, folder.path().join("uploads/link.csv")).unwrap();
+        assert!(uploads.keep("link.csv", csv).is_err() && uploads.inspect("link.csv").is_err());
+        assert_eq!(uploads.names(), ["run.csv"]);
+        std::fs::remove_dir_all(folder.path().join("uploads")).unwrap();
+        symlink(other.path(), folder.path().join("uploads")).unwrap();
+        assert!(uploads.keep("new.csv", csv).is_err() && uploads.names().is_empty());
+        assert_eq!(std::fs::read_dir(other.path()).unwrap().count(), 1);
     }
 }

@@ -9,10 +9,10 @@ mod task;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use super::Console;
+use super::{Console, threads};
 use bench::ModelBench;
 
-/// Serve a page on this machine: import recordings, see them, identify, compare, find what is missing, add it, design a law.
+/// Serve a page on this machine: import recordings, see them, identify, compare, diagnose, extend, design a law.
 ///
 /// The page is served on 127.0.0.1 alone, to whoever has the address that is printed. Whatever is done there is kept in
 /// the project folder: models that every other command reads, the tree of how they came about, the log of commands.
@@ -37,6 +37,7 @@ pub(crate) struct Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
+    threads::needed("the workbench")?;
     let project = match (&args.project, &args.dataset) {
         (Some(folder), _) => folder.clone(),
         (None, Some(dataset)) => named_by(dataset)?,
@@ -48,7 +49,9 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     }
     workbench::serve(bench, args.port, |address| {
         let told = match console.json {
-            true => console.document(&serde_json::json!({"address": address, "project": project})),
+            true => console.document(
+                &serde_json::json!({"address": address, "project": project.to_string_lossy()}),
+            ),
             false => console.say(&format!(
                 "the workbench is at {address}\nproject folder {}; Ctrl-C ends it, nothing is lost",
                 project.display()
@@ -77,9 +80,13 @@ fn named_by(dataset: &Path) -> anyhow::Result<PathBuf> {
 /// The data set within a project that was imported into it.
 const IMPORTED: &str = "data";
 
-/// The files of a folder whose names end so, sorted; none where there is no folder.
+/// The files of a folder whose names end so, sorted; none where there is no folder. Links are none: they may lead
+/// out of the project.
 fn names_in(folder: &Path, ending: &str) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_link = std::fs::symlink_metadata(folder).is_ok_and(|found| found.is_symlink());
+    let entries = (!is_link).then(|| std::fs::read_dir(folder));
+    let entries = entries.into_iter().flatten().flatten().flatten();
+    let entries = entries.filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_file()));
     let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
     let mut names: Vec<String> = names.filter(|name| name.ends_with(ending)).collect();
     names.sort();

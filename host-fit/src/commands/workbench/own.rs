@@ -5,14 +5,17 @@ use std::path::{Path, PathBuf};
 use host_fit::output::write_atomic;
 use host_fit::user_effect::Definition;
 use serde_json::{Value, json};
-use workbench::Refusal;
+use workbench::{Refusal, beneath};
 
 /// The effect files of a project.
 pub(super) struct OwnEffects(PathBuf);
 
+/// Their folder in the project.
+const EFFECTS: &str = "effects";
+
 impl OwnEffects {
     pub(super) fn of(project: &Path) -> Self {
-        Self(project.join("effects"))
+        Self(project.join(EFFECTS))
     }
 
     /// The files, sorted by name.
@@ -37,10 +40,8 @@ impl OwnEffects {
 
     /// What a text is: the effect's name, or what is wrong with it and where.
     pub(super) fn check(text: &str) -> Value {
-        match Definition::from_toml(text, "the effect") {
-            Ok(definition) => {
-                json!({"name": definition.spec().name, "summary": definition.spec().summary})
-            }
+        match Definition::check(text, "the effect") {
+            Ok(source) => json!({"name": source.name, "summary": source.summary}),
             Err(error) => {
                 let at = error.place_in(text);
                 json!({"error": error.to_string(), "line": at.map(|at| at.0), "column": at.map(|at| at.1)})
@@ -50,9 +51,11 @@ impl OwnEffects {
 
     /// Keeps a text as the file of its effect.
     pub(super) fn keep(&self, text: &str) -> Result<Value, Refusal> {
-        let name = Definition::from_toml(text, "the effect")?.spec().name;
+        let name = Definition::check(text, "the effect")?.name;
+        let project = self.0.parent().unwrap_or(&self.0);
+        let path = beneath(project, &Path::new(EFFECTS).join(format!("{name}.toml")))?;
         std::fs::create_dir_all(&self.0)?;
-        write_atomic(&self.file(name), |out| out.write_all(text.as_bytes()))?;
+        write_atomic(&path, |out| out.write_all(text.as_bytes()))?;
         Ok(json!({"name": name}))
     }
 

@@ -76,12 +76,14 @@ impl Command {
                 "channel",
                 "graded",
                 "hold-out-from",
+                "ignore-time",
                 "no-channels",
                 "period",
                 "t",
                 "t-scale",
                 "title",
                 "u",
+                "u-before",
                 "u-offset",
                 "u-scale",
                 "u-threshold",
@@ -233,7 +235,6 @@ mod tests {
         let (from, set) = (PathBuf::from("a.toml"), PathBuf::from("my set"));
         let files = match request.command {
             Command::Identify => vec![set],
-            Command::Design => vec![from],
             _ => vec![from, set],
         };
         Ok(Line::new(request.command, &files, request.options()).file("output", "b.toml".as_ref()))
@@ -252,7 +253,7 @@ mod tests {
         let asked = line(asked).unwrap();
         assert_eq!(
             asked.text(),
-            "host-fit design a.toml --least-air --target=-0.5 --output=b.toml"
+            "host-fit design a.toml 'my set' --least-air --target=-0.5 --output=b.toml"
         );
         assert!(asked.parse::<design::Args>().is_ok());
     }

@@ -10,12 +10,13 @@ use host_fit::output::write_atomic;
 use host_fit::search::Snapshot;
 use host_fit::steps::{self, Finding, Onlooker, Terms};
 use serde_json::{Value, json};
-use workbench::{Refusal, Work};
+use workbench::{Refusal, Work, beneath};
 
 use super::bench::{Made, ModelBench, lock};
 use super::data::Data;
 use super::request::{Command, Line, Request};
-use crate::commands::words::Words;
+use crate::commands::paragraph;
+use crate::commands::words::{Words, ranking_rows};
 use crate::commands::{design, diagnose, discover, drawings, extend, identify, import, page};
 
 /// A piece of work that can be begun.
@@ -104,7 +105,7 @@ impl Onlooker for Page<'_> {
 
 #[allow(clippy::needless_pass_by_value)]
 fn told(error: anyhow::Error) -> Refusal {
-    Refusal(format!("{error:#}"))
+    Refusal(paragraph(&error))
 }
 
 impl ModelBench {
@@ -115,8 +116,7 @@ impl ModelBench {
         let from = request.model.unwrap_or_default();
         let files: Vec<PathBuf> = match command {
             Command::Identify => vec![self.data()?.path.clone()],
-            Command::Design => vec![self.path(from)?],
-            Command::Diagnose | Command::Discover | Command::Extend => {
+            Command::Design | Command::Diagnose | Command::Discover | Command::Extend => {
                 vec![self.path(from)?, self.data()?.path.clone()]
             }
             Command::Import => {
@@ -133,12 +133,12 @@ impl ModelBench {
             Command::Identify | Command::Extend | Command::Import => line.file("output", &to),
             Command::Design => line.file("output", &to).file("csv", &loop_of(&to)),
             Command::Discover => {
-                let report = self.beside("discovery", from, "html");
+                let report = self.beside("discovery", from, "html")?;
                 line.file("output", &to).file("report", &report)
             }
             Command::Diagnose => line
-                .file("report", &self.beside("diagnosis", from, "html"))
-                .file("experiment", &self.beside("experiment", from, "csv")),
+                .file("report", &self.beside("diagnosis", from, "html")?)
+                .file("experiment", &self.beside("experiment", from, "csv")?),
         };
         let (line, asked) = match command {
             Command::Identify => {
@@ -204,8 +204,9 @@ impl Task {
         bench.forget_best();
         match &self.asked {
             Asked::Identify(args) => {
-                let request = args.request().map_err(told)?;
-                let found = steps::identify(&bench.data()?.set, &request, &page)?;
+                let data = bench.data()?;
+                let request = args.request(data.set.sample_period_s).map_err(told)?;
+                let found = steps::identify(&data.set, &request, &page)?;
                 found.remarks.iter().for_each(|remark| work.warning(remark));
                 self.made(bench, &found.model, "identified", None)?;
             }
@@ -230,8 +231,9 @@ impl Task {
             }
             Asked::Design(args) => {
                 page.begins("designing, and trying the law in the loop");
-                let tried = args.tried(&self.model(bench)?).map_err(told)?;
-                let refused = tried.refused("the box “keep it even if a trial loses attachment”");
+                let (model, data) = (self.model(bench)?, bench.data()?);
+                let tried = args.tried(&model, Some(&data.set)).map_err(told)?;
+                let refused = tried.refused("the box “keep it even if attachment is lost”");
                 if let Some(refused) = refused.filter(|_| !args.force()) {
                     return Err(Refusal(refused));
                 }
@@ -242,15 +244,16 @@ impl Task {
                     Some(self.from),
                 )?;
                 let words = tried.words();
-                let mut picture = None;
-                if let Some(proof) = &tried.proof {
-                    let drawn = drawings::proof_picture(proof, args.tracks());
-                    write(&args.picture(), &drawn)?;
-                    write(&bench.beside("loop", id, "csv"), &proof.trace.to_csv())?;
-                    picture = Some(drawn);
-                }
+                let picture = drawings::proof_picture(&tried.proof, args.tracks());
+                let drawn_to = args.picture();
+                let name = drawn_to.file_name().unwrap_or_default();
+                write(&beneath(&bench.folder, Path::new(name))?, &picture)?;
+                write(
+                    &bench.beside("loop", id, "csv")?,
+                    &tried.proof.trace.to_csv(),
+                )?;
                 let kept = json!({"words": words, "picture": picture});
-                write(&bench.beside("law", id, "json"), &kept.to_string())?;
+                write(&bench.beside("law", id, "json")?, &kept.to_string())?;
             }
             Asked::Import(args) => {
                 page.begins("reading the files");
@@ -259,6 +262,7 @@ impl Task {
                     let remarks = file.remarks.iter();
                     remarks.for_each(|remark| work.warning(&format!("{}: {remark}", file.name)));
                 }
+                found.remarks.iter().for_each(|remark| work.warning(remark));
                 bench.take(&found, &self.line.text())?;
             }
         }
@@ -301,23 +305,27 @@ impl Task {
             args.options().seed,
             &self.line.text(),
         );
-        write(&bench.beside("diagnosis", self.from, "html"), &report)?;
+        write(&bench.beside("diagnosis", self.from, "html")?, &report)?;
         let mut kept = serde_json::to_value(found)?;
         let separation = found.diagnosis.separation.as_ref();
         if let Some(separation) = separation {
-            let path = bench.beside("experiment", self.from, "csv");
+            let path = bench.beside("experiment", self.from, "csv")?;
             separation.experiment.write_csv(&path)?;
         }
         if let Some(kept) = kept.as_object_mut() {
-            kept.insert("headline".to_owned(), found.headline.clone().into());
-            kept.insert("meaning".to_owned(), found.meaning.clone().into());
+            let outcomes = ranking_rows(&found.diagnosis).into_iter();
+            let outcomes = outcomes.filter_map(|row| {
+                let mut cells = row.into_iter();
+                Some((cells.next()?, Value::from(cells.next()?)))
+            });
+            kept.insert("outcomes".to_owned(), Value::Object(outcomes.collect()));
             let picture = page::ranking_picture(&found.diagnosis);
             kept.insert("picture".to_owned(), picture.into());
             let experiment = separation.map(drawings::experiment_picture);
             kept.insert("experiment_picture".to_owned(), experiment.into());
         }
         write(
-            &bench.beside("diagnosis", self.from, "json"),
+            &bench.beside("diagnosis", self.from, "json")?,
             &kept.to_string(),
         )?;
         Ok(lock(&bench.project).note(&self.line.text())?)
@@ -339,7 +347,7 @@ impl Task {
             None => self.line.clone(),
         };
         let report = page::discovery(given, &data.set, found, &line.text());
-        write(&bench.beside("discovery", self.from, "html"), &report)?;
+        write(&bench.beside("discovery", self.from, "html")?, &report)?;
         let told: Vec<Value> = terms
             .iter()
             .map(|term| {
@@ -353,9 +361,9 @@ impl Task {
                 })
             })
             .collect();
-        let kept = json!({"headline": found.headline, "meaning": found.meaning, "terms": told});
+        let kept = json!({"answer": found.answer, "terms": told});
         write(
-            &bench.beside("discovery", self.from, "json"),
+            &bench.beside("discovery", self.from, "json")?,
             &kept.to_string(),
         )?;
         if terms.is_empty() {

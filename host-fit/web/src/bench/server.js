@@ -3,7 +3,8 @@
 /**
  * @typedef {{id: number, parent: number | null, step: string, command: string, rmse: number | null, noise_rmse: number | null, fit_percent: number | null}} Model
  * @typedef {{effect: string, error_reduction_percent: number, p_value: number, significant: boolean, refitted: boolean, parameters: Record<string, {value: number, unit: string, low: number, high: number}>, confounded_with: string[]}} Candidate
- * @typedef {{headline: string, meaning: string, missing: string[], ranking: Candidate[], picture: string, experiment: {description: string, separation_sigmas: number, effects: string[]} | null, experiment_picture: string | null}} Diagnosis
+ * @typedef {{tone: string, verdict: string, evidence: string, confidence: string, next: string, notes: string[]}} Answer
+ * @typedef {{answer: Answer, outcomes: Record<string, string>, missing: string[], ranking: Candidate[], picture: string, experiment: {description: string, separation_sigmas: number, effects: string[]} | null, experiment_picture: string | null}} Diagnosis
  * @typedef {{effect: string, title: string, formula: string, is_formula: boolean, picture: string, file: string}} Term
  * @typedef {object} State
  * @property {{title: string, path: string, hash: string, period: number, records: {name: string, use: string, samples: number}[], remarks: string[]} | null} data
@@ -15,7 +16,7 @@
  * @property {{name: string, text: string}[]} own
  * @property {{describe: string, effects: string[], columns: string[], rows: string[][], where: string[], where_picture: string, ladder_picture: string, error: string | null} | null} model
  * @property {Diagnosis | null} diagnosis
- * @property {{headline: string, meaning: string, terms: Term[]} | null} discovery
+ * @property {{answer: Answer, terms: Term[]} | null} discovery
  * @property {{words: string, picture: string | null} | null} law
  * @property {{name: string, now: string, best: [number, number][]} | null} work
  */

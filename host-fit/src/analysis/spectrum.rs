@@ -1,0 +1,101 @@
+//! Power spectral density of residuals.
+
+use super::Residuals;
+use realfft::RealFftPlanner;
+use std::f64::consts::TAU;
+
+/// One-sided power spectral densities, in the unit of y squared per Hz. Their integrals over frequency are mean squares.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Spectrum {
+    /// Frequencies, Hz.
+    pub hz: Vec<f64>,
+    /// Of the residual y − ŷ.
+    pub residual: Vec<f64>,
+    /// Of the measured output about its mean.
+    pub output: Vec<f64>,
+    /// Of white noise with the standard error `y_sd`; none without it.
+    pub noise: Option<f64>,
+}
+
+/// Longest segment, samples.
+const LONGEST: usize = 4096;
+
+/// Welch's estimate: segments of a quarter of the shortest record (at most 4096 samples), half overlapping, Hann window.
+#[must_use]
+pub fn spectrum(residuals: &Residuals) -> Spectrum {
+    let shortest = residuals.e.iter().map(Vec::len).min().unwrap_or(0);
+    let length = (shortest / 4).min(LONGEST);
+    if length < 32 || residuals.period_s.is_nan() || residuals.period_s <= 0.0 {
+        return Spectrum::default();
+    }
+    let length = 1 << length.ilog2();
+    let window: Vec<f64> = (0..length)
+        .map(|k| 0.5 - 0.5 * (TAU * k as f64 / length as f64).cos())
+        .collect();
+    let weight: f64 = window.iter().map(|w| w * w).sum();
+    let transform = RealFftPlanner::new().plan_fft_forward(length);
+    let density = |signals: &[Vec<f64>]| {
+        let mut sum = vec![0.0; length / 2 + 1];
+        let mut segments = 0.0;
+        for signal in signals {
+            for start in (0..=signal.len().saturating_sub(length)).step_by(length / 2) {
+                let Some(part) = signal.get(start..start + length) else {
+                    continue;
+                };
+                let mean = part.iter().sum::<f64>() / length as f64;
+                let mut input: Vec<f64> = part
+                    .iter()
+                    .zip(&window)
+                    .map(|(v, w)| (v - mean) * w)
+                    .collect();
+                let mut lines = transform.make_output_vec();
+                // Cannot fail: planned for this length.
+                let _ = transform.process(&mut input, &mut lines);
+                for (sum, line) in sum.iter_mut().zip(&lines) {
+                    *sum += line.norm_sqr();
+                }
+                segments += 1.0;
+            }
+        }
+        let scale = 2.0 * residuals.period_s / (weight * f64::max(segments, 1.0));
+        // The mean is no frequency.
+        sum.into_iter().skip(1).map(|s| s * scale).collect()
+    };
+    let finest = 1.0 / (length as f64 * residuals.period_s);
+    Spectrum {
+        hz: (1..=length / 2).map(|i| i as f64 * finest).collect(),
+        residual: density(&residuals.e),
+        output: density(&residuals.y),
+        noise: residuals
+            .noise_variance
+            .map(|variance| 2.0 * residuals.period_s * variance),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_integral_is_the_mean_square_and_a_tone_is_at_its_frequency() {
+        let tone: Vec<f64> = (0..8192)
+            .map(|k| 0.3 * (TAU * 31.25 * f64::from(k) * 0.001).sin())
+            .collect();
+        let found = spectrum(&Residuals {
+            period_s: 0.001,
+            e: vec![tone.clone()],
+            u: vec![tone.clone()],
+            y: vec![tone],
+            noise_variance: Some(0.01),
+        });
+        let step = found.hz[1] - found.hz[0];
+        let power: f64 = found.residual.iter().sum::<f64>() * step;
+        assert!((power / 0.045 - 1.0).abs() < 1e-3, "{power}");
+        let top =
+            (0..found.hz.len()).max_by(|a, b| found.residual[*a].total_cmp(&found.residual[*b]));
+        assert!((found.hz[top.unwrap()] - 31.25).abs() < step);
+        // White noise fills the band to half the sampling rate.
+        assert!((found.noise.unwrap() * 500.0 / 0.01 - 1.0).abs() < 1e-12);
+        assert_eq!(spectrum(&Residuals::default()), Spectrum::default());
+    }
+}

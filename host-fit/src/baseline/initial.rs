@@ -1,0 +1,109 @@
+//! The initial state of a free run, from the beginning of the record.
+
+use crate::linalg::dot;
+
+/// The fewest samples of a record that its initial state is estimated from.
+const FEWEST: usize = 20;
+/// The share of a record that its initial state is estimated from.
+const SHARE: f64 = 0.05;
+
+/// Free responses of a process over a record: what different initial states differ by. The state itself is estimated
+/// from the beginning alone: the first twentieth of the record, at least 20 samples, and longer where the process has
+/// no time constant as short as half of that.
+#[derive(Clone, Debug)]
+pub(super) struct InitialState {
+    /// Orthonormal over the beginning.
+    columns: Vec<Vec<f64>>,
+    beginning: usize,
+}
+
+/// Σ of products over the shorter of two.
+pub(super) fn inner(a: &[f64], b: &[f64]) -> f64 {
+    let both = a.len().min(b.len());
+    dot(
+        a.get(..both).unwrap_or_default(),
+        b.get(..both).unwrap_or_default(),
+    )
+}
+
+impl InitialState {
+    /// Of free responses over a record of `samples`; `fastest` is the shortest time of the process, samples.
+    pub(super) fn new(free: Vec<Vec<f64>>, samples: usize, fastest: f64) -> Self {
+        let mut beginning = FEWEST.max((SHARE * samples as f64) as usize);
+        // Doubled, so that it does not change with every change of the time constant.
+        while beginning < samples && (beginning as f64) < 2.0 * fastest {
+            beginning *= 2;
+        }
+        let mut new = Self {
+            columns: Vec::new(),
+            beginning: beginning.min(samples),
+        };
+        for mut column in free {
+            let size = new.over_the_beginning(&column, &column).sqrt();
+            // Gram–Schmidt, twice for nearly parallel columns.
+            for _ in 0..2 {
+                new.remove_from(&mut column);
+            }
+            let left = new.over_the_beginning(&column, &column).sqrt();
+            if left > 1e-9 * size && left > 0.0 {
+                column.iter_mut().for_each(|value| *value /= left);
+                new.columns.push(column);
+            }
+        }
+        new
+    }
+
+    fn over_the_beginning(&self, a: &[f64], b: &[f64]) -> f64 {
+        inner(a.get(..self.beginning).unwrap_or(a), b)
+    }
+
+    /// Takes out of `values` what the initial state explains that fits their beginning best.
+    pub(super) fn remove_from(&self, values: &mut [f64]) {
+        let share = |column: &Vec<f64>| self.over_the_beginning(column, values);
+        let shares: Vec<f64> = self.columns.iter().map(share).collect();
+        for (column, share) in self.columns.iter().zip(shares) {
+            for (value, response) in values.iter_mut().zip(column) {
+                *value -= share * response;
+            }
+        }
+    }
+
+    /// `run` with the initial state that brings its beginning nearest to `y`.
+    pub(super) fn added_to(&self, run: &[f64], y: &[f64]) -> Vec<f64> {
+        let mut errors: Vec<f64> = y.iter().zip(run).map(|(y, run)| y - run).collect();
+        self.remove_from(&mut errors);
+        y.iter().zip(errors).map(|(y, error)| y - error).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::response::{Response, Shape};
+    use super::*;
+
+    #[test]
+    fn a_run_begins_where_the_record_does_and_forgets_it() {
+        let response = Response::new(Shape::of_time_constants(30.0, 10.0), 0.0);
+        let free = response.free(300);
+        let y: Vec<f64> = (0..300)
+            .map(|k| 2.0 * free[0].get(k).unwrap_or(&0.0) - free[1].get(k).unwrap_or(&0.0))
+            .collect();
+        let initial = InitialState::new(free, 300, 10.0);
+        let run = initial.added_to(&[0.0; 300], &y);
+        assert!(run.iter().zip(&y).all(|(run, y)| (run - y).abs() < 1e-9));
+        // Of what comes after the beginning nothing is used.
+        let mut late = y.clone();
+        late[100..].iter_mut().for_each(|y| *y = 7.0);
+        let other = initial.added_to(&[0.0; 300], &late);
+        assert!(run.iter().zip(&other).all(|(a, b)| (a - b).abs() < 1e-9));
+    }
+
+    #[test]
+    fn a_slow_process_has_a_long_beginning() {
+        let beginning = |fastest| InitialState::new(Vec::new(), 1000, fastest).beginning;
+        assert_eq!(
+            (beginning(3.0), beginning(90.0), beginning(1e6)),
+            (50, 200, 1000)
+        );
+    }
+}

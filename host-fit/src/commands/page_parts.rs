@@ -1,0 +1,369 @@
+//! Parts that several pages have: the answer, the worst stretch, the standard checks.
+
+use host_fit::analysis::{Residuals, correlations, poles, spectrum, step_response};
+use host_fit::data::{Record, Use};
+use host_fit::model::Model;
+use host_fit::picture::{
+    Column, LabelledRun, Line, LinePlot, Overlay, Report, Tone, lines, overlay, significant,
+};
+use host_fit::steps::{self, Answer};
+
+/// The answer as a card.
+pub(crate) fn card(report: &mut Report, answer: &Answer) {
+    let tone = match answer.tone {
+        steps::Tone::Good => Tone::Good,
+        steps::Tone::Finding => Tone::Finding,
+        steps::Tone::Warning => Tone::Warning,
+    };
+    report.answer(tone, &answer.verdict, &answer.parts(), &answer.notes);
+}
+
+/// Free runs of a model, one for each record.
+pub(crate) struct Run<'a> {
+    pub(crate) label: &'a str,
+    pub(crate) model: &'a Model,
+    pub(crate) runs: &'a [Vec<f64>],
+}
+
+/// Where in the records a run errs most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Stretch {
+    /// Index of the record.
+    pub(crate) record: usize,
+    /// From and to, s since the record's start.
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+}
+
+/// How long a stretch is shown: two seconds or four periods of the command, at least a hundred samples.
+fn stretch_samples(record: &Record) -> usize {
+    let rising = record.u.windows(2).enumerate();
+    let rising: Vec<usize> = rising
+        .filter(|(_, pair)| pair[0] < 0.5 && pair[1] >= 0.5)
+        .map(|(k, _)| k)
+        .collect();
+    let mut periods: Vec<usize> = rising.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    periods.sort_unstable();
+    let period = periods.get(periods.len() / 2).copied().unwrap_or(0);
+    let two_seconds = (2.0 / record.sample_period_s) as usize;
+    let least = two_seconds.max(100).max(4 * period);
+    least.min(record.len())
+}
+
+/// The stretch of the validation records (of all records where none is marked `validate`) with the largest error of `runs`.
+pub(crate) fn worst_stretch(records: &[Record], runs: &[Vec<f64>]) -> Option<Stretch> {
+    let validate = records.iter().any(|r| r.role == Use::Validate);
+    let judged = records.iter().zip(runs).enumerate();
+    let judged = judged.filter(|(_, (record, run))| {
+        (!validate || record.role == Use::Validate) && run.len() == record.len()
+    });
+    let mut worst: Option<(f64, Stretch)> = None;
+    for (index, (record, run)) in judged {
+        let width = stretch_samples(record);
+        let squares: Vec<f64> = record
+            .y
+            .iter()
+            .zip(run)
+            .map(|(y, m)| (y - m).powi(2))
+            .collect();
+        let step = (width / 20).max(1);
+        for start in (0..=record.len() - width).step_by(step) {
+            let Some(part) = squares.get(start..start + width) else {
+                continue;
+            };
+            let mean = part.iter().sum::<f64>() / width.max(1) as f64;
+            if mean.is_finite() && worst.is_none_or(|(most, _)| mean > most) {
+                let seconds = |k: usize| k as f64 * record.sample_period_s;
+                let stretch = Stretch {
+                    record: index,
+                    from: seconds(start),
+                    to: seconds(start + width),
+                };
+                worst = Some((mean, stretch));
+            }
+        }
+    }
+    worst.map(|(_, stretch)| stretch)
+}
+
+/// The picture of a stretch: measurement and runs, with what each run errs there.
+pub(crate) fn stretch_picture(
+    report: &mut Report,
+    records: &[Record],
+    runs: &[(&str, &[Vec<f64>])],
+    stretch: Stretch,
+) {
+    let Some(record) = records.get(stretch.record) else {
+        return;
+    };
+    let rate = 1.0 / record.sample_period_s;
+    let (from, to) = ((stretch.from * rate) as usize, (stretch.to * rate) as usize);
+    let own: Vec<(&str, &Vec<f64>)> = runs
+        .iter()
+        .filter_map(|(label, runs)| Some((*label, runs.get(stretch.record)?)))
+        .collect();
+    let errors = own.iter().map(|(label, run)| {
+        let pairs = record.y.iter().zip(*run).take(to).skip(from);
+        let sum: f64 = pairs.map(|(y, m)| (y - m).powi(2)).sum();
+        let rmse = (sum / to.saturating_sub(from).max(1) as f64).sqrt();
+        format!("{label} RMSE {}", significant(rmse, 3))
+    });
+    let errors = errors.collect::<Vec<_>>().join(", ");
+    let models: Vec<LabelledRun<'_>> = own
+        .iter()
+        .map(|(label, y)| LabelledRun { label, y })
+        .collect();
+    let title = format!(
+        "Where the error is largest: {}, {} to {} s",
+        record.name,
+        significant(stretch.from, 3),
+        significant(stretch.to, 3)
+    );
+    let svg = overlay(&Overlay {
+        title: &title,
+        y_label: "y",
+        sample_period_s: record.sample_period_s,
+        t0_s: record.t0,
+        u: &record.u,
+        y: &record.y,
+        y_sd: record.y_sd.as_deref(),
+        y_min: record.y_min.as_deref(),
+        y_max: record.y_max.as_deref(),
+        models: &models,
+        window_s: Some((record.t0 + stretch.from, record.t0 + stretch.to)),
+    });
+    report.figure(
+        &svg,
+        &format!(
+            "The {} s of the validation records with the largest error. There: {errors}.",
+            significant(stretch.to - stretch.from, 2)
+        ),
+    );
+}
+
+/// Residual correlations, residual spectrum, step responses and poles of each model.
+pub(crate) fn checks(report: &mut Report, records: &[Record], runs: &[Run<'_>]) {
+    report.section("Residual tests");
+    let residuals: Vec<Residuals> = runs
+        .iter()
+        .map(|run| Residuals::of(records, run.runs))
+        .collect();
+    let tested: Vec<_> = residuals.iter().map(correlations).collect();
+    let outside = |of: &dyn Fn(usize) -> f64| {
+        let each = runs.iter().enumerate();
+        let each = each.map(|(i, run)| format!("{} {:.0} %", run.label, 100.0 * of(i)));
+        each.collect::<Vec<_>>().join(", ")
+    };
+    let last = tested.last().cloned().unwrap_or_default();
+    report.columns();
+    let auto: Vec<Line<'_>> = runs
+        .iter()
+        .zip(&tested)
+        .enumerate()
+        .map(|(i, (run, (auto, _)))| Line {
+            label: run.label,
+            points: &auto.points,
+            colour: Some(i),
+            dashed: false,
+        })
+        .collect();
+    report.figure(
+        &lines(&LinePlot {
+            title: "Residual autocorrelation",
+            x_label: "lag (s)",
+            y_label: "correlation",
+            lines: &auto,
+            band: Some((last.0.band, "95 % band of a white residual")),
+            log_x: false,
+        }),
+        &format!(
+            "A white residual stays in the band at 95 % of the lags; coloured measurement noise leaves it as well. Outside: {}.",
+            outside(&|i| tested[i].0.outside)
+        ),
+    );
+    let cross: Vec<Line<'_>> = runs
+        .iter()
+        .zip(&tested)
+        .enumerate()
+        .map(|(i, (run, (_, cross)))| Line {
+            label: run.label,
+            points: &cross.points,
+            colour: Some(i),
+            dashed: false,
+        })
+        .collect();
+    report.figure(
+        &lines(&LinePlot {
+            title: "Cross-correlation of u and residual",
+            x_label: "lag of the residual behind u (s)",
+            y_label: "correlation",
+            lines: &cross,
+            band: Some((last.1.band, "95 % band of an independent residual")),
+            log_x: false,
+        }),
+        &format!(
+            "Peaks outside the band at positive lags are dynamics from u to y that the model lacks. Outside: {}.",
+            outside(&|i| tested[i].1.outside)
+        ),
+    );
+    spectra(report, runs, &residuals);
+    responses(report, runs);
+    report.end_columns();
+    pole_table(report, runs);
+}
+
+fn spectra(report: &mut Report, runs: &[Run<'_>], residuals: &[Residuals]) {
+    let spectra: Vec<_> = residuals.iter().map(spectrum).collect();
+    let decibels = |hz: &[f64], density: &[f64]| -> Vec<(f64, f64)> {
+        let pairs = hz.iter().zip(density);
+        pairs
+            .map(|(hz, s)| (*hz, 10.0 * s.max(f64::MIN_POSITIVE).log10()))
+            .collect()
+    };
+    let Some(first) = spectra.first().filter(|s| !s.hz.is_empty()) else {
+        return;
+    };
+    let output = decibels(&first.hz, &first.output);
+    let noise = first
+        .noise
+        .map(|noise| decibels(&first.hz, &vec![noise; first.hz.len()]));
+    let each: Vec<Vec<(f64, f64)>> = spectra
+        .iter()
+        .map(|s| decibels(&s.hz, &s.residual))
+        .collect();
+    let mut drawn = vec![Line {
+        label: "measured y",
+        points: &output,
+        colour: None,
+        dashed: false,
+    }];
+    if let Some(noise) = &noise {
+        drawn.push(Line {
+            label: "noise of y_sd, if white",
+            points: noise,
+            colour: None,
+            dashed: true,
+        });
+    }
+    for (i, (run, points)) in runs.iter().zip(&each).enumerate() {
+        drawn.push(Line {
+            label: run.label,
+            points,
+            colour: Some(i),
+            dashed: false,
+        });
+    }
+    report.figure(
+        &lines(&LinePlot {
+            title: "Residual spectrum",
+            x_label: "frequency (Hz)",
+            y_label: "density (dB re 1 y²/Hz)",
+            lines: &drawn,
+            band: None,
+            log_x: true,
+        }),
+        "Welch's estimate. Where the residual stands above the noise, the model lacks dynamics at that frequency.",
+    );
+}
+
+fn responses(report: &mut Report, runs: &[Run<'_>]) {
+    let found: Vec<_> = runs.iter().map(|run| step_response(run.model)).collect();
+    let labels: Vec<[String; 2]> = runs
+        .iter()
+        .map(|run| {
+            [
+                format!("{}: opening from rest", run.label),
+                format!("{}: closing from steady", run.label),
+            ]
+        })
+        .collect();
+    let mut drawn = Vec::new();
+    for (i, (response, [opening, closing])) in found.iter().zip(&labels).enumerate() {
+        let Some(response) = response else { continue };
+        for (label, points, dashed) in [
+            (opening, &response.opening, false),
+            (closing, &response.closing, true),
+        ] {
+            drawn.push(Line {
+                label,
+                points,
+                colour: Some(i),
+                dashed,
+            });
+        }
+    }
+    if drawn.is_empty() {
+        return;
+    }
+    report.figure(
+        &lines(&LinePlot {
+            title: "Step response at two levels",
+            x_label: "time since the step (s)",
+            y_label: "change of y",
+            lines: &drawn,
+            band: None,
+            log_x: false,
+        }),
+        "The command opens from rest (0 → 1), and closes from the steady state (1 → 0, sign reversed). The two differ as far \
+         as the plant is not linear.",
+    );
+}
+
+fn pole_table(report: &mut Report, runs: &[Run<'_>]) {
+    const MOST: usize = 3;
+    let number = |value: f64| significant(value, 3);
+    let rows: Vec<Vec<String>> = runs
+        .iter()
+        .flat_map(|run| {
+            let own = poles(run.model, MOST).into_iter();
+            own.map(|pole| {
+                vec![
+                    run.label.to_owned(),
+                    if pole.command == 0 { "off" } else { "on" }.to_owned(),
+                    format!("{:.5}", pole.modulus),
+                    number(pole.time_constant_s),
+                    if pole.hz > 0.0 {
+                        number(pole.hz)
+                    } else {
+                        "real".to_owned()
+                    },
+                    number(pole.damping),
+                ]
+            })
+        })
+        .collect();
+    if rows.is_empty() {
+        return;
+    }
+    report.subsection("Poles");
+    report.table(
+        "The slowest poles of the recursion with a constant command, effects left out; one of each conjugate pair.",
+        &[
+            Column::Text("model"),
+            Column::Text("command"),
+            Column::Number("modulus"),
+            Column::Number("time constant, s"),
+            Column::Number("frequency, Hz"),
+            Column::Number("damping ratio"),
+        ],
+        &rows,
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worst_stretch_is_where_the_error_is() {
+        let n = 4000;
+        let u: Vec<f64> = (0..n).map(|k| f64::from(u8::from(k % 250 < 100))).collect();
+        let record = Record::new("a", Use::Validate, 0.001, u, vec![0.0; n]);
+        let mut run = vec![0.0; n];
+        run[2500..2600].fill(1.0);
+        let found = worst_stretch(&[record], &[run]).unwrap();
+        assert!(found.from <= 2.5 && found.to >= 2.6, "{found:?}");
+        assert!((found.to - found.from - 2.0).abs() < 1e-9);
+        assert_eq!(worst_stretch(&[], &[]), None);
+    }
+}

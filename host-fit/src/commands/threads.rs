@@ -1,0 +1,54 @@
+//! Whether the machine gives threads. Libraries that start their own end the program where it does not, so it is found
+//! out before they are asked.
+
+use std::sync::OnceLock;
+use std::sync::mpsc::channel;
+use std::thread::{self, Builder};
+
+static GIVEN: OnceLock<bool> = OnceLock::new();
+
+/// Whether as many threads as there are processors, and a few for the line and the page, can be had at once.
+pub(crate) fn are_given() -> bool {
+    *GIVEN.get_or_init(|| {
+        const BESIDE: usize = 4;
+        let wanted = thread::available_parallelism().map_or(1, usize::from) + BESIDE;
+        let mut held = Vec::with_capacity(wanted);
+        let all = (0..wanted).all(|_| {
+            let (end, waits) = channel::<()>();
+            match Builder::new().spawn(move || waits.recv()) {
+                Ok(thread) => {
+                    held.push((end, thread));
+                    true
+                }
+                Err(_) => false,
+            }
+        });
+        for (end, thread) in held {
+            drop(end);
+            let _ = thread.join();
+        }
+        all
+    })
+}
+
+/// Has everything run on the calling thread where there are no others; the results are the same, later.
+pub(crate) fn or_one() {
+    if !are_given() {
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1);
+        // Refused only where there is a pool already, and this is the first.
+        let _ = one.use_current_thread().build_global();
+    }
+}
+
+/// Refuses what cannot do without threads.
+///
+/// # Errors
+/// What to do.
+pub(crate) fn needed(what: &str) -> anyhow::Result<()> {
+    match are_given() {
+        true => Ok(()),
+        false => anyhow::bail!(
+            "{what} needs threads and the system gives none; raise the limit of processes (`ulimit -u`) or end others"
+        ),
+    }
+}

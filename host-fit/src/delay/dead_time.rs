@@ -1,0 +1,237 @@
+//! The dead time of one linear plant with an interval that covers the choice of its order.
+//!
+//! A dead time and a second time constant look much alike: h falls by about T₂ when T₂ is allowed. So h is not taken
+//! from the best order but averaged over all of them. For each ratio b of a grid around the best, and for the first
+//! order (b = 0), the fit over h and S gives a normal law of h, its weight
+//!
+//!    w_b ∝ prior(b)·√det Cov(h, ln S)·exp(−RSS_b / 2σ²ν)
+//!
+//! with σ² the residual variance and ν its widening through autocorrelation, (1 + ρ)/(1 − ρ). One half of the prior is
+//! the first order's. The interval is that of the mixture, its ends at 2.5 and 97.5 %.
+
+use super::linear::{Evaluation, Free, Refined, Series, refine};
+use super::plant::Plant;
+use super::rules::RULES;
+use super::spread::spread;
+use crate::linalg::dot;
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+
+/// An estimate of a dead time.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct DeadTime {
+    /// Dead time, samples: the first sample that u_k can change is y_{k+1+h}.
+    pub samples: f64,
+    /// Its standard error, samples.
+    pub standard_error: f64,
+    /// Lower end of the 95 % interval, samples.
+    pub low: f64,
+    /// Upper end of the 95 % interval, samples.
+    pub high: f64,
+}
+
+impl DeadTime {
+    /// The mean of some edges of one direction or both; `common` is what they share: order, settings and clock.
+    pub(crate) fn of_edges(edges: &[(f64, f64)], common: f64) -> Option<Self> {
+        let n = edges.len();
+        if n == 0 {
+            return None;
+        }
+        let delays: Vec<f64> = edges.iter().map(|e| e.0).collect();
+        let spread = spread(&delays);
+        let own = edges.iter().map(|e| e.1 * e.1).sum::<f64>().sqrt() / n as f64;
+        let scatter = spread.sd / (n as f64).sqrt();
+        let upper = 0.5 + 0.5 * RULES.confidence;
+        let normal = Normal::standard().inverse_cdf(upper);
+        // One edge has no scatter, but its own error.
+        let student = match n {
+            1 => normal,
+            _ => StudentsT::new(0.0, 1.0, n as f64 - 1.0).map_or(normal, |t| t.inverse_cdf(upper)),
+        };
+        let half = (normal * own).max(student * scatter).hypot(normal * common);
+        Some(Self {
+            samples: spread.mean,
+            standard_error: own.max(scatter).hypot(common),
+            low: (spread.mean - half).max(0.0),
+            high: spread.mean + half,
+        })
+    }
+
+    /// The same in a unit `factor` times shorter: with the sampling period, seconds.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        Self {
+            samples: self.samples * factor,
+            standard_error: self.standard_error * factor,
+            low: self.low * factor,
+            high: self.high * factor,
+        }
+    }
+}
+
+/// A share of the law of h.
+#[derive(Debug, Clone, Copy)]
+struct Component {
+    log_weight: f64,
+    mean: f64,
+    sd: f64,
+}
+
+/// The variance of the residual, widened for its autocorrelation.
+pub(crate) fn widened_variance(at: &Evaluation) -> f64 {
+    let samples: usize = at.residuals.iter().map(Vec::len).sum();
+    let free = samples.saturating_sub(3 + 3 * at.residuals.len()).max(1) as f64;
+    let lagged: f64 = at
+        .residuals
+        .iter()
+        .flat_map(|r| r.windows(2))
+        .map(|w| w[0] * w[1])
+        .sum();
+    let square: f64 = at.residuals.iter().map(|r| dot(r, r)).sum();
+    let rho = if square > 0.0 {
+        (lagged / square).clamp(0.0, RULES.slowest_disturbance)
+    } else {
+        0.0
+    };
+    // Data without noise still have rounding.
+    at.rss / free * (1.0 + rho) / (1.0 - rho) + f64::MIN_POSITIVE
+}
+
+/// Density of the prior of b where there is a second time constant (probability ½): mostly without ringing.
+fn prior(ratio: f64) -> f64 {
+    if ratio <= 0.25 {
+        1.6
+    } else {
+        0.1 / ratio / 3.0
+    }
+}
+
+/// The dead time over all orders, from the fits of [`super::linear::fit`], and the place of the fit whose order is chosen. `clock`
+/// is the standard error of the clock, samples.
+pub(crate) fn dead_time(
+    series: &[Series],
+    fits: &[Refined],
+    free: Free,
+    max_delay: f64,
+    clock: f64,
+) -> Option<(DeadTime, usize)> {
+    let best = fits.iter().min_by(|a, b| a.at.rss.total_cmp(&b.at.rss))?;
+    let noise = widened_variance(&best.at);
+    let component = |fit: &Refined, log_prior: f64| -> Option<Component> {
+        let inverse = fit.inverse.as_ref()?;
+        let stride = inverse.len().isqrt();
+        let (hh, hs) = (*inverse.first()?, *inverse.get(1)?);
+        let ss = *inverse.get(stride + 1)?;
+        let determinant = (hh * ss - hs * hs).max(f64::MIN_POSITIVE);
+        Some(Component {
+            log_weight: log_prior + 0.5 * determinant.ln() + noise.ln()
+                - (fit.at.rss - best.at.rss) / (2.0 * noise),
+            mean: fit.at.plant.mean_delay(),
+            sd: (hh * noise).sqrt(),
+        })
+    };
+    let first = fits.first()?;
+    let mut components: Vec<Component> = component(first, 0.5f64.ln()).into_iter().collect();
+    let second = fits.get(1);
+    let (centre, step) = match second {
+        Some(second) => {
+            let ratio = second.at.plant.ratio.max(0.005);
+            let variance = second.inverse.as_ref().and_then(|i| {
+                let stride = i.len().isqrt();
+                i.get(2 * stride + 2).copied()
+            });
+            let sd = variance.map_or(f64::INFINITY, |v| (v * noise).sqrt());
+            (ratio, (0.75 * sd / ratio).clamp(0.004, 0.3))
+        }
+        None => (0.01, 0.3),
+    };
+    let start = second.unwrap_or(first).at.plant;
+    for direction in [1.0, -1.0] {
+        let mut at = start;
+        for i in usize::from(direction < 0.0)..=RULES.ratios {
+            let ratio = centre * (direction * step * i as f64).exp();
+            if !(0.002..=6.0).contains(&ratio) {
+                break;
+            }
+            let from = Plant { ratio, ..at };
+            let Some(fit) = refine(series, from, free.with_order(false), max_delay) else {
+                break;
+            };
+            at = fit.at.plant;
+            components.extend(component(&fit, (prior(ratio) * ratio * step).ln()));
+            if fit.at.rss - best.at.rss > 14.0 * noise {
+                break;
+            }
+        }
+    }
+    // The value is that of the order that the data ask for (BIC); the interval is that of all orders.
+    let samples: usize = best.at.residuals.iter().map(Vec::len).sum();
+    let residual = best.at.rss / samples.max(1) as f64;
+    let independent = (samples as f64 * residual / noise).max(2.0);
+    let better = second.is_some_and(|s| first.at.rss - s.at.rss > independent.ln() * noise);
+    let chosen = second.filter(|_| better).unwrap_or(first);
+    let mixed = mixture(&components, max_delay, clock)?;
+    let samples = chosen.at.plant.mean_delay();
+    let estimate = DeadTime {
+        samples,
+        low: mixed.low.min(samples),
+        high: mixed.high.max(samples),
+        ..mixed
+    };
+    Some((estimate, usize::from(better)))
+}
+
+/// Mean, spread and interval of a mixture of normal laws, each widened by the standard error of the clock.
+fn mixture(components: &[Component], max_delay: f64, clock: f64) -> Option<DeadTime> {
+    let largest = components
+        .iter()
+        .map(|c| c.log_weight)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let known: Vec<(f64, f64, f64)> = components
+        .iter()
+        .filter(|c| c.log_weight.is_finite() && c.sd.is_finite())
+        .map(|c| ((c.log_weight - largest).exp(), c.mean, c.sd.hypot(clock)))
+        .collect();
+    let total: f64 = known.iter().map(|c| c.0).sum();
+    if total <= 0.0 {
+        return None;
+    }
+    let middle = known.iter().map(|(w, m, _)| w * m).sum::<f64>() / total;
+    let variance = known
+        .iter()
+        .map(|(w, m, s)| w * (s * s + (m - middle).powi(2)))
+        .sum::<f64>()
+        / total;
+    let share_below = |h: f64| -> f64 {
+        known
+            .iter()
+            .map(|(w, m, s)| w * normal_share((h - m) / s))
+            .sum::<f64>()
+            / total
+    };
+    let quantile = |p: f64| -> f64 {
+        let (mut low, mut high) = known.iter().fold((middle, middle), |(l, h), (_, m, s)| {
+            (l.min(m - 8.0 * s), h.max(m + 8.0 * s))
+        });
+        for _ in 0..80 {
+            let half = f64::midpoint(low, high);
+            if share_below(half) < p {
+                low = half;
+            } else {
+                high = half;
+            }
+        }
+        f64::midpoint(low, high)
+    };
+    let tail = 0.5 - 0.5 * RULES.confidence;
+    Some(DeadTime {
+        samples: middle.clamp(0.0, max_delay),
+        standard_error: variance.sqrt(),
+        low: quantile(tail).max(0.0),
+        high: quantile(1.0 - tail).max(0.0),
+    })
+}
+
+/// The share of a standard normal law below `z`.
+fn normal_share(z: f64) -> f64 {
+    0.5 * statrs::function::erf::erfc(-z / std::f64::consts::SQRT_2)
+}

@@ -1,0 +1,316 @@
+//! Dead times of plants that are known, made by a simulator of these tests' own, and of records like strangers bring.
+
+use super::{DelayMethod, DelayOptions, DelayStudy, study_delays};
+use crate::data::{DataSet, Record, Use};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// A plant of two time constants (the second may be 0) behind a dead time, in small steps of the exact first-order
+/// solution; `start` is its state before the first sample.
+fn respond(t1: f64, t2: f64, delay: f64, u: &[f64], start: [f64; 2]) -> Vec<f64> {
+    let steps = 40;
+    let [mut x, mut y] = start;
+    let decay = |tau: f64| (-1.0 / (f64::from(steps) * tau)).exp();
+    let (first, second) = (decay(t1), if t2 > 0.0 { decay(t2) } else { 0.0 });
+    let mut out = Vec::with_capacity(u.len());
+    for k in 0..u.len() {
+        out.push(if t2 > 0.0 { y } else { x });
+        for s in 0..steps {
+            let t = k as f64 + (f64::from(s) + 0.5) / f64::from(steps) - delay;
+            let input = if t < 0.0 { u[0] } else { u[t as usize] };
+            let before = x;
+            x = input + (x - input) * first;
+            let middle = f64::midpoint(before, x);
+            y = middle + (y - middle) * second;
+        }
+    }
+    out
+}
+
+struct Case {
+    time_constants: f64,
+    delay: f64,
+    edges: usize,
+    record: Record,
+}
+
+/// First or second order, time constants 5 to 400 samples, dead time 0 to 100, 1 to 40 edges on/off or graded, either
+/// sign, resting at any level, at rest with u = 0 or 1 or in mid-run, noise 0.1 to 3 % of the step, quantised or not.
+fn case(seed: u64, period: f64) -> Case {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let t1 = 5.0 * 80f64.powf(rng.random());
+    let t2 = if rng.random::<bool>() {
+        t1 * rng.random_range(0.05..0.9)
+    } else {
+        0.0
+    };
+    let sum = t1 + t2;
+    let delay = (rng.random::<f64>() * 101.0).floor();
+    let edges = [1, 1, 2, 3, 5, 10, 20, 40][rng.random_range(0..8)];
+    let (mid_run, graded) = (rng.random::<f64>() < 0.3, rng.random::<f64>() < 0.2);
+    let mut level = f64::from(u8::from(rng.random::<bool>()));
+    let mut u = vec![level; 20 + (rng.random::<f64>() * sum) as usize];
+    for i in 0..edges {
+        let before = level;
+        level = 1.0 - before;
+        while graded && (level == 1.0 - before || (level - before).abs() < 0.25) {
+            level = (rng.random::<f64>() * 10.0).floor() / 10.0;
+        }
+        let hold = if i + 1 == edges {
+            delay + sum * rng.random_range(1.5..4.0) + 10.0
+        } else {
+            0.5 * delay + sum * rng.random_range(0.5..3.0) + 8.0
+        };
+        u.extend(std::iter::repeat_n(level, hold as usize));
+    }
+    let start = if mid_run {
+        let x: f64 = rng.random();
+        [x, x + 0.3 * (rng.random::<f64>() - 0.5)]
+    } else {
+        [u[0]; 2]
+    };
+    let gain = [1.0, -1.0, 30.0, -0.4][rng.random_range(0..4)];
+    let rest = [0.0, 0.0, 21.0, -3.0, 250.0][rng.random_range(0..5)];
+    let noise = 0.001 * 30f64.powf(rng.random());
+    let reading = if rng.random::<f64>() < 0.3 { 0.01 } else { 0.0 };
+    let y = respond(t1, t2, delay, &u, start)
+        .into_iter()
+        .map(|y| {
+            let z: f64 = StandardNormal.sample(&mut rng);
+            let noisy = y + noise * z;
+            let read = if reading > 0.0 {
+                (noisy / reading).round() * reading
+            } else {
+                noisy
+            };
+            rest + gain * read
+        })
+        .collect();
+    Case {
+        time_constants: sum,
+        delay,
+        edges,
+        record: Record::new("r", Use::Identify, period, u, y),
+    }
+}
+
+fn study(records: Vec<Record>) -> DelayStudy {
+    let set = DataSet::from_records(None, records).unwrap();
+    study_delays(&set, &DelayOptions::default()).unwrap()
+}
+
+#[test]
+fn dead_times_of_known_plants_are_right_and_within_their_intervals() {
+    let (mut held, mut off, mut edges, mut edges_off, mut unmeasured) = (0, 0, 0, 0, 0);
+    let cases = 60;
+    for seed in 0..cases {
+        let case = case(1000 + seed, if seed % 2 == 0 { 0.01 } else { 8.0 });
+        let study = study(vec![case.record]);
+        let tolerance = 1.5f64.max(0.05 * case.time_constants);
+        let found = study.dead_time.unwrap();
+        assert!(found.standard_error > 0.0 && found.high > found.low);
+        held += usize::from(found.low <= case.delay && case.delay <= found.high);
+        off += usize::from((found.samples - case.delay).abs() > tolerance);
+        edges += case.edges;
+        for edge in &study.edges {
+            match edge.onset {
+                Ok(onset) => edges_off += usize::from((onset.delay - case.delay).abs() > tolerance),
+                Err(_) => unmeasured += 1,
+            }
+        }
+        assert!(study.law.is_none(), "seed {seed}: {:?}", study.law);
+    }
+    assert!(held * 10 >= 9 * cases as usize, "{held} of {cases}");
+    assert!(off <= 1, "{off} of {cases}");
+    assert!(edges_off * 50 <= edges, "{edges_off} of {edges}");
+    assert!(unmeasured * 20 <= edges, "{unmeasured} of {edges}");
+}
+
+#[test]
+fn level_scale_and_sign_of_y_and_of_u_change_nothing() {
+    for seed in [1003, 1010, 1021] {
+        let case = case(seed, 1.0);
+        let plain = study(vec![case.record.clone()]).dead_time.unwrap();
+        let mut moved = case.record.clone();
+        moved.y.iter_mut().for_each(|y| *y = 400.0 - 7.0 * *y);
+        let moved = study(vec![moved]).dead_time.unwrap();
+        let mut inverted = case.record;
+        inverted.u.iter_mut().for_each(|u| *u = 1.0 - *u);
+        let inverted = study(vec![inverted]).dead_time.unwrap();
+        for other in [moved, inverted] {
+            assert!(
+                (plain.samples - other.samples).abs() < 0.05,
+                "{seed}: {plain:?} {other:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn heating_and_cooling_at_different_rates_have_one_dead_time() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    for (on, off) in [(40.0, 60.0), (20.0, 60.0)] {
+        for edges in [2usize, 7] {
+            let mut u = vec![0.0; 60];
+            for i in 0..edges {
+                let hold = 150 + rng.random_range(0..60);
+                u.extend(std::iter::repeat_n(f64::from(u8::from(i % 2 == 0)), hold));
+            }
+            let mut state: f64 = 0.0;
+            let y = (0..u.len())
+                .map(|k| {
+                    let z: f64 = StandardNormal.sample(&mut rng);
+                    let now = 21.0 + 30.0 * (state + 0.01 * z);
+                    let input = if k < 15 { 0.0 } else { u[k - 15] };
+                    let tau: f64 = if input > 0.5 { on } else { off };
+                    state = input + (state - input) * (-1.0 / tau).exp();
+                    now
+                })
+                .collect();
+            let study = study(vec![Record::new("r", Use::Identify, 1.0, u, y)]);
+            let found = study.dead_time.unwrap();
+            assert!(
+                (found.samples - 15.0).abs() < 1.0,
+                "{on} {off} {edges}: {found:?}"
+            );
+            let plant = study.plant.unwrap();
+            assert!(
+                (plant.time_constants_on / on - 1.0).abs() < 0.1,
+                "{plant:?}"
+            );
+            assert!(
+                (plant.time_constants_off / off - 1.0).abs() < 0.1,
+                "{plant:?}"
+            );
+        }
+    }
+}
+
+/// A state-dependent delay at 10 ms: few samples between edges, so that the time constants are those of all edges.
+#[test]
+fn a_rig_sampled_at_ten_milliseconds_is_measured_at_nearly_every_edge() {
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let records = (0..4)
+        .map(|i| {
+            let mut u = vec![0.0; 40];
+            while u.len() < 1200 {
+                let level = f64::from(u8::from(u[u.len() - 1] < 0.5));
+                u.extend(std::iter::repeat_n(level, rng.random_range(8..18)));
+            }
+            u.truncate(1200);
+            // h = 3 + 2·exp(−4·y) samples, rates that differ, a gain that sags while blowing.
+            let steps = 20;
+            let (mut value, mut store): (f64, f64) = (0.0, 1.0);
+            let y = (0..u.len())
+                .map(|k| {
+                    let z: f64 = StandardNormal.sample(&mut rng);
+                    let now = value + 0.01 * z;
+                    let delay = 3.0 + 2.0 * (-4.0 * value).exp();
+                    for s in 0..steps {
+                        let t = k as f64 + f64::from(s) / f64::from(steps) - delay;
+                        let input = if t < 0.0 { 0.0 } else { u[t as usize] };
+                        store +=
+                            (if input > 0.5 { 0.6 } else { 1.0 } - store) / 30.0 / f64::from(steps);
+                        let tau = if input > 0.5 { 4.0 } else { 2.5 };
+                        value += (input * store - value) / tau / f64::from(steps);
+                    }
+                    now
+                })
+                .collect();
+            Record::new(&format!("r{i}"), Use::Identify, 0.01, u, y)
+        })
+        .collect();
+    let study = study(records);
+    let measured = study.edges.iter().filter(|e| e.onset.is_ok()).count();
+    assert!(study.edges.len() > 300);
+    assert!(
+        measured * 10 >= study.edges.len() * 9,
+        "{measured} of {}, {:?}",
+        study.edges.len(),
+        study.method
+    );
+    let found = study.dead_time.unwrap();
+    assert!(
+        (3.0..5.0).contains(&found.samples),
+        "{found:?} {:?}",
+        study.method
+    );
+}
+
+#[test]
+fn records_of_strangers_have_the_delays_that_their_readmes_state() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/strangers");
+    for (file, truth, edges) in [
+        ("bump-test/step-at-20.csv", 15.0, 1),
+        ("bump-test/step-at-60.csv", 15.0, 1),
+        ("bump-test/step-at-200.csv", 15.0, 1),
+        ("heat-cool-cycle/run.csv", 15.0, 2),
+        ("normally-open/run.csv", 15.0, 10),
+        ("thermostat/rest-at-0.csv", 15.0, 61),
+        ("thermostat/rest-at-21.csv", 15.0, 61),
+        ("hotend-bang/one-cycle.csv", 18.0, 2),
+        ("hotend-bang/two-cycles.csv", 18.0, 4),
+        ("hotend-bang/other-day.csv", 18.0, 2),
+    ] {
+        let set = DataSet::load(&folder.join(file)).unwrap();
+        for reach in [None, Some(15), Some(60), Some(380)] {
+            let options = DelayOptions {
+                reach,
+                ..DelayOptions::default()
+            };
+            let study = study_delays(&set, &options).unwrap();
+            assert_eq!(study.method, DelayMethod::Trajectory, "{file}");
+            assert_eq!(study.edges.len(), edges, "{file}");
+            let found = study.dead_time.unwrap();
+            assert!((found.samples - truth).abs() < 1.0, "{file}: {found:?}");
+            assert!(found.low < truth && truth < found.high, "{file}: {found:?}");
+            for onset in study.edges.iter().filter_map(|e| e.onset.ok()) {
+                assert!((onset.delay - truth).abs() < 1.5, "{file}: {onset:?}");
+                assert!(onset.standard_error > 0.4, "{file}: {onset:?}");
+            }
+            assert!(
+                study.law.is_none() && study.law_not_kept.is_some(),
+                "{file}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_longest_delay_that_is_asked_for_is_kept_to() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../");
+    for (file, longest) in [
+        ("tests/data/strangers/hotend-bang/one-cycle.csv", 10),
+        ("data/ramp-cfd", 20),
+    ] {
+        let set = DataSet::load(&folder.join(file)).unwrap();
+        let options = DelayOptions {
+            max_delay: Some(longest),
+            ..DelayOptions::default()
+        };
+        let study = study_delays(&set, &options).unwrap();
+        for onset in study.edges.iter().filter_map(|e| e.onset.ok()) {
+            assert!(onset.delay <= longest as f64 + 1e-9, "{file}: {onset:?}");
+        }
+    }
+}
+
+#[test]
+fn nothing_that_moves_gives_edges_without_a_dead_time() {
+    let mut u = vec![0.0; 100];
+    u.extend(vec![1.0; 100]);
+    let still = study(vec![Record::new(
+        "r",
+        Use::Identify,
+        1.0,
+        u.clone(),
+        vec![3.0; 200],
+    )]);
+    assert_eq!(still.edges.len(), 1);
+    assert!(still.dead_time.is_none() && still.edges[0].onset.is_err());
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let noise = (0..200).map(|_| StandardNormal.sample(&mut rng)).collect();
+    let noisy = study(vec![Record::new("r", Use::Identify, 1.0, u, noise)]);
+    assert!(noisy.dead_time.is_none(), "{:?}", noisy.dead_time);
+}

@@ -1,0 +1,423 @@
+//! One plant with a dead time through whole records.
+//!
+//! Every record is described by y = level + initial state + K·(response to u, delayed by h): the plant of [`Plant`], one
+//! gain K for all records, a level and a free initial state (one value for each order) per record. Gain, levels and
+//! initial states are linear and eliminated exactly (variable projection); h, S and b are searched, on a grid over
+//! decimated records first, then by Levenberg–Marquardt on all samples. h is real, so its resolution is not that of the
+//! clock.
+
+use super::plant::{Plant, Switching};
+use super::spread::mean;
+use crate::linalg::{dot, solve_symmetric};
+
+/// Samples that the grid search is allowed; longer records are decimated.
+const COARSE_SAMPLES: usize = 2_000;
+/// Sums of time constants that the grid search tries, in steps of this factor.
+const COARSE_STEP: f64 = 1.5;
+/// Ratios b that the grid search tries: first order, and nearly equal time constants.
+const COARSE_RATIOS: [f64; 2] = [0.0, 0.2];
+/// Valleys of the grid, one after the other along the time constants, that are followed down.
+const COARSE_STARTS: usize = 3;
+/// Largest ratio: damping ratio 0.2.
+const LARGEST_RATIO: f64 = 6.0;
+/// Ratios from which a second order starts.
+const STARTS: [f64; 3] = [0.02, 0.1, 0.25];
+/// Steps of Levenberg–Marquardt.
+const STEPS: usize = 40;
+
+/// One record, ready for fits.
+#[derive(Debug, Clone)]
+pub(crate) struct Series {
+    /// y less its mean.
+    pub(crate) y: Vec<f64>,
+    /// The changes of u.
+    pub(crate) switching: Switching,
+}
+
+impl Series {
+    /// A record whose command was `before` before its first sample and is on above `middle`.
+    pub(crate) fn new(y: &[f64], u: &[f64], before: f64, middle: f64) -> Self {
+        let level = mean(y);
+        Self {
+            y: y.iter().map(|y| y - level).collect(),
+            switching: Switching::of(u, before, middle),
+        }
+    }
+
+    /// Means of `factor` samples each in place of samples; each stands for the middle of its block.
+    pub(crate) fn thinned(&self, factor: usize) -> Self {
+        if factor <= 1 {
+            return self.clone();
+        }
+        let scale = factor as f64;
+        let mut switching = self.switching.clone();
+        for change in &mut switching.changes {
+            change.time = (change.time - (scale - 1.0) / 2.0) / scale;
+        }
+        Self {
+            y: self.y.chunks_exact(factor).map(mean).collect(),
+            switching,
+        }
+    }
+
+    /// Every `factor`-th sample; unlike [`thinned`](Self::thinned) this blurs nothing.
+    pub(crate) fn picked(&self, factor: usize) -> Self {
+        let factor = factor.max(1);
+        let mut switching = self.switching.clone();
+        for change in &mut switching.changes {
+            change.time /= factor as f64;
+        }
+        Self {
+            y: self.y.iter().step_by(factor).copied().collect(),
+            switching,
+        }
+    }
+
+    /// An orthonormal basis of what y does without the command: a level and the free courses.
+    fn basis(&self, plant: &Plant) -> Vec<Vec<f64>> {
+        let n = self.y.len();
+        let mut basis: Vec<Vec<f64>> = Vec::with_capacity(3);
+        for mut column in std::iter::once(vec![1.0; n]).chain(plant.free(&self.switching, n)) {
+            let before = dot(&column, &column);
+            // Twice: once leaves rounding errors.
+            for _ in 0..2 {
+                remove(&basis, &mut column);
+            }
+            let square = dot(&column, &column);
+            if square > 1e-10 * before {
+                let norm = square.sqrt();
+                column.iter_mut().for_each(|c| *c /= norm);
+                basis.push(column);
+            }
+        }
+        basis
+    }
+
+    /// Takes level and free courses out of `values`, which are as long as the record.
+    pub(crate) fn without_nuisance(&self, plant: &Plant, values: &mut [f64]) {
+        remove(&self.basis(plant), values);
+    }
+}
+
+/// Takes out of `column` what an orthonormal basis holds.
+fn remove(basis: &[Vec<f64>], column: &mut [f64]) {
+    for b in basis {
+        let share = dot(b, column);
+        column.iter_mut().zip(b).for_each(|(c, b)| *c -= share * b);
+    }
+}
+
+/// The best linear part at one plant.
+#[derive(Debug, Clone)]
+pub(crate) struct Evaluation {
+    /// The plant.
+    pub(crate) plant: Plant,
+    /// K, units of y per unit of u.
+    pub(crate) gain: f64,
+    /// y less the fit, one series for each record.
+    pub(crate) residuals: Vec<Vec<f64>>,
+    /// Sum of squares of `residuals`.
+    pub(crate) rss: f64,
+    /// By how much the command lowers the sum of squares.
+    pub(crate) explained: f64,
+}
+
+/// Orthonormal bases of all records at one plant, and y without them.
+struct Eliminated {
+    bases: Vec<Vec<Vec<f64>>>,
+    y: Vec<Vec<f64>>,
+    square: f64,
+}
+
+fn eliminate(series: &[Series], plant: &Plant) -> Eliminated {
+    let bases: Vec<_> = series.iter().map(|s| s.basis(plant)).collect();
+    let y: Vec<Vec<f64>> = series
+        .iter()
+        .zip(&bases)
+        .map(|(s, basis)| {
+            let mut y = s.y.clone();
+            remove(basis, &mut y);
+            y
+        })
+        .collect();
+    Eliminated {
+        bases,
+        square: y.iter().map(|y| dot(y, y)).sum(),
+        y,
+    }
+}
+
+/// The best gain and what it leaves. `None` where the command says nothing.
+fn gain_and_rss(
+    series: &[Series],
+    parts: &Eliminated,
+    plant: &Plant,
+    responses: &mut Vec<Vec<f64>>,
+) -> Option<(f64, f64)> {
+    let (mut with_y, mut square) = (0.0, 0.0);
+    responses.resize(series.len(), Vec::new());
+    for (((s, basis), y), response) in series.iter().zip(&parts.bases).zip(&parts.y).zip(responses)
+    {
+        response.resize(s.y.len(), 0.0);
+        plant.respond(&s.switching, response);
+        remove(basis, response);
+        with_y += dot(response, y);
+        square += dot(response, response);
+    }
+    (square > 0.0).then(|| {
+        let gain = with_y / square;
+        (gain, (parts.square - gain * with_y).max(0.0))
+    })
+}
+
+/// The best linear part at `plant`.
+pub(crate) fn evaluate(series: &[Series], plant: Plant) -> Option<Evaluation> {
+    let parts = eliminate(series, &plant);
+    let mut responses = Vec::new();
+    let (gain, _) = gain_and_rss(series, &parts, &plant, &mut responses)?;
+    let mut residuals = parts.y;
+    for (residual, response) in residuals.iter_mut().zip(&responses) {
+        residual
+            .iter_mut()
+            .zip(response)
+            .for_each(|(y, r)| *y -= gain * r);
+    }
+    let rss = residuals.iter().map(|r| dot(r, r)).sum();
+    Some(Evaluation {
+        plant,
+        gain,
+        residuals,
+        rss,
+        explained: parts.square - rss,
+    })
+}
+
+/// First-order and second-order linear plants from a grid over decimated records: the deepest valleys along the time
+/// constants. A free initial state makes more than one: it bends y like a response does.
+pub(crate) fn coarse(series: &[Series], max_delay: f64, spacing: usize) -> Vec<Plant> {
+    let samples: usize = series.iter().map(|s| s.y.len()).sum();
+    let factor = samples
+        .div_ceil(COARSE_SAMPLES)
+        .min((spacing / 8).max(1))
+        .max(1);
+    let thinned: Vec<Series> = series.iter().map(|s| s.thinned(factor)).collect();
+    let longest = thinned.iter().map(|s| s.y.len()).max().unwrap_or(0) as f64;
+    let last = (max_delay / factor as f64).floor().max(1.0);
+    let mut starts = Vec::new();
+    let mut responses = Vec::new();
+    for ratio in COARSE_RATIOS {
+        // The best of each time constant.
+        let mut floor: Vec<(f64, Plant)> = Vec::new();
+        // Over a long range of delays the shortest time constants would take too many steps, and tell no more.
+        let mut sum = (last / 300.0).max(1.0);
+        while sum < 4.0 * longest {
+            // A linear plant's free course does not depend on the dead time.
+            let parts = eliminate(&thinned, &Plant::linear(0.0, sum, ratio));
+            // The response hardly changes within a quarter of its time constant.
+            let step = (sum / 4.0).floor().clamp(1.0, (last / 16.0).max(1.0));
+            let mut best: Option<(f64, Plant)> = None;
+            let mut delay = 0.0;
+            while delay <= last {
+                let plant = Plant::linear(delay, sum, ratio);
+                if let Some((_, rss)) = gain_and_rss(&thinned, &parts, &plant, &mut responses)
+                    && best.as_ref().is_none_or(|b| rss < b.0)
+                {
+                    best = Some((rss, plant));
+                }
+                delay += step;
+            }
+            floor.extend(best);
+            sum *= COARSE_STEP;
+        }
+        let at = |i: usize| floor.get(i).map_or(f64::INFINITY, |f| f.0);
+        let is_valley = |i: usize| {
+            at(i) <= at(i + 1) && i.checked_sub(1).is_none_or(|before| at(i) < at(before))
+        };
+        let mut valleys: Vec<&(f64, Plant)> = floor
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| is_valley(*i))
+            .map(|(_, f)| f)
+            .collect();
+        valleys.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let best = valleys.into_iter().take(COARSE_STARTS);
+        starts.extend(best.map(|(_, plant)| plant.slower(factor as f64)));
+    }
+    starts
+}
+
+/// The parameters that a refinement may change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Free {
+    /// b, beside h and S.
+    pub(crate) order: bool,
+    /// The difference of S between on and off.
+    pub(crate) dynamics: bool,
+    /// The difference of h between rising and falling.
+    pub(crate) delays: bool,
+}
+
+impl Free {
+    /// h and S only.
+    pub(crate) const DELAY: Self = Self {
+        order: false,
+        dynamics: false,
+        delays: false,
+    };
+
+    /// The same with b free or fixed.
+    pub(crate) fn with_order(self, order: bool) -> Self {
+        Self { order, ..self }
+    }
+
+    /// Indices of the parameters: h, ln S, b, difference of h, difference of ln S.
+    fn axes(self) -> Vec<usize> {
+        let further = [(self.order, 2), (self.delays, 3), (self.dynamics, 4)];
+        let further = further.into_iter().filter(|f| f.0).map(|f| f.1);
+        [0, 1].into_iter().chain(further).collect()
+    }
+}
+
+/// What Levenberg–Marquardt ends with.
+#[derive(Debug, Clone)]
+pub(crate) struct Refined {
+    /// The fit.
+    pub(crate) at: Evaluation,
+    /// (JᵀJ)⁻¹ over h, ln S, b where it was free, and the differences; the variance of h is `[0]` times that of the residual.
+    pub(crate) inverse: Option<Vec<f64>>,
+}
+
+/// Levenberg–Marquardt over the free parameters.
+pub(crate) fn refine(
+    series: &[Series],
+    start: Plant,
+    free: Free,
+    max_delay: f64,
+) -> Option<Refined> {
+    let axes = free.axes();
+    let size = axes.len();
+    let longest = series.iter().map(|s| s.y.len()).max().unwrap_or(0) as f64;
+    let moved = |p: Plant, along: &[f64]| {
+        let by = |axis: usize| -> f64 {
+            let place = axes.iter().position(|a| *a == axis);
+            place.and_then(|i| along.get(i)).copied().unwrap_or(0.0)
+        };
+        let (apart, stretch) = (by(3) / 2.0, by(4) / 2.0);
+        let sum = |s: f64, stretch: f64| {
+            (s * (by(1) + stretch).clamp(-1.0, 1.0).exp()).clamp(0.02, 20.0 * longest)
+        };
+        let delay = |h: f64, apart: f64| (h + by(0) + apart).clamp(0.0, max_delay);
+        Plant {
+            delay: [delay(p.delay[0], apart), delay(p.delay[1], -apart)],
+            sum: [sum(p.sum[0], stretch), sum(p.sum[1], -stretch)],
+            ratio: (p.ratio + by(2)).clamp(0.0, LARGEST_RATIO),
+        }
+    };
+    let mut at = evaluate(series, start)?;
+    let mut damping = 1e-3;
+    let mut inverse = None;
+    for step in 0..STEPS {
+        let plant = at.plant;
+        // Steps of the difference quotients; backwards where the bound is near.
+        let delta_h = 1e-3 * plant.mean_sum().clamp(1.0, 100.0);
+        let deltas = [
+            if plant.mean_delay() + delta_h > max_delay {
+                -delta_h
+            } else {
+                delta_h
+            },
+            1e-4,
+            1e-4,
+            delta_h,
+            1e-4,
+        ];
+        let mut columns: Vec<Vec<f64>> = Vec::with_capacity(size);
+        for (place, axis) in axes.iter().enumerate() {
+            let delta = deltas.get(*axis).copied().unwrap_or(1e-4);
+            let by: Vec<f64> = (0..size)
+                .map(|i| if i == place { delta } else { 0.0 })
+                .collect();
+            let there = evaluate(series, moved(plant, &by))?;
+            columns.push(
+                at.residuals
+                    .iter()
+                    .flatten()
+                    .zip(there.residuals.iter().flatten())
+                    .map(|(here, there)| (here - there) / delta)
+                    .collect(),
+            );
+        }
+        let flat: Vec<f64> = at.residuals.iter().flatten().copied().collect();
+        let gram: Vec<f64> = columns
+            .iter()
+            .flat_map(|a| columns.iter().map(|b| dot(a, b)))
+            .collect();
+        let right: Vec<f64> = columns.iter().map(|c| dot(c, &flat)).collect();
+        inverse = invert(&gram, size);
+        if step + 1 == STEPS {
+            break;
+        }
+        let mut improved = false;
+        for _ in 0..8 {
+            let mut damped = gram.clone();
+            damped
+                .iter_mut()
+                .step_by(size + 1)
+                .for_each(|d| *d *= 1.0 + damping);
+            let next = solve_symmetric(&damped, &right)
+                .and_then(|by| evaluate(series, moved(plant, &by)))
+                .filter(|next| next.rss < at.rss);
+            if let Some(next) = next {
+                improved = at.rss - next.rss > 1e-7 * at.rss;
+                at = next;
+                damping = (damping * 0.2).max(1e-9);
+                break;
+            }
+            damping *= 6.0;
+        }
+        if !improved {
+            break;
+        }
+    }
+    Some(Refined { at, inverse })
+}
+
+/// The inverse of a small symmetric matrix.
+fn invert(gram: &[f64], size: usize) -> Option<Vec<f64>> {
+    let mut inverse = Vec::with_capacity(size * size);
+    for axis in 0..size {
+        let unit: Vec<f64> = (0..size).map(|i| f64::from(u8::from(i == axis))).collect();
+        inverse.extend(solve_symmetric(gram, &unit)?);
+    }
+    Some(inverse)
+}
+
+/// The best first-order plant, and the best second-order one where that is better, from the `starts` of [`coarse`]. Empty where the command says nothing.
+pub(crate) fn fit(series: &[Series], starts: &[Plant], max_delay: f64) -> Vec<Refined> {
+    let (of_first, of_second): (Vec<&Plant>, Vec<&Plant>) =
+        starts.iter().partition(|p| p.is_first_order());
+    let least =
+        |fits: &mut dyn Iterator<Item = Refined>| fits.min_by(|a, b| a.at.rss.total_cmp(&b.at.rss));
+    let mut tried = of_first
+        .into_iter()
+        .filter_map(|start| refine(series, *start, Free::DELAY, max_delay));
+    let Some(first) = least(&mut tried) else {
+        return Vec::new();
+    };
+    let around = STARTS.into_iter().map(|ratio| {
+        let plant = first.at.plant;
+        // The second time constant is about b·S; the dead time gives it.
+        let second = ratio * plant.mean_sum();
+        Plant::linear(
+            (plant.mean_delay() - second).max(0.0),
+            plant.mean_sum() + second,
+            ratio,
+        )
+    });
+    let mut tried = around
+        .chain(of_second.into_iter().copied())
+        .filter_map(|start| refine(series, start, Free::DELAY.with_order(true), max_delay));
+    let second = least(&mut tried)
+        .filter(|second| second.at.rss < first.at.rss && !second.at.plant.is_first_order());
+    std::iter::once(first).chain(second).collect()
+}

@@ -1,0 +1,308 @@
+//! All edges of all records together: time scales, what u was before each record, one plant, one dead time.
+
+use super::dead_time::{DeadTime, dead_time, widened_variance};
+use super::linear::{Free, Refined, Series, coarse, evaluate, fit, refine};
+use super::plant::Plant;
+use super::rules::RULES;
+use crate::data::Record;
+use crate::linalg::dot;
+
+/// Samples of the refinement; longer records are thinned as far as the time constants allow.
+const FIT_SAMPLES: usize = 12_000;
+
+/// What all records together say.
+#[derive(Debug, Clone)]
+pub(crate) struct Pooled {
+    /// Smallest and largest command.
+    pub(crate) range: (f64, f64),
+    /// Whether records start from rest with u = 0 where nothing in them says otherwise.
+    from_rest: bool,
+    /// The plant.
+    pub(crate) plant: Plant,
+    /// K, units of y per unit of u.
+    pub(crate) gain: f64,
+    /// The dead time over all edges; the middle of both directions where they differ.
+    pub(crate) dead_time: DeadTime,
+    /// Variance of the residual per sample, widened for its autocorrelation.
+    pub(crate) noise: f64,
+    /// Whether the plant leaves little more than noise.
+    pub(crate) describes: bool,
+    /// Whether the command moves y beyond the noise.
+    pub(crate) responds: bool,
+    /// The longest delay that is looked for, samples.
+    pub(crate) max_delay: f64,
+}
+
+/// The levels of a command: smallest and largest over all records.
+fn command_range(records: &[&Record]) -> (f64, f64) {
+    records
+        .iter()
+        .flat_map(|r| r.u.iter())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &u| {
+            (l.min(u), h.max(u))
+        })
+}
+
+/// Median time between changes of the command, and from the last to the end of the record, samples.
+pub(crate) fn spacing(records: &[&Record]) -> usize {
+    let mut times = Vec::new();
+    for record in records {
+        let mut last = 0;
+        for (k, pair) in record.u.windows(2).enumerate() {
+            if pair[0] != pair[1] {
+                times.push(k + 1 - last);
+                last = k + 1;
+            }
+        }
+        times.push(record.u.len() - last);
+    }
+    let middle = times.len() / 2;
+    if times.is_empty() {
+        return 1;
+    }
+    *times.select_nth_unstable(middle).1
+}
+
+/// The value that u starts with.
+fn first_command(record: &Record) -> f64 {
+    record.u.first().copied().unwrap_or(0.0)
+}
+
+/// The best plant under each of two assumptions about u before the records: its first value, and 0. Says whether 0 is
+/// the better one.
+fn start_from_rest(
+    records: &[&Record],
+    middle: f64,
+    max_delay: f64,
+    spacing: usize,
+) -> Option<Start> {
+    let samples: usize = records.iter().map(|r| r.y.len()).sum();
+    let factor = samples.div_ceil(FIT_SAMPLES / 2).min((spacing / 8).max(1));
+    let best = |from_rest: bool| -> Option<(f64, Start)> {
+        let thin: Vec<Series> = records
+            .iter()
+            .map(|r| {
+                let before = if from_rest { 0.0 } else { first_command(r) };
+                Series::new(&r.y, &r.u, before, middle).thinned(factor)
+            })
+            .collect();
+        let limit = max_delay / factor as f64;
+        let starts = coarse(&thin, limit, (spacing / factor).max(1));
+        fit(&thin, &starts, limit)
+            .into_iter()
+            .map(|r| r.at)
+            .min_by(|a, b| a.rss.total_cmp(&b.rss))
+            .map(|at| {
+                let start = Start {
+                    from_rest,
+                    plant: at.plant.slower(factor as f64),
+                    gain: at.gain,
+                    noise: widened_variance(&at) * factor as f64,
+                };
+                (at.rss, start)
+            })
+    };
+    match (best(false), best(true)) {
+        // A start from rest must be seen; otherwise u was before the record what it is at its start.
+        (Some(held), Some(rest)) => {
+            let seen = held.0 - rest.0 > RULES.detection * rest.1.noise / factor as f64;
+            Some(if seen { rest.1 } else { held.1 })
+        }
+        (held, rest) => held.or(rest).map(|(_, start)| start),
+    }
+}
+
+/// How records start, from one assumption for all of them.
+#[derive(Debug, Clone, Copy)]
+struct Start {
+    from_rest: bool,
+    plant: Plant,
+    gain: f64,
+    noise: f64,
+}
+
+/// What u was before one record: its first value, unless y answers a step from 0 at the first sample.
+fn command_before(record: &Record, middle: f64, start: &Start) -> f64 {
+    let held = first_command(record);
+    if held == 0.0 {
+        return held;
+    }
+    let left = |before: f64| -> f64 {
+        let series = Series::new(&record.y, &record.u, before, middle);
+        let residual = series.residual(&start.plant, start.gain);
+        dot(&residual, &residual)
+    };
+    let gained = (left(held) - left(0.0)) / start.noise.max(f64::MIN_POSITIVE);
+    // The step must have been answered; a record that does not say is like the others.
+    if gained > RULES.detection || (start.from_rest && gained > -RULES.detection) {
+        0.0
+    } else {
+        held
+    }
+}
+
+/// Variance of white noise in some records, from the median of the squared second differences of y: few of them are in
+/// the bend of a response.
+fn white_noise(records: &[&Record]) -> f64 {
+    let mut squares: Vec<f64> = records
+        .iter()
+        .flat_map(|r| r.y.windows(3))
+        .map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2) / 6.0)
+        .collect();
+    let middle = squares.len() / 2;
+    if squares.is_empty() {
+        return 0.0;
+    }
+    // The median of a squared normal deviate is 0.455 of its variance.
+    let median = *squares.select_nth_unstable_by(middle, f64::total_cmp).1;
+    median / 0.455
+}
+
+impl Pooled {
+    /// Fits one plant to `records`. `None` where the command never changes.
+    pub(crate) fn of(records: &[&Record], max_delay: Option<usize>) -> Option<Self> {
+        let range = command_range(records);
+        let middle = f64::midpoint(range.0, range.1);
+        let spacing = spacing(records);
+        let max_delay = max_delay.unwrap_or_else(|| longest_delay(records)) as f64;
+        let starts_on = records.iter().any(|r| first_command(r) != 0.0);
+        let start = if starts_on {
+            Some(start_from_rest(records, middle, max_delay, spacing)?)
+        } else {
+            None
+        };
+        let before = |record: &Record| {
+            let start = start.as_ref();
+            start.map_or(0.0, |start| command_before(record, middle, start))
+        };
+        let all: Vec<Series> = records
+            .iter()
+            .map(|r| Series::new(&r.y, &r.u, before(r), middle))
+            .filter(|s| !s.switching.changes.is_empty())
+            .collect();
+        let starts = coarse(&all, max_delay, spacing);
+        let samples: usize = all.iter().map(|s| s.y.len()).sum();
+        let shortest = starts
+            .iter()
+            .map(Plant::mean_sum)
+            .fold(f64::INFINITY, f64::min);
+        let factor = samples
+            .div_ceil(FIT_SAMPLES)
+            .min(((shortest / 10.0) as usize).max(1))
+            .min((spacing / 8).max(1));
+        let scale = factor as f64;
+        let picked: Vec<Series> = all.iter().map(|s| s.picked(factor)).collect();
+        let starts: Vec<Plant> = starts.iter().map(|p| p.slower(1.0 / scale)).collect();
+        let fits = fit(&picked, &starts, max_delay / scale);
+        let (fits, free) = with_directions(&picked, fits, max_delay / scale);
+        let (estimate, chosen) =
+            dead_time(&picked, &fits, free, max_delay / scale, RULES.clock / scale)?;
+        let at = evaluate(&all, fits.get(chosen)?.at.plant.slower(scale))?;
+        let noise = widened_variance(&at);
+        let spread = all.iter().map(|s| dot(&s.y, &s.y)).sum::<f64>() / samples.max(1) as f64;
+        let left = at.rss / samples.max(1) as f64;
+        Some(Self {
+            range,
+            from_rest: start.is_some_and(|s| s.from_rest),
+            plant: at.plant,
+            gain: at.gain,
+            dead_time: estimate.scaled(scale),
+            noise,
+            responds: at.explained > RULES.detection * noise,
+            max_delay,
+            describes: left
+                <= RULES.noise_allowed.powi(2) * white_noise(records)
+                    + RULES.plant_fits.powi(2) * spread,
+        })
+    }
+
+    /// Middle of the range of u: above it the command is on.
+    fn middle(&self) -> f64 {
+        f64::midpoint(self.range.0, self.range.1)
+    }
+
+    /// A record with the command before it.
+    pub(crate) fn series(&self, record: &Record) -> Series {
+        let start = Start {
+            from_rest: self.from_rest,
+            plant: self.plant,
+            gain: self.gain,
+            noise: self.noise,
+        };
+        let before = command_before(record, self.middle(), &start);
+        Series::new(&record.y, &record.u, before, self.middle())
+    }
+}
+
+/// The longest delay that the records can show, samples: from the first change of the command to their end.
+pub(crate) fn longest_delay(records: &[&Record]) -> usize {
+    let seen = records.iter().map(|r| {
+        let first =
+            r.u.windows(2)
+                .position(|w| w[0] != w[1])
+                .map_or(0, |k| k + 1);
+        r.u.len() - first
+    });
+    seen.max()
+        .unwrap_or(0)
+        .saturating_sub(RULES.least_side)
+        .max(1)
+}
+
+/// The fits, with dynamics and then dead times that differ by direction where that is better beyond chance.
+fn with_directions(series: &[Series], fits: Vec<Refined>, max_delay: f64) -> (Vec<Refined>, Free) {
+    let changes = series.iter().flat_map(|s| &s.switching.changes);
+    let rising = changes.clone().filter(|c| c.rising).count();
+    let mut free = Free::DELAY;
+    let mut known = fits;
+    if rising == 0 || rising == changes.count() {
+        return (known, free);
+    }
+    let own_dynamics = Free {
+        dynamics: true,
+        ..free
+    };
+    let own_delays = Free {
+        delays: true,
+        ..own_dynamics
+    };
+    let least = |fits: &[Refined]| fits.iter().map(|f| f.at.rss).fold(f64::INFINITY, f64::min);
+    for more in [own_dynamics, own_delays] {
+        let next: Vec<Refined> = known
+            .iter()
+            .filter_map(|fit| {
+                let order = !fit.at.plant.is_first_order();
+                refine(series, fit.at.plant, more.with_order(order), max_delay)
+            })
+            .collect();
+        let Some(best) = next.iter().min_by(|a, b| a.at.rss.total_cmp(&b.at.rss)) else {
+            break;
+        };
+        // A disturbance that the further parameters take up would whiten the residual: neither variance alone is it.
+        let before = known
+            .iter()
+            .min_by(|a, b| a.at.rss.total_cmp(&b.at.rss))
+            .map_or(f64::INFINITY, |f| widened_variance(&f.at));
+        let noise = (before * widened_variance(&best.at)).sqrt();
+        let fall = (least(&known) - best.at.rss) / noise;
+        if fall > RULES.detection {
+            (known, free) = (next, more);
+        }
+    }
+    (known, free)
+}
+
+impl Series {
+    /// What a plant with a gain leaves of y; level and initial state are the record's own.
+    pub(crate) fn residual(&self, plant: &Plant, gain: f64) -> Vec<f64> {
+        let mut residual = self.y.clone();
+        let mut response = vec![0.0; residual.len()];
+        plant.respond(&self.switching, &mut response);
+        residual
+            .iter_mut()
+            .zip(&response)
+            .for_each(|(y, r)| *y -= gain * r);
+        self.without_nuisance(plant, &mut residual);
+        residual
+    }
+}

@@ -1,0 +1,237 @@
+//! The noise model of given errors, by maximum likelihood.
+
+use super::{Colour, EFFECTS, NoiseModel, Series, random_effects, woodbury_of};
+use crate::linalg::dot;
+use rayon::prelude::*;
+
+/// Shares of coloured noise that are tried …
+const SHARES: [f64; 6] = [0.1, 0.25, 0.5, 0.75, 0.9, 0.98];
+/// … and its times of memory, samples: a grid, refined below.
+const MEMORIES: [f64; 7] = [2.0, 5.0, 12.0, 30.0, 80.0, 200.0, 500.0];
+/// The steps in logit share and ln memory are halved from those of the grid to this share of them.
+const FINEST: f64 = 0.05;
+/// Rounds of the fixed point of the variances (EM): each gains less than the one before.
+const ROUNDS: usize = 60;
+
+/// What the likelihood needs of one record under one colour.
+struct Summary {
+    samples: f64,
+    /// ln det of the covariance of ε.
+    log_determinant: f64,
+    /// r·r, Zᵀr and ZᵀZ, whitened.
+    square: f64,
+    products: [f64; EFFECTS],
+    gram: [[f64; EFFECTS]; EFFECTS],
+}
+
+/// What parameters have to gain to be kept, nats.
+#[derive(Clone, Copy)]
+struct Price {
+    colour: f64,
+    random_effect: f64,
+}
+
+/// A likelihood and the variances at its maximum.
+#[derive(Clone, Copy)]
+struct Best {
+    log_likelihood: f64,
+    scale: f64,
+    variances: [f64; EFFECTS],
+}
+
+impl NoiseModel {
+    /// The noise of `errors` that a good model leaves. With `measured`, their variances are known and ε is no less than they say;
+    /// otherwise they are in proportion only. Colour and random effects are kept where they pay by BIC.
+    #[must_use]
+    pub fn of(errors: &[Series], measured: bool) -> Self {
+        let samples: f64 = errors.iter().map(|e| e.residual.len() as f64).sum();
+        let price = Price {
+            // Two parameters more have to gain ln n.
+            colour: samples.max(1.0).ln(),
+            random_effect: 0.5 * (errors.len().max(1) as f64).ln().max(1.0),
+        };
+        Self::estimated(errors, measured, price)
+    }
+
+    /// The noise under which `errors` are most likely, with all its parameters: nothing has to pay.
+    #[must_use]
+    pub fn most_likely(errors: &[Series], measured: bool) -> Self {
+        let free = Price {
+            colour: 0.0,
+            random_effect: 0.0,
+        };
+        Self::estimated(errors, measured, free)
+    }
+
+    fn estimated(errors: &[Series], measured: bool, price: Price) -> Self {
+        let least = if measured { 1.0 } else { 0.0 };
+        let white = Colour::WHITE;
+        let (mut colour, mut best) = (white, likelihood(errors, white, least, price));
+        let coloured = coloured(errors, least, price);
+        if coloured.1.log_likelihood > best.log_likelihood + price.colour {
+            (colour, best) = coloured;
+        }
+        let [offset, drift, level] = best.variances;
+        Self {
+            scale: best.scale,
+            colour,
+            offset,
+            drift,
+            level,
+        }
+    }
+}
+
+/// The best colour on a grid that is refined around its best point.
+fn coloured(errors: &[Series], least: f64, price: Price) -> (Colour, Best) {
+    // Logit of the share and ln of the memory: even steps of both.
+    let colour = |[share, memory]: [f64; 2]| Colour {
+        share: 1.0 / (1.0 + (-share).exp()),
+        pole: (-1.0 / memory.exp()).exp(),
+    };
+    let evaluate = |points: Vec<[f64; 2]>| -> Vec<([f64; 2], Best)> {
+        let each = points.into_par_iter();
+        each.map(|point| (point, likelihood(errors, colour(point), least, price)))
+            .collect()
+    };
+    let points = SHARES
+        .iter()
+        .flat_map(|share| MEMORIES.map(|memory| [(share / (1.0 - share)).ln(), memory.ln()]));
+    let better = |a: &([f64; 2], Best), b: &([f64; 2], Best)| {
+        a.1.log_likelihood.total_cmp(&b.1.log_likelihood)
+    };
+    let Some(mut best) = evaluate(points.collect()).into_iter().max_by(better) else {
+        return (
+            Colour::WHITE,
+            likelihood(errors, Colour::WHITE, least, price),
+        );
+    };
+    let mut step = 1.0;
+    while step > FINEST {
+        // Share and memory stand for each other along a ridge: corners too.
+        let around = (0..9).map(|at| [f64::from(at / 3) - 1.0, f64::from(at % 3) - 1.0]);
+        let next = around.map(|[s, m]| [best.0[0] + s * step, best.0[1] + m * step]);
+        match evaluate(next.collect()).into_iter().max_by(better) {
+            Some(found) if found.1.log_likelihood > best.1.log_likelihood => best = found,
+            _ => step *= 0.5,
+        }
+    }
+    let (point, best) = best;
+    (colour(point), best)
+}
+
+/// The likelihood under a colour, its scale and variances of random effects at their best; those that gain less than half of ln(number of
+/// records) are 0.
+fn likelihood(errors: &[Series], colour: Colour, least: f64, price: Price) -> Best {
+    let summaries: Vec<Summary> = errors.iter().map(|e| Summary::of(e, colour)).collect();
+    let mut kept = [false; EFFECTS];
+    let mut best = maximised(&summaries, kept, least);
+    loop {
+        let tried = (0..EFFECTS).filter(|i| !kept[*i]).map(|i| {
+            let mut more = kept;
+            more[i] = true;
+            (more, maximised(&summaries, more, least))
+        });
+        let leader = tried.max_by(|a, b| a.1.log_likelihood.total_cmp(&b.1.log_likelihood));
+        match leader {
+            Some((more, better))
+                if better.log_likelihood > best.log_likelihood + price.random_effect =>
+            {
+                (kept, best) = (more, better);
+            }
+            _ => return best,
+        }
+    }
+}
+
+/// Scale and variances by expectation and maximisation: each effect's variance is the mean square of what the records show of
+/// it, and of what they leave open.
+fn maximised(summaries: &[Summary], kept: [bool; EFFECTS], least: f64) -> Best {
+    let samples: f64 = summaries.iter().map(|s| s.samples).sum();
+    let records = summaries.len().max(1) as f64;
+    let square: f64 = summaries.iter().map(|s| s.square).sum();
+    let floor = |scale: f64| scale.max(least).max(f64::MIN_POSITIVE);
+    let mut scale = floor(square / samples.max(1.0));
+    // To set out from: what the records show of each effect by itself.
+    let mut variances: [f64; EFFECTS] = std::array::from_fn(|i| {
+        let each = summaries.iter().filter(|s| s.gram[i][i] > 0.0);
+        let shown: f64 = each.map(|s| (s.products[i] / s.gram[i][i]).powi(2)).sum();
+        if kept[i] { shown / records } else { 0.0 }
+    });
+    if kept.contains(&true) {
+        for _ in 0..ROUNDS {
+            let (mut next, mut left) = ([0.0; EFFECTS], 0.0);
+            for summary in summaries {
+                let (mean, spread, rest) = summary.posterior(scale, variances);
+                for i in 0..EFFECTS {
+                    next[i] += (mean[i] * mean[i] + spread[i]) / records;
+                }
+                left += rest;
+            }
+            variances = std::array::from_fn(|i| if kept[i] { next[i] } else { 0.0 });
+            scale = floor(left / samples.max(1.0));
+        }
+    }
+    let log_likelihood = summaries
+        .iter()
+        .map(|s| s.log_likelihood(scale, variances))
+        .sum();
+    Best {
+        log_likelihood,
+        scale,
+        variances,
+    }
+}
+
+impl Summary {
+    fn of(error: &Series, colour: Colour) -> Self {
+        let filter = colour.filter(&error.variance);
+        let effects = random_effects(&filter, &error.run);
+        let whitened = filter.whiten(&error.residual);
+        Self {
+            samples: whitened.len() as f64,
+            log_determinant: filter.log_determinant(),
+            square: dot(&whitened, &whitened),
+            products: std::array::from_fn(|i| dot(&effects[i], &whitened)),
+            gram: std::array::from_fn(|i| std::array::from_fn(|j| dot(&effects[i], &effects[j]))),
+        }
+    }
+
+    fn log_likelihood(&self, scale: f64, variances: [f64; EFFECTS]) -> f64 {
+        let (factor, log_determinant) = woodbury_of(&self.gram, variances.map(|v| v / scale));
+        let along: f64 = (0..EFFECTS)
+            .map(|j| {
+                let one: f64 = (0..EFFECTS).map(|i| factor[i][j] * self.products[i]).sum();
+                one * one
+            })
+            .sum();
+        let covariance = self.samples * scale.ln() + self.log_determinant + log_determinant;
+        -0.5 * ((self.square - along) / scale + covariance)
+    }
+
+    /// Mean and variance of the record's random effects given its error, and the expected Σ of what ε leaves, whitened.
+    fn posterior(
+        &self,
+        scale: f64,
+        variances: [f64; EFFECTS],
+    ) -> ([f64; EFFECTS], [f64; EFFECTS], f64) {
+        // Covariance scale·L·Lᵀ of the effects given the error.
+        let (factor, _) = woodbury_of(&self.gram, variances.map(|v| v / scale));
+        let cell = |i: usize, j: usize| {
+            (0..EFFECTS)
+                .map(|k| factor[i][k] * factor[j][k])
+                .sum::<f64>()
+        };
+        let mean: [f64; EFFECTS] =
+            std::array::from_fn(|i| (0..EFFECTS).map(|j| cell(i, j) * self.products[j]).sum());
+        let spread = std::array::from_fn(|i| scale * cell(i, i));
+        let mut rest = self.square;
+        for i in 0..EFFECTS {
+            rest -= 2.0 * mean[i] * self.products[i];
+            for j in 0..EFFECTS {
+                rest += self.gram[i][j] * (mean[i] * mean[j] + scale * cell(i, j));
+            }
+        }
+        (mean, spread, rest)
+    }
+}

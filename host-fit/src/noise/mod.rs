@@ -1,0 +1,196 @@
+//! What records are disturbed by: one noise model for all that weighs errors.
+//!
+//! The error of record g is r_g = b_g·1 + d_g·t + a_g·f_g + ε_g (docs/theory.md 4.4), f_g the run of the model. Offset b, drift d
+//! and level a are drawn once a record: Gaussian random effects, marginalised by Woodbury's identity of rank 3. Errors along
+//! them count as far as records scatter there, errors beside them in full. ε is white noise plus noise of first order with
+//! memory, in proportion to the standard errors of the samples. The innovations of a Kalman filter of one state are white;
+//! that filter is linear, and one pass serves errors and derivatives.
+
+mod colour;
+mod estimate;
+
+pub use colour::{Colour, Filter};
+
+use crate::linalg::dot;
+
+/// Random effects of a record: offset, drift, level.
+const EFFECTS: usize = 3;
+
+/// The error of one record, and what is known of its noise.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Measurement minus model, y.
+    pub residual: Vec<f64>,
+    /// Variance of the measurement noise per sample, y²; as many values, all above 0.
+    pub variance: Vec<f64>,
+    /// The free run of the model, which the level's random effect is in proportion to, y. Not the measurement: that holds the
+    /// noise itself, and an effect along it would explain the noise away.
+    pub run: Vec<f64>,
+}
+
+/// The noise model of a set of records.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NoiseModel {
+    /// Variance of ε over that of the samples, at least 1 where standard errors are measured.
+    pub scale: f64,
+    /// The spectrum of ε.
+    pub colour: Colour,
+    /// Variance of a record's offset, y².
+    pub offset: f64,
+    /// Variance of a record's drift from its begin to its end, y².
+    pub drift: f64,
+    /// Variance of a record's level over the level itself.
+    pub level: f64,
+}
+
+impl NoiseModel {
+    /// Scale, share and memory of the colour, and the random effects.
+    pub const PARAMETERS: usize = 3 + EFFECTS;
+
+    /// The metric of a record whose samples have these variances, all above 0, and with this run of the model.
+    #[must_use]
+    pub fn metric(&self, variance: &[f64], run: &[f64]) -> Metric {
+        let filter = self.colour.filter(variance);
+        let effects = random_effects(&filter, run);
+        let variances = [self.offset, self.drift, self.level].map(|v| v / self.scale);
+        let (factor, log_determinant) = woodbury(&effects, variances);
+        let samples = variance.len() as f64;
+        Metric {
+            log_determinant: samples * self.scale.ln() + filter.log_determinant() + log_determinant,
+            scale: self.scale,
+            filter,
+            effects,
+            factor,
+        }
+    }
+
+    /// ln of the probability density of these errors, but for −½·n·ln 2π.
+    #[must_use]
+    pub fn log_likelihood(&self, errors: &[Series]) -> f64 {
+        let each = errors.iter().map(|error| {
+            let metric = self.metric(&error.variance, &error.run);
+            metric.log_likelihood(&error.residual)
+        });
+        each.sum()
+    }
+}
+
+/// Offset, drift and level as columns, whitened.
+fn random_effects(filter: &Filter, run: &[f64]) -> [Vec<f64>; EFFECTS] {
+    let n = run.len();
+    let last = n.saturating_sub(1).max(1) as f64;
+    let ramp: Vec<f64> = (0..n).map(|k| k as f64 / last - 0.5).collect();
+    [
+        filter.whiten(&vec![1.0; n]),
+        filter.whiten(&ramp),
+        filter.whiten(run),
+    ]
+}
+
+/// L with L·Lᵀ = D^½ (1 + D^½ ZᵀZ D^½)⁻¹ D^½ for whitened effects Z of variances D, and ln det(1 + D^½ ZᵀZ D^½).
+fn woodbury(
+    effects: &[Vec<f64>; EFFECTS],
+    variances: [f64; EFFECTS],
+) -> ([[f64; EFFECTS]; EFFECTS], f64) {
+    let gram: [[f64; EFFECTS]; EFFECTS] =
+        std::array::from_fn(|i| std::array::from_fn(|j| dot(&effects[i], &effects[j])));
+    woodbury_of(&gram, variances)
+}
+
+/// The same from ZᵀZ. By columns: with C·Cᵀ = 1 + D^½ ZᵀZ D^½, L = D^½ C⁻ᵀ.
+fn woodbury_of(
+    gram: &[[f64; EFFECTS]; EFFECTS],
+    variances: [f64; EFFECTS],
+) -> ([[f64; EFFECTS]; EFFECTS], f64) {
+    let deviation = variances.map(|v| v.max(0.0).sqrt());
+    let mut lower = [[0.0; EFFECTS]; EFFECTS];
+    for i in 0..EFFECTS {
+        for j in 0..=i {
+            let unit = if i == j { 1.0 } else { 0.0 };
+            let own = unit + deviation[i] * gram[i][j] * deviation[j];
+            let met: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
+            lower[i][j] = if i == j {
+                (own - met).max(f64::MIN_POSITIVE).sqrt()
+            } else {
+                (own - met) / lower[j][j]
+            };
+        }
+    }
+    let log_determinant = (0..EFFECTS).map(|i| 2.0 * lower[i][i].ln()).sum();
+    // The columns of C⁻¹, of which L = D^½ C⁻ᵀ is the transpose, scaled.
+    let columns: [[f64; EFFECTS]; EFFECTS] = std::array::from_fn(|column| {
+        let mut solved = [0.0; EFFECTS];
+        for i in column..EFFECTS {
+            let unit = if i == column { 1.0 } else { 0.0 };
+            let met = dot(&lower[i][column..i], &solved[column..i]);
+            solved[i] = (unit - met) / lower[i][i];
+        }
+        solved
+    });
+    let factor = std::array::from_fn(|i| columns[i].map(|x| deviation[i] * x));
+    (factor, log_determinant)
+}
+
+/// How far errors of one record are from none: the inverse of its noise covariance.
+#[derive(Clone, Debug)]
+pub struct Metric {
+    filter: Filter,
+    effects: [Vec<f64>; EFFECTS],
+    /// L of the random effects, see [`woodbury_of`].
+    factor: [[f64; EFFECTS]; EFFECTS],
+    scale: f64,
+    /// ln det of the covariance.
+    log_determinant: f64,
+}
+
+/// An error or a derivative in this metric.
+#[derive(Clone, Debug)]
+pub struct Whitened {
+    /// What the filter makes of it, unit variance per sample …
+    series: Vec<f64>,
+    /// … and what of that lies along the random effects.
+    along: [f64; EFFECTS],
+}
+
+impl Metric {
+    /// A series of the record in this metric.
+    #[must_use]
+    pub fn whiten(&self, series: &[f64]) -> Whitened {
+        let root = self.scale.sqrt();
+        let whitened: Vec<f64> = self
+            .filter
+            .whiten(series)
+            .iter()
+            .map(|x| x / root)
+            .collect();
+        let products: [f64; EFFECTS] = std::array::from_fn(|i| dot(&self.effects[i], &whitened));
+        let along = std::array::from_fn(|j| {
+            (0..EFFECTS)
+                .map(|i| self.factor[i][j] * products[i])
+                .sum::<f64>()
+        });
+        Whitened {
+            series: whitened,
+            along,
+        }
+    }
+
+    /// ln of the probability density of an error, but for −½·n·ln 2π.
+    #[must_use]
+    pub fn log_likelihood(&self, residual: &[f64]) -> f64 {
+        let whitened = self.whiten(residual);
+        -0.5 * (whitened.dot(&whitened) + self.log_determinant)
+    }
+}
+
+impl Whitened {
+    /// The inner product xᵀ Σ⁻¹ y.
+    #[must_use]
+    pub fn dot(&self, other: &Self) -> f64 {
+        let along: f64 = (0..EFFECTS).map(|i| self.along[i] * other.along[i]).sum();
+        dot(&self.series, &other.series) - along
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,246 @@
+//! How a record begins: at rest under a constant command, with an edge of the command at its first sample, or in
+//! mid-run.
+
+use super::RULES;
+use super::levels::two_levels;
+use super::reference::FirstOrder;
+use crate::data::Record;
+
+/// How a record begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Beginning {
+    /// The command before the first sample.
+    pub(super) command: f64,
+    /// First samples through which y rests; 0 in mid-run.
+    pub(super) rest: usize,
+    /// First samples of which the past is not recorded; 0 at rest.
+    pub(super) follow: usize,
+}
+
+/// A straight-line fit of y to a constant and one shape.
+struct Shape {
+    /// Sum of squares that it leaves.
+    left: f64,
+    /// Sum of squares of the motion that it describes.
+    motion: f64,
+}
+
+impl Shape {
+    fn of(y: &[f64], shape: impl Fn(usize) -> f64) -> Self {
+        let n = y.len() as f64;
+        let (mut s, mut ss, mut sy, mut sum) = (0.0, 0.0, 0.0, 0.0);
+        for (k, y) in y.iter().enumerate() {
+            let x = shape(k);
+            s += x;
+            ss += x * x;
+            sy += x * y;
+            sum += y;
+        }
+        let mean = sum / n;
+        let spread: f64 = y.iter().map(|y| (y - mean).powi(2)).sum();
+        let (square, product) = (ss - s * s / n, sy - s * mean);
+        let motion = if square > 1e-12 * ss.max(1e-300) {
+            product * product / square
+        } else {
+            0.0
+        };
+        Self {
+            left: (spread - motion).max(0.0),
+            motion,
+        }
+    }
+}
+
+impl Beginning {
+    /// How `record`, one of `set`, begins, judged by the response of `reference`.
+    pub(super) fn of(record: &Record, set: &[Record], reference: Option<&FirstOrder>) -> Self {
+        let first = record.u.first().copied().unwrap_or(0.0);
+        let held = record.u_before.unwrap_or(first);
+        let in_mid_run =
+            |dead_time: f64, time: f64| Self::in_mid_run(record, held, dead_time, time);
+        let Some(reference) = reference else {
+            return in_mid_run(0.0, 0.0);
+        };
+        let (dead_time, time) = (reference.dead_time, reference.time_constant);
+        let changes = |u: &f64| (u - first).abs() > 1e-9 * first.abs().max(1e-9);
+        let change = record.u.iter().position(changes).unwrap_or(record.len());
+        // An edge at the first sample is felt before one that the record shows.
+        let known_edge = (held - first).abs() > 1e-9 * first.abs().max(1e-9);
+        let edge = if known_edge { 0 } else { change };
+        let felt = |edge: usize| edge + (RULES.surely_before * dead_time).floor() as usize;
+        let enough = (RULES.times_of_rest * time + 2.0 * dead_time).ceil() as usize;
+        let window = felt(edge).min(record.len()).min(enough.max(5));
+        if window < RULES.fewest_at_rest {
+            return in_mid_run(dead_time, time);
+        }
+        let y = &record.y[..window];
+        let times = [0.5, 1.0, 2.0].map(|factor| factor * time);
+        let least = |shapes: Vec<Shape>| {
+            let by_rest = |a: &Shape, b: &Shape| a.left.total_cmp(&b.left);
+            shapes.into_iter().min_by(by_rest)
+        };
+        let relaxing = |y: &[f64]| {
+            least(
+                times
+                    .map(|time| Shape::of(y, |k| (-(k as f64) / time).exp()))
+                    .into(),
+            )
+        };
+        let answering = |y: &[f64]| {
+            let arrivals = [0.5, 0.7, 0.85, 1.0, 1.15, 1.3, 1.6].map(|factor| factor * dead_time);
+            let arrivals = arrivals.into_iter().filter(|at| at + 3.0 < y.len() as f64);
+            let each = arrivals.flat_map(|at| {
+                let answer = move |k: usize, time: f64| {
+                    let since = (k as f64 - at).max(0.0);
+                    1.0 - (-since / time).exp()
+                };
+                times.map(|time| (at, Shape::of(y, |k| answer(k, time))))
+            });
+            each.min_by(|a, b| a.1.left.total_cmp(&b.1.left))
+        };
+        // Which of the two it is shows where the answer has not begun yet, or has just begun.
+        let early = &y[..window.min((RULES.early * dead_time).ceil() as usize + 5)];
+        let (Some(relaxes), Some(relaxes_early)) = (relaxing(y), relaxing(early)) else {
+            return in_mid_run(dead_time, time);
+        };
+        let (answers, answers_early) = (answering(y), answering(early));
+        let range = range_of_y(set);
+        let moves = |shape: &Shape| {
+            let noise = shape.left / (window as f64 - 3.0).max(1.0);
+            let least =
+                (RULES.motion_at_rest * range).max(RULES.motion_unexplained * reference.left_rms);
+            let visible = least.powi(2) * window as f64;
+            shape.motion > visible && shape.motion > RULES.motion_over_noise * noise
+        };
+        let at_rest = |command: f64, rest: usize| Self {
+            command,
+            rest,
+            follow: 0,
+        };
+        let best = match &answers {
+            Some((_, answer)) if answer.left < relaxes.left => answer,
+            _ => &relaxes,
+        };
+        if !moves(best) {
+            return at_rest(held, window);
+        }
+        // An answer to an edge at the first sample, of a command of two levels.
+        let other = two_levels(set).and_then(|levels| levels.into_iter().find(|u| *u != first));
+        if let (Some((at, answer)), Some(other)) = (&answers_early, other)
+            && !known_edge
+            && record.u_before.is_none()
+            && answer.left < RULES.answer * relaxes_early.left
+        {
+            let rest = (RULES.surely_before * at).floor() as usize;
+            return at_rest(other, rest.max(1));
+        }
+        in_mid_run(dead_time, time)
+    }
+
+    /// A beginning in mid-run behind a command of `held`: what is on its way is followed to its arrival, what is slower
+    /// for as long as a record bears it.
+    fn in_mid_run(record: &Record, held: f64, dead_time: f64, time: f64) -> Self {
+        let most = record.len() / RULES.most_followed;
+        let share = record.len() / RULES.followed_share;
+        let arrives = (2.0 * dead_time).ceil() as usize + 2;
+        let fades = (RULES.times_of_rest * time).ceil() as usize;
+        Self {
+            command: held,
+            rest: 0,
+            follow: (arrives + fades).min(share).max(arrives.min(most.max(1))),
+        }
+    }
+
+    /// Takes rests that are too short to be sure of for what they are: where records rest at different levels under the
+    /// same command, something slow is still on its way, and those that show less than a motion takes begin in mid-run.
+    pub(super) fn reconcile(beginnings: &mut [Self], records: &[Record], reference: &FirstOrder) {
+        let level = |record: &Record, own: &Self| {
+            let rest = &record.y[..own.rest.min(record.y.len())];
+            rest.iter().sum::<f64>() / rest.len().max(1) as f64
+        };
+        let levels: Vec<Option<(f64, f64)>> = records
+            .iter()
+            .zip(&*beginnings)
+            .map(|(record, own)| (own.rest > 0).then(|| (own.command, level(record, own))))
+            .collect();
+        let apart = RULES.rests_apart * range_of_y(records);
+        let enough = RULES.times_of_rest * reference.time_constant;
+        for (own, record) in beginnings.iter_mut().zip(records) {
+            let same = levels
+                .iter()
+                .flatten()
+                .filter(|(command, _)| *command == own.command);
+            let (low, high) = same
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, y)| {
+                    (low.min(*y), high.max(*y))
+                });
+            if own.rest > 0 && (own.rest as f64) < enough && high - low > apart {
+                let (dead_time, time) = (reference.dead_time, reference.time_constant);
+                *own = Self::in_mid_run(record, own.command, dead_time, time);
+            }
+        }
+    }
+
+    /// Takes a record that begins where others rest under the other level of the command for one that rests there, with
+    /// an edge at its first sample.
+    pub(super) fn recognise(beginnings: &mut [Self], records: &[Record], reference: &FirstOrder) {
+        let Some(levels) = two_levels(records) else {
+            return;
+        };
+        let mean = |y: &[f64]| y.iter().sum::<f64>() / y.len().max(1) as f64;
+        let near = 0.5 * RULES.rests_apart * range_of_y(records);
+        let early = (RULES.surely_before * reference.dead_time).floor() as usize;
+        let rests: Vec<(f64, f64)> = records
+            .iter()
+            .zip(&*beginnings)
+            .filter(|(record, own)| own.rest > 0 && own.rest <= record.y.len())
+            .map(|(record, own)| (own.command, mean(&record.y[..own.rest])))
+            .collect();
+        for (own, record) in beginnings.iter_mut().zip(records) {
+            let first = record.u.first().copied().unwrap_or(0.0);
+            let other = levels.into_iter().find(|level| *level != first);
+            let Some(other) = other.filter(|_| own.follow > 0 && record.u_before.is_none()) else {
+                continue;
+            };
+            let under: Vec<f64> = rests
+                .iter()
+                .filter(|(command, _)| *command == other)
+                .map(|(_, level)| *level)
+                .collect();
+            if under.is_empty() || early == 0 || early > record.y.len() {
+                continue;
+            }
+            if (mean(&record.y[..early]) - mean(&under)).abs() < near {
+                *own = Self {
+                    command: other,
+                    rest: early,
+                    follow: 0,
+                };
+            }
+        }
+    }
+
+    /// Whether the record begins at rest under a command of `level`.
+    pub(super) fn rests_at(&self, level: f64) -> bool {
+        self.follow == 0 && self.command == level
+    }
+
+    /// The record with what is known of its beginning.
+    pub(super) fn filled_in(&self, record: &Record) -> Record {
+        let mut record = record.clone();
+        record.u_before.get_or_insert(self.command);
+        record.follow = self.follow;
+        record.lead = record.lead.max(self.follow);
+        if self.rest > 0 && record.y_before.is_none() {
+            let rest = &record.y[..self.rest.min(record.y.len())];
+            record.y_before = Some(rest.iter().sum::<f64>() / rest.len().max(1) as f64);
+        }
+        record
+    }
+}
+
+/// The distance from the least y of all records to the largest.
+pub(super) fn range_of_y(records: &[Record]) -> f64 {
+    let all = || records.iter().flat_map(|r| r.y.iter().copied());
+    all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min)
+}

@@ -1,0 +1,114 @@
+//! What is decided about records before any model: where they rest, what the command was before them, which of their
+//! samples are scored, what zero and size of command and response are.
+//!
+//! Everything here comes from the data alone, so that all hypotheses of a command are run over the same records, from
+//! the same beginnings, and scored on the same samples.
+
+mod beginning;
+mod command;
+mod levels;
+mod reference;
+mod rest;
+mod rules;
+
+pub use reference::FirstOrder;
+pub use rest::MovingZero;
+pub use rules::{RULES, Rules};
+
+use crate::data::Record;
+use crate::model::CommandRange;
+use beginning::Beginning;
+use std::fmt::Write as _;
+
+/// Records made ready, and what that found.
+#[derive(Clone, Debug)]
+pub struct Preparation {
+    /// The records: what was before their first sample and what of them is scored is filled in, and each is taken from
+    /// its own zero where that moves.
+    pub records: Vec<Record>,
+    /// The command of no jet and of a full one, in the unit of u.
+    pub command: CommandRange,
+    /// Whether a full jet of that range is one of the rig, and not only the largest command of the records.
+    pub full_is_known: bool,
+    /// y where the sensor shows nothing: where records rest under no command, or an estimate of that.
+    pub zero: f64,
+    /// Whether every record begins at rest under no command.
+    pub at_rest: bool,
+    /// The zero that differs between records, where it does.
+    pub moving_zero: Option<MovingZero>,
+    /// The first-order response that stands behind these decisions; none where u and y are unrelated.
+    pub reference: Option<FirstOrder>,
+}
+
+impl Preparation {
+    /// Prepares `records`; what a file says of a record's beginning stays as it is.
+    #[must_use]
+    pub fn of(records: &[Record]) -> Self {
+        let reference = FirstOrder::fitted(records);
+        let mut beginnings: Vec<Beginning> = records
+            .iter()
+            .map(|record| Beginning::of(record, records, reference.as_ref()))
+            .collect();
+        if let Some(reference) = &reference {
+            Beginning::reconcile(&mut beginnings, records, reference);
+            Beginning::recognise(&mut beginnings, records, reference);
+        }
+        let command = command::range_of(records, &beginnings, reference.as_ref());
+        let mut prepared: Vec<Record> = records
+            .iter()
+            .zip(&beginnings)
+            .map(|(record, beginning)| beginning.filled_in(record))
+            .collect();
+        let moving_zero = MovingZero::of(&prepared, &beginnings, command.off);
+        if moving_zero.is_some() {
+            rest::tare(&mut prepared, &beginnings, command.off);
+        }
+        let zero = rest::level_of_rest(&prepared, &beginnings, command.off)
+            .unwrap_or_else(|| rest::estimated_zero(&prepared, command, reference.as_ref()));
+        Self {
+            full_is_known: command.is_unit() || levels::two_levels(records).is_some(),
+            at_rest: beginnings.iter().all(|own| own.rests_at(command.off)),
+            records: prepared,
+            command,
+            zero,
+            moving_zero,
+            reference,
+        }
+    }
+
+    /// What the user should know of it, one sentence each.
+    #[must_use]
+    pub fn remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        let begun: Vec<&Record> = self.records.iter().filter(|r| r.follow > 0).collect();
+        if let Some(first) = begun.first() {
+            let mut text = format!(
+                "{} of {} records begin in mid-run: free runs follow the measurement for their first ",
+                begun.len(),
+                self.records.len()
+            );
+            let _ = write!(
+                text,
+                "{} samples ({} s), which are not scored.",
+                first.follow,
+                crate::picture::significant(first.follow as f64 * first.sample_period_s, 3)
+            );
+            remarks.push(text);
+        }
+        if self.command.off != 0.0 {
+            remarks.push(format!(
+                "No jet is a command of {}, a full jet one of {}.",
+                self.command.off, self.command.full
+            ));
+        }
+        remarks.extend(self.moving_zero.iter().map(ToString::to_string));
+        remarks
+    }
+}
+
+/// Samples of `records` that are scored, and samples in all.
+#[must_use]
+pub fn scored_samples(records: &[Record]) -> (usize, usize) {
+    let scored = records.iter().map(|r| r.len().saturating_sub(r.lead)).sum();
+    (scored, records.iter().map(Record::len).sum())
+}

@@ -1,0 +1,235 @@
+//! The first-order response with dead time that describes records best: what tells rest from motion, and how long
+//! an edge of the command takes to be felt.
+
+use super::RULES;
+use crate::data::Record;
+use rayon::prelude::*;
+
+/// y = level + gain·x with x_{k+1} = x_k + (1 − e^{−1/T})(u_{k−θ} − x_k), an initial state of each record aside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FirstOrder {
+    /// θ, samples, ≥ 0.
+    pub dead_time: f64,
+    /// T, samples, above 0.
+    pub time_constant: f64,
+    /// Change of y for each unit of u.
+    pub gain: f64,
+    /// y under u = 0.
+    pub level: f64,
+    /// Share of the variance of y that is explained, up to 1.
+    pub explained: f64,
+    /// What it leaves, y rms.
+    pub left_rms: f64,
+}
+
+/// A record with neighbouring samples averaged.
+struct Thinned {
+    u: Vec<f64>,
+    y: Vec<f64>,
+    before: f64,
+}
+
+impl Thinned {
+    fn of(record: &Record, stride: usize) -> Self {
+        let mean = |series: &[f64]| {
+            let chunks = series.chunks(stride);
+            chunks
+                .map(|c| c.iter().sum::<f64>() / c.len() as f64)
+                .collect()
+        };
+        Self {
+            u: mean(&record.u),
+            y: mean(&record.y),
+            before: record.u_before.or(record.u.first().copied()).unwrap_or(0.0),
+        }
+    }
+}
+
+/// Sums of products of 1, x and y, what an initial state explains taken off.
+#[derive(Clone, Copy, Default)]
+struct Moments {
+    one: f64,
+    x: f64,
+    y: f64,
+    xx: f64,
+    xy: f64,
+    yy: f64,
+}
+
+impl FirstOrder {
+    /// Fits the response to `records` by least squares over a grid that is refined; `None` where y does not follow u.
+    #[must_use]
+    pub fn fitted(records: &[Record]) -> Option<Self> {
+        let total: usize = records.iter().map(Record::len).sum();
+        let stride = total.div_ceil(RULES.reference_samples).max(1);
+        let thinned: Vec<Thinned> = records.iter().map(|r| Thinned::of(r, stride)).collect();
+        let longest = thinned.iter().map(|r| r.y.len()).max()? as f64;
+        let shortest = thinned.iter().map(|r| r.y.len()).min()? as f64;
+        let times: Vec<f64> = grid(RULES.shortest_time, longest, 1.5);
+        let mut delays: Vec<f64> = vec![0.0];
+        delays.extend(grid(1.0, (shortest / 3.0).max(1.0), 1.3));
+        let whole = whole_spread(&thinned);
+        if !(whole > 0.0 && whole.is_finite()) {
+            return None;
+        }
+        let points: Vec<(f64, f64)> = times
+            .iter()
+            .flat_map(|time| delays.iter().map(|delay| (*delay, *time)))
+            .collect();
+        let least = |points: Vec<(f64, f64)>| {
+            let each = points
+                .into_par_iter()
+                .map(|(delay, time)| (residual(&thinned, delay, time).0, delay, time));
+            let all: Vec<(f64, f64, f64)> = each.collect();
+            all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let (mut left, mut delay, mut time) = least(points)?;
+        let (mut wide, mut factor) = ((0.3 * delay).max(1.0), 1.3_f64);
+        for _ in 0..RULES.refinements {
+            let near = [-1.0, -0.5, 0.0, 0.5, 1.0];
+            let around = near.iter().flat_map(|i| {
+                let delay = (delay + i * wide).max(0.0);
+                near.map(|j| (delay, (time * factor.powf(j)).max(RULES.shortest_time)))
+            });
+            let best = least(around.collect())?;
+            if best.0 <= left {
+                (left, delay, time) = best;
+            }
+            wide *= 0.5;
+            factor = factor.sqrt();
+        }
+        let explained = 1.0 - left / whole;
+        let (_, level, gain) = residual(&thinned, delay, time);
+        let usable = gain.is_finite() && level.is_finite() && explained > RULES.related;
+        usable.then_some(Self {
+            dead_time: delay * stride as f64,
+            time_constant: time * stride as f64,
+            gain,
+            level,
+            explained,
+            left_rms: (left / thinned.iter().map(|r| r.y.len()).sum::<usize>().max(1) as f64)
+                .sqrt(),
+        })
+    }
+
+    /// y at rest under a command of `u`.
+    #[must_use]
+    pub fn at_rest(&self, u: f64) -> f64 {
+        self.level + self.gain * u
+    }
+}
+
+/// Numbers from `low` to `high`, each a factor above the one before.
+fn grid(low: f64, high: f64, factor: f64) -> Vec<f64> {
+    let grow = std::iter::successors(Some(low), |x| Some(x * factor));
+    grow.take_while(|x| *x <= high.max(low)).collect()
+}
+
+/// Σ (y − ȳ)² with the mean of all records.
+fn whole_spread(records: &[Thinned]) -> f64 {
+    let all = || records.iter().flat_map(|r| r.y.iter());
+    let count = all().count().max(1) as f64;
+    let mean = all().sum::<f64>() / count;
+    all().map(|y| (y - mean).powi(2)).sum()
+}
+
+/// Sum of squares that the response leaves, with its level and gain.
+fn residual(records: &[Thinned], delay: f64, time: f64) -> (f64, f64, f64) {
+    let mut sums = Moments::default();
+    for record in records {
+        let own = moments(record, delay, time);
+        sums.one += own.one;
+        sums.x += own.x;
+        sums.y += own.y;
+        sums.xx += own.xx;
+        sums.xy += own.xy;
+        sums.yy += own.yy;
+    }
+    let determinant = sums.one * sums.xx - sums.x * sums.x;
+    if determinant <= 1e-12 * sums.one * sums.xx {
+        return (f64::INFINITY, 0.0, 0.0);
+    }
+    let level = (sums.xx * sums.y - sums.x * sums.xy) / determinant;
+    let gain = (sums.one * sums.xy - sums.x * sums.y) / determinant;
+    let left = sums.yy - level * sums.y - gain * sums.xy;
+    (left.max(0.0), level, gain)
+}
+
+/// The moments of a record, without what an initial state that fades explains.
+fn moments(record: &Thinned, delay: f64, time: f64) -> Moments {
+    let whole = delay.floor();
+    let (fraction, lag) = (delay - whole, whole as usize);
+    let kept = (-1.0 / time).exp();
+    let at = |k: usize, lag: usize| k.checked_sub(lag).map_or(record.before, |k| record.u[k]);
+    let (mut x, mut state) = (record.before, 1.0);
+    let mut sums = Moments::default();
+    let (mut e_one, mut e_x, mut e_y, mut e_e) = (0.0, 0.0, 0.0, 0.0);
+    for (k, y) in record.y.iter().enumerate() {
+        sums.one += 1.0;
+        sums.x += x;
+        sums.y += y;
+        sums.xx += x * x;
+        sums.xy += x * y;
+        sums.yy += y * y;
+        e_one += state;
+        e_x += state * x;
+        e_y += state * y;
+        e_e += state * state;
+        let u = at(k, lag) + fraction * (at(k, lag + 1) - at(k, lag));
+        x += (1.0 - kept) * (u - x);
+        state *= kept;
+    }
+    sums.one -= e_one * e_one / e_e;
+    sums.x -= e_one * e_x / e_e;
+    sums.y -= e_one * e_y / e_e;
+    sums.xx -= e_x * e_x / e_e;
+    sums.xy -= e_x * e_y / e_e;
+    sums.yy -= e_y * e_y / e_e;
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Use;
+
+    /// A first order with dead time that begins at `start`, at a level of 20.
+    fn record(dead_time: usize, time: f64, start: f64, samples: usize) -> Record {
+        let u: Vec<f64> = (0..samples)
+            .map(|k| f64::from(u8::from(k / 90 % 2 == 1)))
+            .collect();
+        let mut y = start;
+        let series = (0..samples).map(|k| {
+            let now = y;
+            let arriving = k.checked_sub(dead_time).map_or(u[0], |k| u[k]);
+            y += (20.0 + 30.0 * arriving - y) * (1.0 - (-1.0 / time).exp());
+            now
+        });
+        let series = series.collect();
+        Record::new("r", Use::Identify, 1.0, u, series)
+    }
+
+    #[test]
+    fn a_first_order_is_found_from_rest_and_from_mid_run() {
+        for (dead_time, time, start) in [(15, 40.0, 20.0), (0, 6.0, 20.0), (30, 80.0, 43.0)] {
+            let found = FirstOrder::fitted(&[record(dead_time, time, start, 900)]);
+            let found = found.expect("y follows u");
+            assert!(
+                (found.dead_time - dead_time as f64).abs() < 0.6,
+                "{found:?}"
+            );
+            assert!((found.time_constant / time - 1.0).abs() < 0.05, "{found:?}");
+            assert!((found.at_rest(0.0) - 20.0).abs() < 0.2, "{found:?}");
+            assert!((found.at_rest(1.0) - 50.0).abs() < 0.5, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn noise_follows_nothing() {
+        let mut record = record(0, 5.0, 20.0, 900);
+        for (k, y) in record.y.iter_mut().enumerate() {
+            *y = f64::from((k as u32).wrapping_mul(2_654_435_761) >> 8);
+        }
+        assert_eq!(FirstOrder::fitted(&[record]), None);
+    }
+}

@@ -1,0 +1,66 @@
+//! What usual linear models reach on the samples that a model is scored on.
+
+use crate::baseline::{BaselineFits, Baselines};
+use crate::data::{Record, Use};
+use crate::preparation::scored_samples;
+use serde::Serialize;
+
+/// Baselines beside a model, on the same scored samples.
+#[derive(Clone, Debug, Serialize)]
+pub struct Beside {
+    /// FIT of each, %: on the validation records, or on the estimation records where there are none.
+    #[serde(rename = "baselines")]
+    pub fits: BaselineFits,
+    /// Samples that are scored, of all records.
+    pub scored_samples: usize,
+    /// Samples of all records.
+    #[serde(skip)]
+    pub samples: usize,
+    /// The baselines in words, one line each.
+    #[serde(skip)]
+    pub words: Vec<String>,
+}
+
+impl Beside {
+    /// Fits the baselines to the estimation records among prepared `records`, and scores them as models are scored.
+    pub(super) fn of(records: &[Record]) -> Self {
+        let of = |role: Use| -> Vec<&Record> {
+            let own = records.iter().filter(|record| record.role == role);
+            own.collect()
+        };
+        let (mut learning, mut judged) = (of(Use::Identify), of(Use::Validate));
+        if learning.is_empty() {
+            learning.clone_from(&judged);
+        }
+        if judged.is_empty() {
+            judged.clone_from(&learning);
+        }
+        let found = Baselines::fit(&learning);
+        let ranges = judged
+            .iter()
+            .map(|record| (*record, record.lead..record.len()));
+        let fits = found.fit_percent(&ranges.collect::<Vec<_>>());
+        let (scored, samples) = scored_samples(records);
+        Self {
+            words: found.words(&fits),
+            fits,
+            scored_samples: scored,
+            samples,
+        }
+    }
+
+    /// What the user should know of a model with this FIT beside the best baseline, if that is better.
+    pub(super) fn better_than(&self, fit_percent: f64) -> Option<String> {
+        let (name, best) = self.fits.best()?;
+        let behind = best - fit_percent;
+        (behind.is_nan() || behind > BEHIND_POINTS).then(|| {
+            format!(
+                "A {name} reaches {best:.1} % FIT on the same samples, more than this model ({fit_percent:.1} %): the \
+                 structure over-fits these records. Record more, or use `--n1 1 --n2 0`."
+            )
+        })
+    }
+}
+
+/// A model this far behind a baseline is not the answer, points of FIT.
+const BEHIND_POINTS: f64 = 1.0;

@@ -1,0 +1,137 @@
+//! An error beside the noise level, worded once for every step.
+
+use super::{Answer, Tone, verdict::times};
+use crate::analysis::{Correlation, Residuals, correlations};
+use crate::baseline::BaselineFits;
+use crate::data::{Record, Use};
+use crate::indicators::{Indicators, Scores};
+use crate::picture::significant;
+use crate::residual::Failures;
+
+/// "2.64 × the noise level (RMSE 0.0273, FIT 92.7 %)"; without the ratio where there is no `y_sd`.
+pub(super) fn beside_noise(all: &Indicators) -> String {
+    let noise = all.noise_rmse.filter(|noise| *noise > 0.0);
+    let rmse = significant(all.rmse, 3);
+    match noise {
+        Some(noise) => format!(
+            "{} × the noise level (RMSE {rmse}, FIT {:.1} %)",
+            times(all.rmse / noise),
+            all.fit_percent
+        ),
+        None => format!("RMSE {rmse} (FIT {:.1} %)", all.fit_percent),
+    }
+}
+
+/// "validation error", or "estimation error" where no record is marked `validate`.
+pub(super) fn error_name(role: Use) -> &'static str {
+    match role {
+        Use::Validate => "validation error",
+        Use::Identify => "estimation error",
+    }
+}
+
+/// The residual test of an output-error model: the share of lags at which the cross-correlation of u and the residual
+/// lies outside its 95 % band. The autocorrelation is no test here, because measurement noise may be coloured.
+fn residual_test((_, cross): &(Correlation, Correlation)) -> String {
+    format!(
+        "Residual test: {:.0} % of the cross-correlation with u lies outside its 95 % band (5 % expected of a complete model).",
+        100.0 * cross.outside
+    )
+}
+
+/// The answer of a comparison.
+pub(super) fn compared(
+    scores: &Scores,
+    failures: &Failures,
+    records: &[Record],
+    runs: &[Vec<f64>],
+) -> Answer {
+    let Some(all) = scores.held_out() else {
+        return Answer::new(Tone::Warning, "there is no record to compare with");
+    };
+    let error = error_name(all.role);
+    let answer = if failures.above_noise {
+        Answer::new(
+            Tone::Warning,
+            format!("the {error} exceeds the noise level"),
+        )
+        .next("host-fit diagnose model.toml DATASET --report diagnosis.html")
+    } else {
+        Answer::new(Tone::Good, format!("the {error} is at the noise level"))
+            .next("host-fit design model.toml --goal maximise -o controlled.toml")
+    };
+    answer
+        .evidence(format!(
+            "The {error} of the free run is {}.",
+            beside_noise(all)
+        ))
+        .confidence(residual_test(&correlations(&Residuals::of(records, runs))))
+}
+
+/// The answer of an identification; `parameters` are those of the model.
+pub(super) fn identified(scores: &Scores, fits: &BaselineFits, parameters: usize) -> Answer {
+    let Some(all) = scores.held_out() else {
+        return Answer::new(Tone::Warning, "the model has no record to be judged on");
+    };
+    let error = error_name(all.role);
+    let baseline = fits.best().map_or_else(String::new, |(name, fit)| {
+        format!(" The best linear baseline ({name}) reaches FIT {fit:.1} %.")
+    });
+    let answer = Answer::new(
+        Tone::Finding,
+        format!("model identified, FIT {:.1} %", all.fit_percent),
+    )
+    .evidence(format!(
+        "The {error} of the free run is {}, with {parameters} parameters.{baseline}",
+        beside_noise(all)
+    ))
+    .next("host-fit diagnose model.toml DATASET --report diagnosis.html");
+    answer.confidence(match all.role {
+        Use::Validate => "Choices were made on the validation records, so this error is optimistic.",
+        Use::Identify => {
+            "Not independent: no record is marked `validate`, so the error is of the records that were fitted."
+        }
+    })
+}
+
+/// The answer of an extension by `effects`.
+pub(super) fn extended(
+    effects: &str,
+    before: Option<&Indicators>,
+    after: Option<&Indicators>,
+) -> Answer {
+    let Some(after) = after else {
+        return Answer::new(Tone::Warning, "the model has no record to be judged on");
+    };
+    let error = error_name(after.role);
+    let was = before.map_or_else(
+        || "It diverged before".to_owned(),
+        |before| format!("It was {} before", beside_noise(before)),
+    );
+    Answer::new(
+        Tone::Finding,
+        format!("{effects} added, the {error} is lower"),
+    )
+    .evidence(format!(
+        "The {error} of the free run is {}. {was}.",
+        beside_noise(after)
+    ))
+    .confidence("A refit is not a significance test; `host-fit diagnose` gives the p-value.")
+    .next("host-fit compare model.toml DATASET --report report.html")
+}
+
+/// The answer of several models side by side: the best one first.
+pub(super) fn ranked<'a>(models: impl Iterator<Item = (&'a str, &'a Scores)>) -> Answer {
+    let judged = models.filter_map(|(name, scores)| Some((name, scores.held_out()?)));
+    let mut judged: Vec<(&str, &Indicators)> = judged.collect();
+    judged.sort_by(|a, b| a.1.rmse.total_cmp(&b.1.rmse));
+    let Some((name, best)) = judged.first() else {
+        return Answer::new(Tone::Warning, "there is no record to compare with");
+    };
+    let error = error_name(best.role);
+    let next = judged.get(1).map_or_else(String::new, |(other, second)| {
+        format!(" Next best: {other}, {}.", beside_noise(second))
+    });
+    Answer::new(Tone::Finding, format!("{name} has the lowest {error}"))
+        .evidence(format!("Free run of {name}: {}.{next}", beside_noise(best)))
+}

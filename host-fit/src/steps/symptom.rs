@@ -1,0 +1,314 @@
+//! The two parts of an effect's name: what the records show, and what it is in this kind of plant.
+
+use crate::data::Plant;
+use crate::diagnose::{FLOW_LAG, FLOW_MEMORY, ParameterEstimate};
+use crate::picture::significant;
+use model_core::effects::spec;
+use std::collections::BTreeMap;
+
+/// Parameters of an effect by name.
+pub(super) type Estimates = BTreeMap<String, ParameterEstimate>;
+
+/// What the records show where `effect` is named: behaviour that any plant can have. The test certifies this part.
+/// `{name}` stands for a fitted parameter.
+const SHOWN: [(&str, &str); 23] = [
+    (
+        "valve-lag",
+        "an additional lag between the command and its effect",
+    ),
+    (
+        "plenum-droop",
+        "a gain that falls while the command stays on and recovers at rest",
+    ),
+    (
+        "free-stream-variation",
+        "a gain that follows a measured channel",
+    ),
+    (
+        "input-nonlinearity",
+        "a response that is not proportional to the command",
+    ),
+    (
+        "echo-path",
+        "a second, later copy of the response to the command",
+    ),
+    (
+        "starting-vortex",
+        "an additional response after each rising edge that decays",
+    ),
+    (
+        "stopping-vortex",
+        "an undershoot after each falling edge that decays",
+    ),
+    (
+        "state-dependent-delay",
+        "a dead time that shortens as y rises",
+    ),
+    (
+        "edge-dependent-delay",
+        "different dead times of rising and falling edges",
+    ),
+    (
+        "attachment-hysteresis",
+        "two stable levels of y with hysteresis between them",
+    ),
+    (
+        "amplitude-saturation",
+        "a rate of change that depends on the cube of y",
+    ),
+    (
+        "bouc-wen-hysteresis",
+        "a smooth hysteresis loop between y and its restoring rate",
+    ),
+    (
+        "dry-friction",
+        "a constant resistance against the motion of y",
+    ),
+    (
+        "quadratic-drag",
+        "a resistance that grows with the square of the rate of y",
+    ),
+    (
+        "vortex-shedding",
+        "a lightly damped oscillation{frequency} that the command excites",
+    ),
+    ("rectifying-sensor", "a reading that loses the sign of y"),
+    (
+        "hot-film-nonlinearity",
+        "a curved static characteristic of the reading",
+    ),
+    (
+        "hot-film-lag",
+        "an additional lag between y and its reading",
+    ),
+    (
+        "thermal-drift",
+        "a reading that drifts towards a final value during a record",
+    ),
+    (
+        "electrical-pickup",
+        "a share of the command in the reading without any delay",
+    ),
+    ("sensor-saturation", "a reading with a fixed limit"),
+    (FLOW_LAG, "a second lag in series with the first"),
+    (
+        FLOW_MEMORY,
+        "a response that depends on its own past over a long time",
+    ),
+];
+
+/// The check at the bench that would confirm the interpretation in a flow, one sentence each.
+const CHECKS: [(&str, &str); 21] = [
+    (
+        "valve-lag",
+        "measure the jet velocity with the tunnel off: its rise after an edge shows the same lag",
+    ),
+    (
+        "plenum-droop",
+        "record the plenum pressure during a long pulse: it falls with the same time constant",
+    ),
+    (
+        "free-stream-variation",
+        "hold the free stream constant and repeat one record: the misfit disappears",
+    ),
+    (
+        "input-nonlinearity",
+        "measure the jet velocity at several commands with the tunnel off",
+    ),
+    (
+        "echo-path",
+        "move the sensor or block one jet: the second arrival moves or disappears",
+    ),
+    (
+        "starting-vortex",
+        "take phase-locked images 10 to 50 ms after a rising edge",
+    ),
+    (
+        "stopping-vortex",
+        "take phase-locked images 10 to 50 ms after a falling edge",
+    ),
+    (
+        "state-dependent-delay",
+        "repeat single pulses at several levels of y and read off the dead times",
+    ),
+    (
+        "edge-dependent-delay",
+        "measure the jet velocity with the tunnel off: the two edges differ there too",
+    ),
+    (
+        "attachment-hysteresis",
+        "raise and lower the duty cycle slowly and compare the levels of y",
+    ),
+    (
+        "amplitude-saturation",
+        "repeat one pulse train at several free-stream velocities",
+    ),
+    (
+        "bouc-wen-hysteresis",
+        "raise and lower the duty cycle slowly and compare the levels of y",
+    ),
+    (
+        "dry-friction",
+        "give the smallest command that moves y and look for a dead zone",
+    ),
+    (
+        "quadratic-drag",
+        "repeat one step at several amplitudes: the decay slows at small ones",
+    ),
+    (
+        "vortex-shedding",
+        "look for the same frequency in a hot wire in the wake",
+    ),
+    (
+        "rectifying-sensor",
+        "turn the sensor by 180 degrees: a sign-blind one reads the same",
+    ),
+    (
+        "hot-film-nonlinearity",
+        "calibrate the sensor against a Preston tube",
+    ),
+    (
+        "hot-film-lag",
+        "give the sensor alone a step of its heating current, or open a shutter",
+    ),
+    (
+        "thermal-drift",
+        "let the sensor warm up for an hour and repeat one record",
+    ),
+    (
+        "electrical-pickup",
+        "play the command with the air shut off: the reading still follows it",
+    ),
+    (
+        "sensor-saturation",
+        "compare the largest readings with the range of the converter",
+    ),
+];
+
+/// Candidates with a similar residual, and what distinguishes them.
+const CONFUSED: [(&str, &str); 12] = [
+    (
+        "valve-lag",
+        "`hot-film-lag` and a second lag of the flow: lags in series commute. Only a bench check distinguishes them.",
+    ),
+    (
+        "hot-film-lag",
+        "`valve-lag` and a second lag of the flow: lags in series commute. Only a bench check distinguishes them.",
+    ),
+    (
+        "plenum-droop",
+        "`echo-path` with a negative gain and `thermal-drift`: records with long and short rests distinguish them.",
+    ),
+    (
+        "echo-path",
+        "a longer memory of the flow, `starting-vortex`: random on-times distinguish them.",
+    ),
+    (
+        "starting-vortex",
+        "`plenum-droop` with a short recovery: single pulses after long rests distinguish them.",
+    ),
+    (
+        "stopping-vortex",
+        "`edge-dependent-delay`: pulses of several lengths distinguish them.",
+    ),
+    (
+        "edge-dependent-delay",
+        "`state-dependent-delay` and `valve-lag`: edges at several levels of y distinguish them.",
+    ),
+    (
+        "state-dependent-delay",
+        "`edge-dependent-delay`: edges at several levels of y distinguish them.",
+    ),
+    (
+        "attachment-hysteresis",
+        "`bouc-wen-hysteresis`: small loops inside the large one distinguish them.",
+    ),
+    (
+        "bouc-wen-hysteresis",
+        "`attachment-hysteresis`: small loops inside the large one distinguish them.",
+    ),
+    (
+        "hot-film-nonlinearity",
+        "`amplitude-saturation`: a calibration of the sensor alone distinguishes them.",
+    ),
+    (
+        "thermal-drift",
+        "a record-to-record offset and `plenum-droop`: repeat one record after an hour of warming up.",
+    ),
+];
+
+/// What is observed, the bench check and what it is confused with, for the catalogue of effects.
+pub(super) fn described(effect: &str) -> [Option<&'static str>; 3] {
+    let of = |table: &'static [(&str, &str)]| {
+        let found = table.iter().find(|(name, _)| *name == effect);
+        found.map(|(_, text)| *text)
+    };
+    [of(&SHOWN), of(&CHECKS), of(&CONFUSED)]
+}
+
+/// What the records show where `effect` is named.
+pub(super) fn shown(effect: &str, parameters: Option<&Estimates>) -> Option<String> {
+    let (_, text) = SHOWN.iter().find(|(name, _)| *name == effect)?;
+    let frequency = parameters.and_then(|own| own.get("frequency"));
+    let at = frequency.map_or_else(String::new, |f| {
+        format!(" at {} Hz", significant(f.value, 3))
+    });
+    Some(text.replace("{frequency}", &at))
+}
+
+/// What `effect` is in a plant of this kind, with the check that would confirm it; none where the name says nothing
+/// about the plant.
+pub(super) fn meant(effect: &str, plant: Plant) -> Option<String> {
+    if plant != Plant::Flow {
+        return None;
+    }
+    let summary = spec(effect)?.summary;
+    let check = CHECKS.iter().find(|(name, _)| *name == effect);
+    let check = check.map_or_else(String::new, |(_, check)| format!(" Bench check: {check}."));
+    Some(format!("In a flow this is `{effect}`: {summary}.{check}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model_core::effects::SPECS;
+
+    /// A name without its observed part would be interpretation alone.
+    #[test]
+    fn every_effect_has_both_parts() {
+        for card in SPECS {
+            assert!(shown(card.name, None).is_some(), "{}", card.name);
+            assert!(
+                CHECKS.iter().any(|(name, _)| *name == card.name),
+                "{}",
+                card.name
+            );
+            let meant = meant(card.name, Plant::Flow).unwrap();
+            assert!(meant.contains(card.summary), "{meant}");
+            assert_eq!(super::meant(card.name, Plant::Thermal), None);
+        }
+    }
+
+    #[test]
+    fn a_frequency_is_said_where_it_is_known() {
+        let own = Estimates::from([(
+            "frequency".to_owned(),
+            ParameterEstimate {
+                value: 23.71,
+                unit: "Hz".to_owned(),
+                low: 23.0,
+                high: 24.4,
+            },
+        )]);
+        let text = shown("vortex-shedding", Some(&own)).unwrap();
+        assert!(
+            text.starts_with("a lightly damped oscillation at 23.7 Hz"),
+            "{text}"
+        );
+        let text = shown("vortex-shedding", None).unwrap();
+        assert!(
+            text.starts_with("a lightly damped oscillation that"),
+            "{text}"
+        );
+    }
+}

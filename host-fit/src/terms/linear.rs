@@ -1,0 +1,92 @@
+//! The baselines as models of ours: a base that such a simple model beats is not handed over.
+
+use crate::baseline::{Arx, Baselines, Recursion};
+use crate::data::Record;
+use crate::model::{Delay, Model, Start};
+use model_core::effects::ConstantDelay;
+
+/// First order, second order and ARX(2,2) on `records`, as linear models that start from measurements; those that
+/// exist, in the units of the records.
+pub(crate) fn baselines(frame: &Model, records: &[&Record]) -> Vec<Model> {
+    let found = Baselines::fit(records);
+    let period = frame.sample_period_s;
+    let first = found.fopdt.map(|first| first.recursion(period));
+    let second = found.sopdt.map(|second| second.recursion(period));
+    let [first, second] = [first, second].map(|found| Some(recursion(frame, found?)));
+    let arx = found.arx.map(|found| arx(frame, &found));
+    let all = [first, second, arx].into_iter().flatten();
+    all.filter(|model| model.values().iter().all(|v| v.is_finite()))
+        .collect()
+}
+
+/// A linear model with the given lags, its inputs a sample apart behind `delay` samples.
+fn linear(frame: &Model, a: Vec<f64>, b: Vec<f64>, constant: f64, delay: f64) -> Model {
+    let lags: Vec<u16> = (1..=a.len() as u16).collect();
+    let whole = delay.max(0.0);
+    // Factors of a law are relative: of a delay below a sample there is none.
+    let delays: Vec<u16> = (0..b.len() as u16)
+        .map(|later| (whole.round().clamp(0.0, 60_000.0) as u16) + later)
+        .collect();
+    Model {
+        start: Start::Measured,
+        constant,
+        state_lags: lags,
+        a,
+        product_lags: vec![1],
+        c: vec![0.0; b.len()],
+        delay: if b.len() == 1 {
+            Delay::of::<ConstantDelay<f64>>(&[whole], vec![1.0], true)
+        } else {
+            Delay::Fixed { delays }
+        },
+        b,
+        effects: Vec::new(),
+        ..frame.clone()
+    }
+}
+
+fn recursion(frame: &Model, found: Recursion) -> Model {
+    linear(frame, found.a, found.b, found.constant, found.delay as f64)
+}
+
+fn arx(frame: &Model, arx: &Arx) -> Model {
+    let delay = arx.delay.saturating_sub(1) as f64;
+    linear(frame, arx.a.to_vec(), arx.b.to_vec(), arx.c, delay)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Use;
+
+    #[test]
+    fn baselines_run_as_models_do() {
+        let n = 3000;
+        let u: Vec<f64> = (0..n)
+            .map(|k| f64::from(u8::from(k / 170 % 2 == 1)))
+            .collect();
+        let (mut fast, mut slow) = (0.0, 0.0);
+        let y = (0..n).map(|k: usize| {
+            let now = 3.0 + slow;
+            let arriving = k.checked_sub(12).map_or(0.0, |k| u[k]);
+            fast += (2.0 * arriving - fast) / 8.0;
+            slow += (fast - slow) / 60.0;
+            now
+        });
+        let y = y.collect();
+        let record = Record::new("r", Use::Identify, 0.001, u, y);
+        let record = crate::preparation::Preparation::of(&[record])
+            .records
+            .remove(0);
+        let models = baselines(&Model::default(), &[&record]);
+        assert_eq!(models.len(), 3);
+        let rms = |model: &Model| {
+            let run = model.free_run(&record).expect("stable");
+            let squares = run.iter().zip(&record.y).map(|(a, b)| (a - b).powi(2));
+            (squares.sum::<f64>() / n as f64).sqrt()
+        };
+        assert!(rms(&models[0]) < 0.06, "{}", rms(&models[0]));
+        assert!(rms(&models[1]) < 0.03, "{}", rms(&models[1]));
+        assert!(rms(&models[2]) < 0.03, "{}", rms(&models[2]));
+    }
+}

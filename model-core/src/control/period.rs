@@ -1,0 +1,89 @@
+//! Loop periods, and times in samples of them.
+//!
+//! Whatever is a time to a user (a valve's shortest times, a failsafe's patience) is stated in seconds and becomes
+//! samples here, on the host and on the board alike.
+
+/// Shortest loop period that laws and boards are made for, µs.
+pub const SHORTEST_US: u32 = 200;
+/// Longest loop period that laws and boards are made for, µs.
+pub const LONGEST_US: u32 = 100_000;
+
+/// A period in whole microseconds, the nearest: what the boards' timers count. `None` outside of
+/// [`SHORTEST_US`] to [`LONGEST_US`].
+///
+/// ```
+/// use model_core::control::period::loop_period_us;
+/// assert_eq!(loop_period_us(0.001), Some(1000));
+/// assert_eq!(loop_period_us(0.1), Some(100_000));
+/// assert_eq!(loop_period_us(1e-4), None);
+/// assert_eq!(loop_period_us(f64::NAN), None);
+/// ```
+#[must_use]
+pub const fn loop_period_us(period_s: f64) -> Option<u32> {
+    // Saturates, and no number is 0.
+    let us = (period_s * 1e6 + 0.5) as u32;
+    if us >= SHORTEST_US && us <= LONGEST_US {
+        Some(us)
+    } else {
+        None
+    }
+}
+
+/// The fewest samples that last at least `time_s`: rounded up, and at least 1. An excess of a thousandth of a sample is
+/// the rounding of a printed time, or of an `f32`, and is no further sample.
+///
+/// ```
+/// use model_core::control::period::samples_at_least;
+/// assert_eq!(samples_at_least(0.010, 0.001), 10);
+/// assert_eq!(samples_at_least(0.0101, 0.001), 11);
+/// assert_eq!(samples_at_least(0.010, 0.1), 1);
+/// assert_eq!(samples_at_least(0.004_f32.into(), 0.001_f32.into()), 4);
+/// ```
+#[must_use]
+pub const fn samples_at_least(time_s: f64, period_s: f64) -> u32 {
+    let samples = time_s / period_s - 1e-3;
+    // Saturates, and no number is 0.
+    let whole = samples as u32;
+    let up = if (whole as f64) < samples {
+        whole.saturating_add(1)
+    } else {
+        whole
+    };
+    if up == 0 { 1 } else { up }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_kept_whatever_the_period() {
+        for period in [2e-4, 1e-3, 1.0 / 1024.0, 0.01, 0.1] {
+            for time in [1e-5, 4e-3, 0.0123, 0.5, 7.0] {
+                let samples = samples_at_least(time, period);
+                let kept = f64::from(samples) * period;
+                assert!(
+                    kept >= time - 1.1e-3 * period,
+                    "{time} at {period}: {samples}"
+                );
+                assert!(
+                    samples == 1 || kept < time + period,
+                    "{time} at {period}: {samples}"
+                );
+            }
+        }
+        assert_eq!(samples_at_least(f64::INFINITY, 0.001), u32::MAX);
+        assert_eq!(samples_at_least(f64::NAN, 0.001), 1);
+        assert_eq!(samples_at_least(-1.0, 0.001), 1);
+    }
+
+    #[test]
+    fn the_ends_belong_to_the_range() {
+        assert_eq!(loop_period_us(2e-4), Some(SHORTEST_US));
+        assert_eq!(loop_period_us(0.1_f32.into()), Some(LONGEST_US));
+        assert_eq!(loop_period_us(1.9e-4), None);
+        assert_eq!(loop_period_us(0.11), None);
+        assert_eq!(loop_period_us(1e12), None);
+        assert_eq!(loop_period_us(-0.001), None);
+    }
+}

@@ -1,0 +1,391 @@
+//! Tables of numbers as text: whatever separates their columns, marks their decimals and precedes their rows.
+
+use std::collections::HashSet;
+
+use super::cell::Marks;
+use super::column::Column;
+use super::delimited::{Rows, Separator, is_comment};
+use super::labelled::{Labels, arrows, leading};
+use super::problem::ImportProblem;
+use super::source::{Budget, Source, fault};
+use crate::error::{DataError, DataProblem, FilePlace, printable};
+
+/// Most cells of a row: as many columns as a spreadsheet has.
+const WIDEST: usize = 16_384;
+/// Bytes of memory that a line takes beside its text, and a cell: its value and its last place, and its copy in a record.
+const LINE: u64 = 32;
+const CELL: u64 = 24;
+
+/// Name of the column that a serial monitor's clock makes.
+const MONITOR: &str = "received";
+
+/// How lines become rows.
+enum Layout {
+    Table(Rows),
+    Labelled(Labels),
+}
+
+/// One line as a row.
+enum Line {
+    Row,
+    /// Nothing of a row; it may stand between rows.
+    Other,
+    /// A row with too few or too many cells.
+    Length(usize),
+}
+
+impl Layout {
+    fn of(lines: &[&str]) -> Result<Self, DataError> {
+        if let Some(labels) = Labels::of(lines) {
+            return Ok(Self::Labelled(labels));
+        }
+        if let Some(rows) = Rows::find(lines) {
+            return Ok(Self::Table(rows));
+        }
+        Err(match Rows::nearest(lines) {
+            Some((at, text)) => FilePlace::default()
+                .at_line(at as u64 + 1)
+                .error(ImportProblem::NearlyRow(printable(&text)).into()),
+            None => fault(ImportProblem::NoTable),
+        })
+    }
+
+    /// Index of the first line that may be a row.
+    fn first(&self) -> usize {
+        match self {
+            Self::Table(rows) => rows.first,
+            Self::Labelled(_) => 0,
+        }
+    }
+
+    /// Cells of a row.
+    fn width(&self) -> usize {
+        match self {
+            Self::Table(rows) => rows.width,
+            Self::Labelled(labels) => labels.0.len(),
+        }
+    }
+
+    fn split<'a>(&self, line: &'a str, cells: &mut Vec<&'a str>) -> Line {
+        match self {
+            Self::Labelled(labels) => match labels.split(line, cells) {
+                true => Line::Row,
+                false => Line::Other,
+            },
+            Self::Table(_) if is_comment(line) => Line::Other,
+            Self::Table(rows) => {
+                rows.separator.split(line, cells);
+                // Programs that end a row with separators make no empty columns of them.
+                while cells.len() > rows.width && cells.last().is_some_and(|c| c.is_empty()) {
+                    cells.pop();
+                }
+                match cells.len() == rows.width {
+                    true => Line::Row,
+                    false => Line::Length(cells.len()),
+                }
+            }
+        }
+    }
+
+    fn is_parted_by_commas(&self) -> bool {
+        matches!(self, Self::Table(rows) if rows.separator == Separator::Comma)
+    }
+
+    fn words(&self) -> String {
+        match self {
+            Self::Table(rows) => format!("table separated by {}", rows.separator.words()),
+            Self::Labelled(_) => "lines of labelled values".to_owned(),
+        }
+    }
+}
+
+/// The columns of a table.
+pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, DataError> {
+    // The text beside its bytes, and where its lines are.
+    let lines = bytes.iter().filter(|b| **b == b'\n').count() as u64 + 1;
+    budget.take(2 * bytes.len() as u64 + lines * LINE, || {
+        "its text".to_owned()
+    })?;
+    let text = decode(bytes)?;
+    let mut lines: Vec<&str> = text.lines().collect();
+    let is_cut = !text.ends_with('\n');
+    let parted = arrows(&lines).or_else(|| Labels::of(&lines).and_then(|_| leading(&lines)));
+    let stamps = parted.map(|parted| {
+        lines = parted.iter().map(|(_, rest)| *rest).collect();
+        let stamps = parted.iter().map(|(stamp, _)| *stamp);
+        stamps.collect::<Vec<&str>>()
+    });
+    let layout = Layout::of(&lines)?;
+    let width = layout.width();
+    if width > WIDEST {
+        let here = FilePlace::default().at_line(layout.first() as u64 + 1);
+        return Err(here.error(ImportProblem::TooWide(width).into()));
+    }
+    let cells = (lines.len() - layout.first()) as u64 * width as u64;
+    budget.take(cells * CELL, || format!("its table of {width} columns"))?;
+    let (names, units) = match &layout {
+        Layout::Table(rows) => rows.header(&lines),
+        Layout::Labelled(labels) => (labels.0.clone(), vec![None; labels.0.len()]),
+    };
+    let mut before = HashSet::new();
+    for name in &names {
+        if !before.insert(name) {
+            let header = FilePlace::default().at_line(layout.first() as u64);
+            let header = header.in_column(name);
+            return Err(header.error(DataProblem::DoubledColumn));
+        }
+    }
+    let mut source = Source::new(String::new());
+    let rows = rows(&layout, &lines, is_cut, &mut source)?;
+    let mut marks = Marks::default();
+    let mut cells = Vec::new();
+    for &at in &rows {
+        layout.split(lines.get(at).copied().unwrap_or_default(), &mut cells);
+        cells.iter().for_each(|cell| marks.see(cell));
+    }
+    let decimals = marks.decimals(layout.is_parted_by_commas());
+    let mut columns = vec![Column::default(); names.len()];
+    let mut monitor = Column::default();
+    for &at in &rows {
+        let line = at as u64 + 1;
+        layout.split(lines.get(at).copied().unwrap_or_default(), &mut cells);
+        for (cell, column) in cells.iter().zip(&mut columns) {
+            column.push(cell, line, decimals);
+        }
+        if let Some(stamp) = stamps.as_ref().and_then(|stamps| stamps.get(at)) {
+            monitor.push(stamp, line, decimals);
+        }
+        source.lines.push(line);
+    }
+    if marks.is_unclear() {
+        let as_what = match layout.is_parted_by_commas() {
+            true => "commas are taken for thousands marks",
+            false => "commas are taken for decimal commas",
+        };
+        source.remarks.push(format!(
+            "{as_what}; no number of the file says which they are"
+        ));
+    }
+    let mut described: Vec<_> = names.into_iter().zip(units).zip(columns).collect();
+    if stamps.is_some() && described.iter().all(|((name, _), _)| name != MONITOR) {
+        described.push(((MONITOR.to_owned(), None), monitor));
+    }
+    for (index, ((name, unit), column)) in described.into_iter().enumerate() {
+        if column.is_empty() {
+            if !name.starts_with("column ") {
+                source
+                    .skipped
+                    .push((name, "its cells are empty".to_owned()));
+            }
+            continue;
+        }
+        let text = |row: usize| {
+            let at = rows.get(row).copied().unwrap_or(0);
+            let mut cells = Vec::new();
+            layout.split(lines.get(at).copied().unwrap_or_default(), &mut cells);
+            let stamp = || stamps.as_ref().and_then(|stamps| stamps.get(at));
+            let cell = cells.get(index).or_else(stamp);
+            cell.copied().unwrap_or_default().to_owned()
+        };
+        match column.variable(name, unit, &source.lines, text) {
+            Ok(variable) => source.variables.push(variable),
+            Err(unread) => source.unread.push(unread),
+        }
+    }
+    source.dialect = format!("{}, decimal {}", layout.words(), decimals.words(marks));
+    Ok(source)
+}
+
+/// Indices of the lines that are rows; what is passed over is remarked.
+fn rows(
+    layout: &Layout,
+    lines: &[&str],
+    is_cut: bool,
+    source: &mut Source,
+) -> Result<Vec<usize>, DataError> {
+    let mut rows = Vec::with_capacity(lines.len());
+    let mut others: Vec<usize> = Vec::new();
+    let mut cells = Vec::new();
+    for (at, line) in lines.iter().enumerate().skip(layout.first()) {
+        if line.trim().is_empty() {
+            continue;
+        }
+        let found = layout.split(line, &mut cells);
+        let is_last = at + 1 == lines.len() && is_cut;
+        match found {
+            // A program that was stopped leaves half a line.
+            Line::Length(_) if is_last => others.push(at),
+            Line::Row
+                if is_last && matches!(layout, Layout::Labelled(_)) && cells.contains(&"") =>
+            {
+                others.push(at);
+            }
+            Line::Row => rows.push(at),
+            Line::Other if rows.is_empty() => {}
+            Line::Other => others.push(at),
+            Line::Length(found) => {
+                let expected = layout.width();
+                let here = FilePlace::default().at_line(at as u64 + 1);
+                return Err(here.error(DataProblem::RowLength { expected, found }));
+            }
+        }
+    }
+    if let Some(&first) = others.first() {
+        let text = printable(lines.get(first).copied().unwrap_or_default().trim());
+        let more = match others.len() - 1 {
+            0 => String::new(),
+            more => format!(" ({more} more)"),
+        };
+        source.remarks.push(format!(
+            "line {} is no row and is left out: `{text}`{more}",
+            first + 1
+        ));
+    }
+    Ok(rows)
+}
+
+/// UTF-8, UTF-16 with its mark, or else Latin-1, in which old instruments write `°C` and `µs`.
+fn decode(bytes: &[u8]) -> Result<String, DataError> {
+    let wide = |from: fn([u8; 2]) -> u16| {
+        let units = bytes.chunks_exact(2).skip(1).map(|b| from([b[0], b[1]]));
+        char::decode_utf16(units)
+            .map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER))
+            .collect()
+    };
+    if bytes.starts_with(b"\xff\xfe") {
+        return Ok(wide(u16::from_le_bytes));
+    }
+    if bytes.starts_with(b"\xfe\xff") {
+        return Ok(wide(u16::from_be_bytes));
+    }
+    if bytes.contains(&0) {
+        return Err(FilePlace::default().error(DataProblem::NotText));
+    }
+    let text = match std::str::from_utf8(bytes) {
+        Ok(text) => text.to_owned(),
+        Err(_) => bytes.iter().map(|&b| char::from(b)).collect(),
+    };
+    Ok(match text.strip_prefix('\u{feff}') {
+        Some(rest) => rest.to_owned(),
+        None => text,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Source {
+        variables(text.as_bytes(), &mut Budget::with(0)).expect("a table")
+    }
+
+    #[track_caller]
+    fn expect(source: &Source, names: &[&str], last: &[f64]) {
+        let found: Vec<&str> = source.variables.iter().map(|v| v.name.as_str()).collect();
+        assert_eq!(found, names);
+        let values: Vec<f64> = source
+            .variables
+            .iter()
+            .filter_map(|v| v.values.last().copied())
+            .collect();
+        assert_eq!(values, last);
+    }
+
+    #[test]
+    fn dialects_are_told_apart() {
+        let german = read("Zeit [ms];Ventil;tau / Pa\r\n0,0;0;1,25\r\n1,0;5;-1,5e-3\r\n");
+        expect(&german, &["Zeit", "Ventil", "tau"], &[1.0, 5.0, -1.5e-3]);
+        assert_eq!(german.variables[0].unit.as_deref(), Some("ms"));
+        assert_eq!(german.variables[2].unit.as_deref(), Some("Pa"));
+        assert!(
+            german.dialect.contains("semicolons") && german.dialect.contains("decimal commas"),
+            "{}",
+            german.dialect
+        );
+        let tabs = read("\u{feff}t\tu (V)\ty\n0,000\t0\t0,5\n0,001\t1\t0,6\n");
+        expect(&tabs, &["t", "u", "y"], &[0.001, 1.0, 0.6]);
+        let plain = read("t,u,y\n0,0,1\n0.5,1,2\n");
+        expect(&plain, &["t", "u", "y"], &[0.5, 1.0, 2.0]);
+        let blanks = read("% t u y\n 0.0  0 1\n 0.1  1 2\n");
+        expect(&blanks, &["t", "u", "y"], &[0.1, 1.0, 2.0]);
+        let quoted = read("\"t\",\"a, b\"\n0,1\n1,2\n");
+        expect(&quoted, &["t", "a, b"], &[1.0, 2.0]);
+    }
+
+    #[test]
+    fn what_precedes_the_rows_is_passed_over() {
+        let lab = read(
+            "LabVIEW Measurement\nChannels\t3\n\nTime\tValve\tShear\ns\tV\tPa\n0\t0\t1\n1\t5\t2\n2\t5\t3\n",
+        );
+        expect(&lab, &["Time", "Valve", "Shear"], &[2.0, 5.0, 3.0]);
+        assert_eq!(lab.variables[1].unit.as_deref(), Some("V"));
+        assert_eq!(lab.lines, [6, 7, 8]);
+        let bare = read("0 1\n1 2\n");
+        expect(&bare, &["column 1", "column 2"], &[1.0, 2.0]);
+    }
+
+    #[test]
+    fn quotes_indices_and_empty_ends_are_understood() {
+        let quoted = read("t,u,y\n0,0,\"1,021.04\"\n1,1,\"998.5\"\n");
+        expect(&quoted, &["t", "u", "y"], &[1.0, 1.0, 998.5]);
+        let indexed = read(",t,u\n0,0.0,1\n1,0.5,1\n");
+        expect(&indexed, &["column 1", "t", "u"], &[1.0, 0.5, 1.0]);
+        let unnamed = read("\"t\" \"u\"\n\"1\" 0.0 1\n\"2\" 0.5 1\n");
+        expect(&unnamed, &["column 1", "t", "u"], &[2.0, 0.5, 1.0]);
+        let ended = read("t;u;\n0;1;\n1;0;\n");
+        expect(&ended, &["t", "u"], &[1.0, 0.0]);
+        let sparse = read("t;u\n0;1\n1;\n2;\n3;0\n");
+        expect(&sparse, &["t", "u"], &[3.0, 0.0]);
+        assert_eq!(sparse.variables[1].blanks, [1, 2]);
+        let plain = read("0,5 100,2\n1,5 100,3\n");
+        expect(&plain, &["column 1", "column 2"], &[1.5, 100.3]);
+    }
+
+    #[test]
+    fn a_line_that_was_cut_off_and_comments_are_remarked() {
+        let cut = read("t,u\n0,1\n# a break\n1,0\n2");
+        assert_eq!(cut.lines, [2, 4]);
+        assert_eq!(
+            cut.remarks,
+            ["line 3 is no row and is left out: `# a break` (1 more)"]
+        );
+        let unclear = read("t;u\n0;1,021\n1;1,022\n");
+        assert_eq!(unclear.variables[1].values, [1.021, 1.022]);
+        assert!(unclear.remarks[0].contains("decimal commas"));
+    }
+
+    #[test]
+    fn wide_and_old_encodings_are_read() {
+        let text = "t [µs];T [°C]\n0;20\n1;21\n";
+        let latin: Vec<u8> = text.chars().map(|c| c as u32 as u8).collect();
+        let wide: Vec<u8> = std::iter::once(0xfeff)
+            .chain(text.encode_utf16())
+            .flat_map(u16::to_le_bytes)
+            .collect();
+        for bytes in [text.as_bytes(), &latin, &wide] {
+            let source = variables(bytes, &mut Budget::with(0)).expect("a table");
+            expect(&source, &["t", "T"], &[1.0, 21.0]);
+            assert_eq!(source.variables[0].unit.as_deref(), Some("µs"));
+        }
+    }
+
+    #[test]
+    fn faults_name_line_and_column() {
+        let message = |text: &str| {
+            let fault = variables(text.as_bytes(), &mut Budget::with(0)).expect_err("a fault");
+            fault.to_string()
+        };
+        for (text, parts) in [
+            ("t;u\n0;1\n1;1\n2\n", ["line 4", "2 names"]),
+            ("0;1\n1;HEAT\n", ["line 2", "`HEAT` is no number, date"]),
+            ("t;t\n0;1\n1;1\n", ["line 1, column `t`", "twice"]),
+            ("nothing here", ["header", "no rows of numbers"]),
+            ("t;u\n0;1\n1;1;3\n", ["header", "no rows"]),
+        ] {
+            let found = message(text);
+            for part in parts {
+                assert!(found.contains(part), "{text:?}: {found}");
+            }
+        }
+    }
+}

@@ -1,0 +1,284 @@
+//! When the samples of a file were taken: from a time in any unit, from dates and clock times, or from a stated period.
+
+use super::mapping::Mapping;
+use super::names::{TIMES, find, known_as, seconds, seconds_by_name};
+use super::problem::ImportProblem;
+use super::source::{Exactness, Source, Variable};
+use super::stamp::Kind;
+use crate::error::{DataError, FilePlace};
+use crate::sampling::{Clock, PrintedTimes, Rounded, Stated, tidy};
+
+/// A time of this size, s, is counted from 1970 and not from the start of the record.
+const SINCE_1970: f64 = 1e9;
+
+/// The samples' times.
+pub(super) struct Timing<'a> {
+    /// The variables that say it; they are no channels.
+    pub(super) variables: Vec<&'a Variable>,
+    /// Time of the first sample, s.
+    pub(super) t0: f64,
+    /// Sampling period, s.
+    pub(super) period_s: f64,
+}
+
+/// How the numbers of a time become seconds.
+struct Scale {
+    seconds: f64,
+    /// Set where the size of the numbers says that they are counted from 1970: their unit.
+    epoch: Option<&'static str>,
+}
+
+impl Mapping {
+    /// The times of the `n` samples of a file. What was found goes to `found`, what should be known to `remarks`.
+    ///
+    /// # Errors
+    /// [`DataError`] naming the cell, or what the file lacks.
+    pub(super) fn timing<'a>(
+        &self,
+        source: &'a Source,
+        n: usize,
+        place: &dyn Fn(&Variable, usize) -> FilePlace,
+        found: &mut Self,
+        remarks: &mut Vec<String>,
+    ) -> Result<Timing<'a>, DataError> {
+        let file = FilePlace::file(source.path());
+        let stated = self.period_s.map(|period_s| Stated {
+            period_s,
+            by: "--period is",
+        });
+        let Some(time) = self.time(source, n, &file)? else {
+            let period_s = match self.period_s.or_else(|| stated_period(source)) {
+                Some(period_s) => period_s,
+                None => {
+                    let problem = ImportProblem::NoTime(source.listed());
+                    return Err(file.error(problem.into()));
+                }
+            };
+            found.period_s = Some(period_s);
+            let variables = source.variables.iter().filter(|v| self.is_ignored(v));
+            return Ok(Timing {
+                variables: variables.collect(),
+                t0: 0.0,
+                period_s,
+            });
+        };
+        found.period_s = None;
+        let (time, date) = with_date(source, time, n);
+        found.t = Some(time.name.clone());
+        crate::import::mapping::same_length(time, n, place)?;
+        crate::import::mapping::finite(time, place)?;
+        let (times, t0) = match &time.stamped {
+            Some(stamped) => {
+                let seconds = match date.and_then(|d| d.stamped.as_ref()) {
+                    Some(date) => {
+                        let start = stamped.of_day.first().copied().unwrap_or(0.0);
+                        let pairs = date.seconds.iter().zip(&stamped.of_day);
+                        pairs.map(|(day, now)| day + now - start).collect()
+                    }
+                    None => stamped.seconds.clone(),
+                };
+                let day = date.and_then(|d| d.stamped.as_ref());
+                let day = day.map_or(String::new(), |day| format!("{} ", day.first));
+                remarks.push(counted_from(&format!("{day}{}", stamped.first)));
+                if date.is_none() && stamped.midnights > 0 {
+                    remarks.push(format!(
+                        "the clock passes midnight {} time(s)",
+                        stamped.midnights
+                    ));
+                }
+                let unit = stamped.unit.clone();
+                (
+                    PrintedTimes {
+                        time: seconds,
+                        unit,
+                    },
+                    0.0,
+                )
+            }
+            None => {
+                let scale = self.scale(time, &file)?;
+                if scale.seconds != 1.0 {
+                    found.t_scale = Some(scale.seconds);
+                }
+                let first = time.values.first().copied().unwrap_or(0.0);
+                let start = match first.abs() * scale.seconds >= SINCE_1970 {
+                    true => first,
+                    false => 0.0,
+                };
+                if let Some(unit) = scale.epoch {
+                    remarks.push(format!("`{}` is read as a Unix time in {unit}", time.name));
+                }
+                if start != 0.0 {
+                    remarks.push(counted_from(&start.to_string()));
+                }
+                let times = scaled(time, start, scale.seconds);
+                let t0 = times.time.first().copied().unwrap_or(0.0);
+                (times, t0)
+            }
+        };
+        let clock = times
+            .clock(stated)
+            .map_err(|f| place(time, f.row).error(f.problem))?;
+        if let Some(rounded) = clock.rounded {
+            remarks.push(explained(&clock, &rounded, &times, source));
+        }
+        Ok(Timing {
+            variables: [Some(time), date].into_iter().flatten().collect(),
+            t0,
+            period_s: clock.period_s,
+        })
+    }
+
+    /// The variable that is the time; none where the file has none, or it is to be ignored.
+    fn time<'a>(
+        &self,
+        source: &'a Source,
+        n: usize,
+        file: &FilePlace,
+    ) -> Result<Option<&'a Variable>, DataError> {
+        if self.ignore_time {
+            return Ok(None);
+        }
+        if let Some(name) = &self.t {
+            return find(source, name, file).map(Some);
+        }
+        if let Some(known) = known_as(source, &TIMES, file)? {
+            return Ok(Some(known).filter(|t| t.values.len() == n));
+        }
+        let stamps = |kind: Kind| {
+            let is_one = move |v: &&'a Variable| v.stamped.as_ref().is_some_and(|s| s.kind == kind);
+            let mut found = source.variables.iter().filter(is_one);
+            found.next().filter(|_| found.next().is_none())
+        };
+        let kinds = [Kind::DateTime, Kind::Clock, Kind::Date];
+        Ok(kinds.into_iter().find_map(stamps))
+    }
+
+    fn is_ignored(&self, variable: &Variable) -> bool {
+        let is_time = |name: &str| TIMES.iter().any(|t| t.eq_ignore_ascii_case(name));
+        self.ignore_time
+            && (variable.stamped.is_some()
+                || self.t.as_ref().is_some_and(|t| *t == variable.name)
+                || is_time(&variable.name) && variable.name != "T")
+    }
+
+    fn scale(&self, time: &Variable, file: &FilePlace) -> Result<Scale, DataError> {
+        let known = |seconds| Scale {
+            seconds,
+            epoch: None,
+        };
+        if let Some(scale) = self.t_scale {
+            return Ok(known(scale));
+        }
+        if let Some(unit) = &time.unit {
+            let why = || {
+                format!(
+                    "the unit `{unit}` of the time is not known here; give the seconds in it with --t-scale"
+                )
+            };
+            let scale = seconds(unit)
+                .ok_or_else(|| file.clone().error(ImportProblem::Unusable(why()).into()))?;
+            return Ok(known(scale));
+        }
+        if let Some(scale) = seconds_by_name(&time.name) {
+            return Ok(known(scale));
+        }
+        // From September 2001 to November 2286.
+        let first = time.values.first().copied().unwrap_or(0.0) / SINCE_1970;
+        let epochs = [("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)];
+        let is_one = |(_, seconds): &(&str, f64)| (1.0..10.0).contains(&(first * seconds));
+        Ok(match epochs.into_iter().find(is_one) {
+            Some((unit, seconds)) => Scale {
+                seconds,
+                epoch: Some(unit),
+            },
+            None => known(1.0),
+        })
+    }
+}
+
+fn counted_from(first: &str) -> String {
+    format!("time is counted from the first row ({first})")
+}
+
+/// A clock with the days of the file, or a day with its clock: the clock, and the dates.
+fn with_date<'a>(
+    source: &'a Source,
+    time: &'a Variable,
+    n: usize,
+) -> (&'a Variable, Option<&'a Variable>) {
+    let kind = |v: &Variable| v.stamped.as_ref().map(|s| s.kind);
+    let other = |wanted: Kind| {
+        let is_one = |v: &&Variable| kind(v) == Some(wanted) && v.values.len() == n;
+        let mut found = source.variables.iter().filter(is_one);
+        found.next().filter(|_| found.next().is_none())
+    };
+    match kind(time) {
+        Some(Kind::Clock) => (time, other(Kind::Date)),
+        Some(Kind::Date) => match other(Kind::Clock) {
+            Some(clock) => (clock, Some(time)),
+            None => (time, None),
+        },
+        _ => (time, None),
+    }
+}
+
+/// The sampling period that a scalar of the file states.
+fn stated_period(source: &Source) -> Option<f64> {
+    let scalar = |name: &str| {
+        let is_it = |v: &&Variable| v.name.rsplit('.').next() == Some(name);
+        match source.variables.iter().find(is_it)?.values.as_slice() {
+            &[value] if value.is_finite() && value > 0.0 => Some(value),
+            _ => None,
+        }
+    };
+    ["Ts", "dt", "sample_period_s"]
+        .into_iter()
+        .find_map(scalar)
+        .or_else(|| Some(1.0 / ["fs", "Fs"].into_iter().find_map(scalar)?))
+}
+
+/// Times in seconds, counted from `start`, which is in the file's unit.
+fn scaled(t: &Variable, start: f64, scale: f64) -> PrintedTimes {
+    // Milliseconds divide exactly where a multiplication by 0.001 would not.
+    let whole = (1.0 / scale).round();
+    let by = |v: f64| match (whole * scale - 1.0).abs() < 1e-12 && whole > 1.0 {
+        true => v / whole,
+        false => v * scale,
+    };
+    let time: Vec<f64> = t.values.iter().map(|&v| by(v - start)).collect();
+    let bits = |v: &f64| v.abs() * f64::EPSILON;
+    let unit = match &t.exactness {
+        Exactness::Printed(units) => {
+            let units = units.iter().zip(&t.values);
+            units.map(|(unit, v)| unit.max(bits(v)) * scale).collect()
+        }
+        // A clock that was added up is off by more than the last bit of one value.
+        Exactness::Relative(share) => {
+            let values = t.values.iter();
+            values.map(|v| 8.0 * share * (v * scale).abs()).collect()
+        }
+    };
+    PrintedTimes { time, unit }
+}
+
+/// What is to be known of a clock whose rounded times explain its uneven steps.
+fn explained(clock: &Clock, rounded: &Rounded, times: &PrintedTimes, source: &Source) -> String {
+    let (span, steps) = times.span();
+    let mut text = format!(
+        "times are printed in steps of {} s, so they step by {} to {} s; the sampling period is the mean, {} s / {steps} = {} s, and no sample is missing",
+        tidy(rounded.unit, 1e-6),
+        tidy(rounded.shortest, 1e-6),
+        tidy(rounded.longest, 1e-6),
+        tidy(span, 1e-9),
+        clock.period_s
+    );
+    if rounded.uncommon == 1
+        && let Some(line) = source.lines.get(rounded.row)
+    {
+        text.push_str(&format!(
+            " (should one be missing before line {line}, the only uncommon step, split the file there)"
+        ));
+    }
+    text
+}

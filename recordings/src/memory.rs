@@ -1,0 +1,72 @@
+//! How much memory a command may ask for.
+//!
+//! Whatever is sized by a user's file or option (an array in a `.mat`, a table of lags) is counted before it is made,
+//! so that a small file cannot bring the machine down.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The limit where nobody says otherwise, bytes: what a laptop has to spare.
+pub const USUAL: u64 = 2_000_000_000;
+
+static LIMIT: AtomicU64 = AtomicU64::new(USUAL);
+
+/// More memory would be needed than may be used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{what} would take {} of memory and {} may be used; {remedy}, or allow more with --memory {}", gigabytes(*.needed), gigabytes(*.limit), needed.div_ceil(1_000_000_000))]
+pub struct TooMuch {
+    /// What for.
+    pub what: String,
+    /// Bytes that it takes.
+    pub needed: u64,
+    /// Bytes that may be used.
+    pub limit: u64,
+    /// What else could be done.
+    pub remedy: &'static str,
+}
+
+fn gigabytes(bytes: u64) -> String {
+    format!("{:.1} GB", bytes as f64 / 1e9)
+}
+
+/// Sets the limit of this process, bytes.
+pub fn set_limit(bytes: u64) {
+    LIMIT.store(bytes, Ordering::Relaxed);
+}
+
+/// The limit of this process, bytes.
+#[must_use]
+pub fn limit() -> u64 {
+    LIMIT.load(Ordering::Relaxed)
+}
+
+/// Whether `what` may take so many bytes.
+///
+/// # Errors
+/// [`TooMuch`] with what is needed, what may be used, and the `remedy`.
+pub fn allow(needed: u64, what: &str, remedy: &'static str) -> Result<(), TooMuch> {
+    let limit = limit();
+    match needed <= limit {
+        true => Ok(()),
+        false => Err(TooMuch {
+            what: what.to_owned(),
+            needed,
+            limit,
+            remedy,
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_too_much_says_how_much_and_what_to_do() {
+        assert_eq!(allow(USUAL, "it", "shorten it"), Ok(()));
+        let error = allow(6_300_000_000, "--max-lag 12000", "lower it").unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "--max-lag 12000 would take 6.3 GB of memory and 2.0 GB may be used; lower it, or allow more with --memory 7"
+        );
+    }
+}

@@ -1,0 +1,493 @@
+//! Files as loggers write them (`data/strangers`, generated) become the record that they hold; what they do not say, and
+//! what cannot be read, is named.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use recordings::import::{Import, Imported, Mapping, files_of, import};
+use recordings::{DataSet, Record};
+
+fn stranger(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/data/strangers")
+        .join(name)
+}
+
+#[track_caller]
+fn read(files: &[PathBuf], request: &Import) -> Imported {
+    let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+    import(&files, request).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A file with this text, imported.
+fn text(name: &str, content: &str, request: &Import) -> Result<Imported, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    fs::write(&path, content).unwrap();
+    import(&[&path], request).map_err(|e| e.to_string())
+}
+
+#[track_caller]
+fn parsed(content: &str) -> Imported {
+    text("run.csv", content, &Import::default()).unwrap_or_else(|e| panic!("{content}\n{e}"))
+}
+
+#[track_caller]
+fn refused(content: &str, parts: &[&str]) {
+    let error = text("run.csv", content, &Import::default()).expect_err(content);
+    for part in parts {
+        assert!(error.contains(part), "no `{part}` in: {error}");
+    }
+    assert!(!error.contains('\n'), "one paragraph: {error}");
+}
+
+/// The 400 rows that all logs but that of the serial monitor hold.
+fn reference() -> (Vec<f64>, Vec<f64>) {
+    let text = fs::read_to_string(stranger("logs/epochms.csv")).unwrap();
+    let rows = text.lines().skip(1).map(|line| {
+        let cells: Vec<f64> = line.split(',').map(|c| c.parse().unwrap()).collect();
+        (cells[1], cells[2])
+    });
+    rows.unzip()
+}
+
+#[test]
+fn every_logger_gives_the_same_record() {
+    let (u, y) = reference();
+    assert_eq!(u.len(), 400);
+    for (file, offset) in [
+        ("clock.csv", 0.0),
+        ("datetime.csv", 0.0),
+        ("epochms.csv", 0.0),
+        ("iso.csv", 0.0),
+        ("isoz.csv", 0.0),
+        ("onoff.csv", 0.0),
+        ("percent.csv", 0.0),
+        ("thousands.csv", 1000.0),
+        ("truefalse.csv", 0.0),
+        ("uchange.csv", 0.0),
+    ] {
+        let found = read(&[stranger("logs").join(file)], &Import::default());
+        let record = &found.set.records[0];
+        assert_eq!((record.sample_period_s, record.t0), (1.0, 0.0), "{file}");
+        assert_eq!(found.files[0].sample_period_s, 1.0, "{file}");
+        assert_eq!(record.u, u, "{file}");
+        let as_logged = y
+            .iter()
+            .zip(&record.y)
+            .all(|(y, found)| (found - y - offset).abs() < 1e-9);
+        assert!(record.len() == 400 && as_logged, "{file}");
+    }
+}
+
+#[test]
+fn what_was_understood_is_said() {
+    for (file, parts) in [
+        ("clock.csv", &["midnight 1 time", "23:55:01"][..]),
+        ("datetime.csv", &["`Heater`: ON is 1, OFF is 0"]),
+        (
+            "epochms.csv",
+            &["Unix time in ms", "first row (1726617301000)"],
+        ),
+        ("iso.csv", &["first row (2024-09-17T23:55:01)"]),
+        ("percent.csv", &["u is in %", "--u-scale 1"]),
+        ("thousands.csv", &["1,021.04 is read as 1021.04"]),
+        ("truefalse.csv", &["True is 1, False is 0"]),
+        (
+            "uchange.csv",
+            &["keeps the value before it (396 of 400 cells)"],
+        ),
+    ] {
+        let found = read(&[stranger("logs").join(file)], &Import::default());
+        let remarks = found.files[0].remarks.join("\n");
+        for part in parts {
+            assert!(remarks.contains(part), "{file}: no `{part}` in\n{remarks}");
+        }
+    }
+}
+
+#[test]
+fn serial_monitors_are_read() {
+    let found = read(&[stranger("logs/serial.txt")], &Import::default());
+    let record = &found.set.records[0];
+    assert_eq!(record.len(), 119);
+    assert!((record.sample_period_s - 0.289_9).abs() < 1e-5);
+    assert_eq!((record.u[1], record.y[1]), (64.0, 25.341));
+    assert!(record.channels.contains_key("tan"));
+    let mapping = &found.files[0].mapping;
+    assert_eq!(
+        (mapping.u.as_deref(), mapping.y.as_deref()),
+        (Some("out"), Some("pv"))
+    );
+
+    // The monitor's own clock before each line, a start-up message, a line that was cut off.
+    let lines: String = (0..40)
+        .map(|k| {
+            format!(
+                "23:59:59.{:03} -> u:{} y:{}.5\n",
+                500 + 10 * k,
+                k / 10 % 2,
+                k
+            )
+        })
+        .collect();
+    let found = parsed(&format!(
+        "23:59:59.499 -> ready\n{lines}23:59:59.990 -> u:1 y"
+    ));
+    let record = &found.set.records[0];
+    assert_eq!((record.len(), record.sample_period_s), (40, 0.01));
+    assert_eq!(record.y[39], 39.5);
+    let remarks = found.files[0].remarks.join("\n");
+    assert!(
+        remarks.contains("line 42 is no row and is left out: `u:1 y`"),
+        "{remarks}"
+    );
+
+    let plain = parsed("t=0.1 u=1 y=21.3\nt=0.2 u=1 y=21.4\nt=0.3 u=0 y=21.6\n");
+    assert_eq!(plain.set.records[0].u, [1.0, 1.0, 0.0]);
+    let arrows = parsed("10:00:00.1 -> 1,21.3\n10:00:00.2 -> 0,21.4\n10:00:00.3 -> 1,21.6\n");
+    assert_eq!(arrows.set.records[0].y, [21.3, 21.4, 21.6]);
+    assert_eq!(arrows.set.sample_period_s, 0.1);
+}
+
+#[test]
+fn times_of_every_kind_give_the_same_period() {
+    for times in [
+        ["1726617301", "1726617302", "1726617303"],
+        ["1726617301.250", "1726617302.250", "1726617303.250"],
+        ["1726617301000", "1726617302000", "1726617303000"],
+        ["1726617301000000", "1726617302000000", "1726617303000000"],
+        [
+            "1726617301000000000",
+            "1726617302000000000",
+            "1726617303000000000",
+        ],
+        [
+            "2024-12-31 23:59:58",
+            "2024-12-31 23:59:59",
+            "2025-01-01 00:00:00",
+        ],
+        [
+            "31.12.2024 23:59:58",
+            "31.12.2024 23:59:59",
+            "01.01.2025 00:00:00",
+        ],
+        ["11:59:58 AM", "11:59:59 AM", "12:00:00 PM"],
+        ["0 days 00:00:01", "0 days 00:00:02", "0 days 00:00:03"],
+    ] {
+        let rows: String = times
+            .iter()
+            .zip(0..)
+            .map(|(t, k)| format!("{t},{},{k}\n", k % 2))
+            .collect();
+        let found = parsed(&format!("timestamp,heater,temperature\n{rows}"));
+        let record = &found.set.records[0];
+        assert!(
+            (record.sample_period_s - 1.0).abs() < 1e-9,
+            "{times:?}: {}",
+            record.sample_period_s
+        );
+        assert_eq!(record.t0, 0.0, "{times:?}");
+    }
+    let blanks =
+        parsed("Date Time Heater Temp\n2024-09-17 23:59:59 0 21.0\n2024-09-18 00:00:00 1 21.1\n");
+    assert_eq!(blanks.set.records[0].u, [0.0, 1.0]);
+    assert_eq!(blanks.files[0].mapping.t.as_deref(), Some("Date Time"));
+    let millis = parsed("millis,pwm,temp\n5000,0,21\n5100,1,21\n5200,1,22\n");
+    assert_eq!(
+        (millis.set.sample_period_s, millis.set.records[0].t0),
+        (0.1, 5.0)
+    );
+}
+
+/// Stamps of whole seconds of a clock that is a little slow, and of one that is read several times a second.
+#[test]
+fn rounded_stamps_miss_no_sample() {
+    let found = read(&[stranger("rounded-clock/log.csv")], &Import::default());
+    assert_eq!(found.set.records[0].len(), 599);
+    assert!((found.set.sample_period_s - 599.0 / 598.0).abs() < 1e-4);
+    let remarks = found.files[0].remarks.join("\n");
+    assert!(
+        remarks.contains("599 s / 598 = 1.0017 s, and no sample is missing"),
+        "{remarks}"
+    );
+    for period in [1.0, 1.0017] {
+        let mapping = Mapping {
+            period_s: Some(period),
+            ..Mapping::default()
+        };
+        let found = read(
+            &[stranger("rounded-clock/log.csv")],
+            &Import {
+                mapping,
+                ..Import::default()
+            },
+        );
+        assert_eq!(found.set.sample_period_s, period);
+        assert!(found.set.records[0].channels.is_empty());
+    }
+    // As it is, every other command reads it too, and so the set that is made of it.
+    let alone = DataSet::load(&stranger("rounded-clock/log.csv")).unwrap();
+    assert_eq!(alone.records[0].len(), 599);
+    let folder = tempfile::tempdir().unwrap();
+    found.save(&folder.path().join("set")).unwrap();
+    assert_eq!(
+        DataSet::load(&folder.path().join("set")).unwrap().hash,
+        found.set.hash
+    );
+
+    let fast: String = (0..100)
+        .map(|k| format!("10:00:{:02},{},{k}\n", k / 4, k / 10 % 2))
+        .collect();
+    let found = parsed(&format!("time,u,y\n{fast}"));
+    assert!((found.set.sample_period_s - 0.25).abs() < 0.01);
+}
+
+#[test]
+fn clocks_that_agree_within_a_sample_make_one_set() {
+    let days = [
+        stranger("two-clocks/monday.csv"),
+        stranger("two-clocks/tuesday.csv"),
+    ];
+    let found = read(&days, &Import::default());
+    let period = found.set.sample_period_s;
+    assert!((period - 0.990_444).abs() < 1e-5, "{period}");
+    assert!(
+        found.remarks[0].contains("less than a sample"),
+        "{:?}",
+        found.remarks
+    );
+    assert!(found.files[0].sample_period_s != found.files[1].sample_period_s);
+    let folder = tempfile::tempdir().unwrap();
+    found.save(&folder.path().join("set")).unwrap();
+    let set = DataSet::load(&folder.path().join("set")).unwrap();
+    assert_eq!(set.hash, found.set.hash);
+    let mapping = Mapping {
+        period_s: Some(0.9904),
+        ..Mapping::default()
+    };
+    let stated = read(
+        &days,
+        &Import {
+            mapping,
+            ..Import::default()
+        },
+    );
+    assert_eq!(stated.set.sample_period_s, 0.9904);
+
+    // A period that nobody stated is not called stated.
+    let folder = tempfile::tempdir().unwrap();
+    let (slow, fast) = (
+        folder.path().join("slow.csv"),
+        folder.path().join("fast.csv"),
+    );
+    fs::write(&slow, "t,u,y\n0,0,1\n2,1,1\n4,0,1\n").unwrap();
+    fs::write(&fast, "t,u,y\n0,0,1\n1,1,1\n2,0,1\n").unwrap();
+    let error = import(&[&slow, &fast], &Import::default())
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("is 1 s, that of record `slow` is 2 s") && error.contains("resample"),
+        "{error}"
+    );
+    let mapping = Mapping {
+        period_s: Some(2.0),
+        ..Mapping::default()
+    };
+    let error = import(
+        &[&fast],
+        &Import {
+            mapping,
+            ..Import::default()
+        },
+    )
+    .unwrap_err()
+    .to_string();
+    assert!(
+        error.contains("1 s apart by their times, but --period is 2 s"),
+        "{error}"
+    );
+    let mapping = Mapping {
+        period_s: Some(2.0),
+        ignore_time: true,
+        ..Mapping::default()
+    };
+    let found = import(
+        &[&fast],
+        &Import {
+            mapping,
+            ..Import::default()
+        },
+    )
+    .unwrap();
+    assert_eq!(found.set.sample_period_s, 2.0);
+    assert!(found.set.records[0].channels.is_empty());
+}
+
+#[test]
+fn what_is_not_read_is_named_by_its_cell() {
+    refused(
+        "t,u,y\n0,0,21\n1,HEAT,21\n2,0,22\n",
+        &["line 3, column `u`", "`HEAT`", "on/off"],
+    );
+    refused(
+        "t,u,y\n0,HEAT,21\n1,IDLE,21\n",
+        &["line 2, column `u`", "`HEAT`"],
+    );
+    refused(
+        "time,u,y\nyesterday,0,21\ntoday,1,22\n",
+        &["line 2, column `time`", "`yesterday`"],
+    );
+    refused(
+        "t,u,y\n0,0,21\n1,1,\n2,0,22\n",
+        &["line 3, column `y`", "empty"],
+    );
+    refused(
+        "t,u,y\n0,,21\n1,1,21\n2,0,22\n",
+        &["line 2, column `u`", "first value"],
+    );
+    refused("t,u,y\n0,0,21\n1,1,21\n2,1,2,1\n", &["line 4", "4 values"]);
+    refused("u,y\n1,HOT\n", &["line 2", "`HOT`", "no rows of numbers"]);
+    refused(
+        "t,u,y\n0,0,1\n1,1,1\n2,0,1\n3,0,1\n7,0,1\n8,0,1\n",
+        &["column `t`", "missing", "--ignore-time"],
+    );
+    let found = parsed("t,u,y,mode\n0,0,21,AUTO\n1,1,21,AUTO\n2,0,22,MAN\n");
+    let remarks = found.files[0].remarks.join("\n");
+    assert!(
+        remarks.contains("`mode` is left out: its cell in line 2 reads `AUTO`"),
+        "{remarks}"
+    );
+}
+
+#[test]
+fn a_command_may_be_graded_held_or_in_percent() {
+    let graded = parsed("t,u [%],y\n0,0,21\n1,45,21\n2,45,22\n");
+    assert_eq!(graded.set.records[0].u, [0.0, 0.45, 0.45]);
+    let kept = text(
+        "run.csv",
+        "t,u,y\n0,0 %,21\n1,45 %,21\n2,45 %,22\n",
+        &Import {
+            mapping: Mapping {
+                u_scale: Some(1.0),
+                ..Mapping::default()
+            },
+            u_before: Some(0.0),
+            ..Import::default()
+        },
+    );
+    let kept = kept.unwrap();
+    assert_eq!(kept.set.records[0].u, [0.0, 45.0, 45.0]);
+    assert_eq!(kept.set.records[0].u_before, Some(0.0));
+    // The command as the last column, written on change only.
+    let last = parsed("t,y,u\n0,21,open\n1,21,\n2,22,closed\n3,22,\n");
+    assert_eq!(last.set.records[0].u, [1.0, 1.0, 0.0, 0.0]);
+    let german = parsed("Uhrzeit;Ventil;Sensor\n10:00:00;auf;1.021,5\n10:00:01;zu;998,25\n");
+    assert_eq!(german.set.records[0].y, [1021.5, 998.25]);
+}
+
+#[test]
+fn a_folder_stands_for_its_files() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, content) in [
+        ("b.csv", "t,u,y\n0,0,1\n1,1,2\n"),
+        ("a.csv", "t,u,y\n0,1,1\n1,0,2\n"),
+        ("notes.txt", "nothing"),
+        ("README.csv", "nothing"),
+    ] {
+        fs::write(folder.path().join(name), content).unwrap();
+    }
+    let files = files_of(&[folder.path()]).unwrap();
+    let names: Vec<_> = files.iter().map(|f| f.file_name().unwrap()).collect();
+    assert_eq!(names, ["a.csv", "b.csv"]);
+    let hint = DataSet::load(folder.path()).unwrap_err().to_string();
+    assert!(
+        hint.contains("no dataset.toml") && hint.contains("host-fit import"),
+        "{hint}"
+    );
+
+    let found = read(&files, &Import::default());
+    let refuse = |target: &Path, force| {
+        found
+            .refuse_to_replace(target, force)
+            .unwrap_err()
+            .to_string()
+    };
+    assert!(refuse(folder.path(), true).contains("a.csv: is read"));
+    let set = folder.path().join("set");
+    found.refuse_to_replace(&set, false).unwrap();
+    found.save(&set).unwrap();
+    assert!(refuse(&set, false).contains("--force"));
+    found.refuse_to_replace(&set, true).unwrap();
+    let error = files_of(&[&set]).unwrap_err().to_string();
+    assert!(error.contains("a data set already"), "{error}");
+    let other = folder.path().join("other");
+    fs::create_dir(&other).unwrap();
+    assert!(
+        files_of(&[&other])
+            .unwrap_err()
+            .to_string()
+            .contains("name the files")
+    );
+    fs::write(other.join("b.csv"), "").unwrap();
+    assert!(refuse(&other, false).contains("b.csv: is there already"));
+}
+
+#[test]
+fn the_held_out_end_has_the_whole_record_before_it() {
+    let rows: String = (0..100)
+        .map(|k| format!("{k},{},{k}\n", k / 10 % 2))
+        .collect();
+    let content = format!("t,u,y\n{rows}");
+    let all = parsed(&content);
+    assert!(
+        all.remarks[0].contains("Nothing is held out")
+            && all.remarks[0].contains("--hold-out-from 70"),
+        "{:?}",
+        all.remarks
+    );
+    let request = Import {
+        hold_out_from_s: Some(70.0),
+        ..Import::default()
+    };
+    let found = text("run.csv", &content, &request).unwrap();
+    assert!(found.remarks.is_empty(), "{:?}", found.remarks);
+    let shapes = |records: &[Record]| -> Vec<(usize, usize)> {
+        records.iter().map(|r| (r.len(), r.lead)).collect()
+    };
+    assert_eq!(shapes(&found.set.records), [(70, 0), (100, 70)]);
+    assert_eq!(found.set.records[1].u, all.set.records[0].u);
+    let folder = tempfile::tempdir().unwrap();
+    found.save(&folder.path().join("set")).unwrap();
+    let again = DataSet::load(&folder.path().join("set")).unwrap();
+    assert_eq!(again.records, found.set.records);
+    let late = Import {
+        hold_out_from_s: Some(99.5),
+        ..Import::default()
+    };
+    let error = text("run.csv", &content, &late).unwrap_err();
+    assert!(error.contains("goes from 0 to 99 s"), "{error}");
+}
+
+#[test]
+fn other_commands_name_the_import() {
+    let made = |name: &str| {
+        Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("tests/import")
+            .join(name)
+    };
+    for file in [
+        made("v7.mat"),
+        made("v5.mat"),
+        made("plain.npz"),
+        made("matrix.npy"),
+        stranger("logs/epochms.csv"),
+        stranger("logs/onoff.csv"),
+        stranger("logs/iso.csv"),
+        stranger("logs/clock.csv"),
+        stranger("logs/uchange.csv"),
+    ] {
+        let error = DataSet::load(&file).unwrap_err().to_string();
+        assert!(error.contains("host-fit import"), "{error}");
+    }
+}

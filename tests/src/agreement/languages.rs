@@ -1,0 +1,327 @@
+//! Runs the generated files by the tools of their languages.
+
+use super::{Case, Row, TOLERANCE, Vectors};
+use anyhow::{Context, Result, bail, ensure};
+use host_fit::codegen::portable::{self, Precision};
+use host_fit::model::Law;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// What runs a language.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tool {
+    /// GCC.
+    C,
+    /// Python 3 with NumPy.
+    Python,
+    /// GNU Octave.
+    Octave,
+}
+
+impl Tool {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::C, Self::Python, Self::Octave];
+
+    fn command(self) -> Command {
+        match self {
+            Self::C => Command::new("gcc"),
+            Self::Python => Command::new(python()),
+            Self::Octave => {
+                let mut octave = Command::new("octave-cli");
+                octave.args(["--quiet", "--no-init-file"]);
+                octave
+            }
+        }
+    }
+
+    /// Whether it is installed.
+    #[must_use]
+    pub fn is_installed(self) -> bool {
+        let mut command = self.command();
+        if self == Self::Python {
+            command.args(["-c", "import numpy"]);
+        } else {
+            command.arg("--version");
+        }
+        let run = command.stdout(Stdio::null()).stderr(Stdio::null()).status();
+        run.is_ok_and(|status| status.success())
+    }
+}
+
+/// The Python that has NumPy: the first on the path, or the system's.
+fn python() -> &'static str {
+    let has = |program: &str| {
+        let mut command = Command::new(program);
+        command
+            .args(["-c", "import numpy"])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
+        command.status().is_ok_and(|status| status.success())
+    };
+    if has("python3") {
+        "python3"
+    } else {
+        "/usr/bin/python3"
+    }
+}
+
+/// Readings at rest, readings after another beginning, estimates of the law, its decisions.
+type Said = [Vec<f64>; 4];
+
+fn expected<T: model_core::Real>(case: &Case, vectors: &Vectors) -> Said {
+    let (on, estimates, _) = vectors.law::<T>(&case.model);
+    let on = on.into_iter().map(|on| f64::from(u8::from(on))).collect();
+    [
+        vectors.run::<T>(&case.model, false),
+        vectors.run::<T>(&case.model, true),
+        estimates,
+        on,
+    ]
+}
+
+/// Runs `cases` by `tool`, in files of `folder`.
+///
+/// # Errors
+/// When the tool refuses what was generated.
+pub fn run(tool: Tool, cases: &[Case], folder: &Path) -> Result<Vec<Row>> {
+    let vectors: Vec<Vectors> = cases.iter().map(|case| Vectors::of(&case.model)).collect();
+    for (i, vectors) in vectors.iter().enumerate() {
+        write_inputs(folder, i, vectors)?;
+    }
+    let mut rows = Vec::new();
+    let mut judge = |case: &Case, language, said: &Said, expected: &Said, most: f64| {
+        let largest = expected[0]
+            .iter()
+            .chain(&expected[1])
+            .fold(1e-9_f64, |m, y| m.max(y.abs()));
+        let mut difference = 0.0_f64;
+        for (said, expected) in said.iter().zip(expected) {
+            if said.len() != expected.len() {
+                difference = f64::INFINITY;
+            }
+            for (said, expected) in said.iter().zip(expected) {
+                let off = (said - expected).abs() / largest;
+                difference = if off.is_nan() {
+                    f64::INFINITY
+                } else {
+                    difference.max(off)
+                };
+            }
+        }
+        rows.push(Row {
+            case: case.name.clone(),
+            language,
+            difference,
+            agrees: difference <= most,
+        });
+    };
+    if tool == Tool::C {
+        for (i, case) in cases.iter().enumerate() {
+            for (precision, language) in
+                [(Precision::Single, "C f32"), (Precision::Double, "C f64")]
+            {
+                let said = c(case, i, precision, folder)
+                    .with_context(|| format!("{}, {language}", case.name))?;
+                let expected = match precision {
+                    Precision::Single => expected::<f32>(case, &vectors[i]),
+                    Precision::Double => expected::<f64>(case, &vectors[i]),
+                };
+                judge(case, language, &said, &expected, 0.0);
+            }
+        }
+        return Ok(rows);
+    }
+    let (language, text) = match tool {
+        Tool::Python => ("Python", interpreted_python(cases, folder)?),
+        _ => ("Octave", interpreted_octave(cases, folder)?),
+    };
+    let mut said = blocks(&text).into_iter();
+    for (case, vectors) in cases.iter().zip(&vectors) {
+        let own: Vec<Vec<f64>> = said.by_ref().take(4).collect();
+        let Ok(own) = Said::try_from(own) else {
+            bail!("{language} said too little")
+        };
+        judge(
+            case,
+            language,
+            &own,
+            &expected::<f64>(case, vectors),
+            TOLERANCE,
+        );
+    }
+    Ok(rows)
+}
+
+/// Commands with channels, and readings, as text: `NaN` is read by all.
+fn write_inputs(folder: &Path, i: usize, vectors: &Vectors) -> Result<()> {
+    let mut text = String::new();
+    for (u, row) in vectors.u.iter().zip(&vectors.channels) {
+        let _ = write!(text, "{u:?}");
+        for channel in row {
+            let _ = write!(text, " {channel:?}");
+        }
+        text.push('\n');
+    }
+    std::fs::write(folder.join(format!("in{i}.txt")), text)?;
+    let readings: String = vectors
+        .readings
+        .iter()
+        .map(|y| format!("{y:?}\n"))
+        .collect();
+    std::fs::write(folder.join(format!("law{i}.txt")), readings)?;
+    Ok(())
+}
+
+/// Lists of numbers, each after a line with `=`.
+fn blocks(text: &str) -> Vec<Vec<f64>> {
+    let blocks = text.split('=').skip(1);
+    let numbers = |block: &str| {
+        block
+            .split_whitespace()
+            .map(|x| x.parse().unwrap_or(f64::NAN))
+            .collect()
+    };
+    blocks.map(numbers).collect()
+}
+
+fn output(command: &mut Command) -> Result<String> {
+    let done = command.output().context("the tool does not start")?;
+    ensure!(
+        done.status.success(),
+        "{}{}",
+        String::from_utf8_lossy(&done.stdout)
+            .chars()
+            .take(2000)
+            .collect::<String>(),
+        String::from_utf8_lossy(&done.stderr)
+    );
+    Ok(String::from_utf8(done.stdout)?)
+}
+
+fn c(case: &Case, i: usize, precision: Precision, folder: &Path) -> Result<Said> {
+    let model = portable::c(&case.model, precision)?;
+    let vectors = Vectors::of(&case.model);
+    let channels = vectors.channels[0].len();
+    let law = match &case.model.law {
+        None => "",
+        Some(Law::Track(_)) => {
+            "f = fopen(argv[2], \"r\"); printf(\"=\\n\"); law_reset();\n\
+             while (fscanf(f, \"%lf\", &x[0]) == 1) { struct law_decision d = law_step((real)x[0], NULL); printf(\"%.17g\\n\", (double)d.estimate); }\n\
+             rewind(f); printf(\"=\\n\"); law_reset();\n\
+             while (fscanf(f, \"%lf\", &x[0]) == 1) { printf(\"%d\\n\", law_step((real)x[0], NULL).on); }\nfclose(f);"
+        }
+        Some(Law::Maximise(_)) => {
+            "printf(\"=\\n\"); for (i = 0; i < 320; i++) { printf(\"0\\n\"); } printf(\"=\\n\"); law_reset(); \
+             for (i = 0; i < 320; i++) { printf(\"%d\\n\", law_step()); }"
+        }
+    };
+    let [u, y] = vectors.before;
+    let main = format!(
+        "{model}\n#include <stdio.h>\nint main(int argc, char **argv)\n{{\n    double x[{width}]; real v[{width}]; int i, held;\n    \
+         FILE *f;\n    (void)argc; (void)x; (void)v; (void)i;\n    for (held = 0; held < 2; held++) {{\n        \
+         f = fopen(argv[1], \"r\");\n        printf(\"=\\n\");\n        for (i = 0; ; i++) {{\n            int n = 0, got = 1;\n            \
+         while (n < {width} && got == 1) {{ got = fscanf(f, \"%lf\", &x[n]); n++; }}\n            if (got != 1) break;\n            \
+         for (n = 1; n < {width}; n++) v[n - 1] = (real)x[n];\n            \
+         if (i == 0) {{ if (held) model_hold((real){u:?}, (real){y:?}, v); else model_reset(); }}\n            \
+         printf(\"%.17g\\n\", (double)model_step((real)x[0], {given}));\n        }}\n        fclose(f);\n    }}\n    {law}\n    return 0;\n}}\n",
+        width = channels + 1,
+        given = if channels == 0 { "NULL" } else { "v" },
+    );
+    let (source, program) = (folder.join("main.c"), folder.join("main"));
+    std::fs::write(&source, main)?;
+    let mut gcc = Command::new("gcc");
+    gcc.args([
+        "-std=c99",
+        "-O2",
+        "-ffp-contract=off",
+        "-Wall",
+        "-Wextra",
+        "-pedantic",
+        "-Werror",
+    ]);
+    gcc.args(["-Wno-misleading-indentation", "-Wno-type-limits", "-o"])
+        .arg(&program)
+        .arg(&source)
+        .arg("-lm");
+    output(&mut gcc)?;
+    let mut run = Command::new(&program);
+    run.arg(folder.join(format!("in{i}.txt")))
+        .arg(folder.join(format!("law{i}.txt")));
+    let mut said = blocks(&output(&mut run)?);
+    said.resize(4, Vec::new());
+    Said::try_from(said).map_err(|_| anyhow::anyhow!("four blocks"))
+}
+
+fn interpreted_python(cases: &[Case], folder: &Path) -> Result<String> {
+    let mut script = String::from(
+        "import sys, importlib\nimport numpy as np\n\
+         def out(x):\n    print('=')\n    for v in x: print(repr(float(v)))\n",
+    );
+    for (i, case) in cases.iter().enumerate() {
+        std::fs::write(
+            folder.join(format!("model{i}.py")),
+            portable::python(&case.model)?,
+        )?;
+        let [u, y] = Vectors::of(&case.model).before;
+        let _ = write!(
+            script,
+            "m = importlib.import_module('model{i}')\nx = np.loadtxt('in{i}.txt', ndmin=2)\n\
+             out(m.Model().simulate(x[:, 0], x[:, 1:]))\nout(m.Model().simulate(x[:, 0], x[:, 1:], {y:?}, {u:?}))\n"
+        );
+        script.push_str(
+            &match &case.model.law {
+                None => "out([])\nout([])\n",
+                Some(Law::Track(_)) => LAW_PYTHON,
+                Some(Law::Maximise(_)) => {
+                    "law = m.Law()\nout([0] * 320)\nout([law.step() for _ in range(320)])\n"
+                }
+            }
+            .replace("{i}", &i.to_string()),
+        );
+    }
+    std::fs::write(folder.join("run_cases.py"), script)?;
+    let mut python = Tool::Python.command();
+    output(
+        python
+            .arg("run_cases.py")
+            .current_dir(folder)
+            .env("PYTHONDONTWRITEBYTECODE", "1"),
+    )
+}
+
+const LAW_PYTHON: &str = "law, on, e = m.Law(), [], []\n\
+    for r in np.loadtxt('law{i}.txt'):\n    on.append(law.step(r))\n    e.append(law.estimate)\nout(e)\nout(on)\n";
+
+fn interpreted_octave(cases: &[Case], folder: &Path) -> Result<String> {
+    let mut script =
+        String::from("1;\nfunction out(x)\n  printf('=\\n'); printf('%.17g\\n', x);\nend\n");
+    for (i, case) in cases.iter().enumerate() {
+        let name = format!("model{i}");
+        std::fs::write(
+            folder.join(format!("{name}.m")),
+            portable::matlab(&case.model, &name)?,
+        )?;
+        let [u, y] = Vectors::of(&case.model).before;
+        let channels = Vectors::of(&case.model).channels[0].len();
+        let first = if channels > 0 { ", x(1, 2:end)" } else { "" };
+        let all = if channels > 0 { ", x(:, 2:end)" } else { "" };
+        let _ = write!(
+            script,
+            "x = dlmread('in{i}.txt', ' ');\nout({name}(x(:, 1), []{all}));\ns = {name}('hold', {u:?}, {y:?}{first});\nout({name}(x(:, 1), s{all}));\n"
+        );
+        script.push_str(&match &case.model.law {
+            None => "out([]); out([]);\n".to_owned(),
+            Some(law) => {
+                let estimate = if matches!(law, Law::Track(_)) { "law.estimate" } else { "0" };
+                format!(
+                    "r = str2double(strsplit(strtrim(fileread('law{i}.txt')), \"\\n\")); law = []; on = []; e = [];\n\
+                     for k = 1:numel(r)\n  [on(k), law] = {name}('law', r(k), law);\n  e(k) = {estimate};\nend\nout(e); out(on);\n"
+                )
+            }
+        });
+    }
+    std::fs::write(folder.join("run_cases.m"), script)?;
+    let mut octave = Tool::Octave.command();
+    output(octave.arg("run_cases.m").current_dir(folder))
+}

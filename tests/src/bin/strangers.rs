@@ -1,0 +1,77 @@
+//! Runs the program on records as strangers bring them and prints the table.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::Parser;
+use scenarios::strangers::{Options, Row, Step, json, run, table};
+
+/// Every set beside the three baselines: samples scored, FIT, verdict, delay, seconds, and whether that is right.
+///
+/// The sets of the project, or those of the folders that are named: a set is a folder with `expected.toml`, or with
+/// `*_train*.csv` and `*_test*.csv`. Exit code 1 if anything is wrong.
+#[derive(Debug, Parser)]
+#[command(name = "strangers")]
+struct Arguments {
+    /// A folder of sets; repeatable.
+    #[arg(long, value_name = "DIR")]
+    folder: Vec<PathBuf>,
+    /// Only sets or cases whose name contains this; repeatable.
+    #[arg(long, value_name = "WORD")]
+    only: Vec<String>,
+    /// Print one JSON document.
+    #[arg(long)]
+    json: bool,
+    /// Also `extend` and `discover`, and `compare` of the files that they write.
+    #[arg(long)]
+    all: bool,
+    /// Leave out this command; repeatable.
+    #[arg(long, value_name = "COMMAND", value_parser = step)]
+    without: Vec<Step>,
+    /// A command that takes longer is stopped.
+    #[arg(long, value_name = "SECONDS", default_value_t = 300)]
+    limit: u64,
+    /// Cases that are run side by side.
+    #[arg(long, value_name = "COUNT", default_value_t = 1)]
+    jobs: usize,
+}
+
+fn step(word: &str) -> Result<Step, String> {
+    Step::named(word).ok_or_else(|| "one of delay, diagnose, discover, extend is needed".to_owned())
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let options = Options {
+        folders: arguments.folder,
+        only: arguments.only,
+        all_commands: arguments.all,
+        without: arguments.without,
+        limit: Duration::from_secs(arguments.limit),
+        jobs: arguments.jobs,
+    };
+    let tell = |row: &Row| {
+        let mark = match (row.is_right(), &row.skipped) {
+            (_, Some(_)) => "skip ",
+            (true, _) => "ok   ",
+            (false, _) => "WRONG",
+        };
+        eprintln!("{mark} {} {} ({:.1} s)", row.set, row.case, row.seconds);
+    };
+    match run(&options, tell) {
+        Err(error) => {
+            eprintln!("strangers: {error:#}");
+            ExitCode::FAILURE
+        }
+        Ok(rows) => {
+            if arguments.json {
+                println!("{:#}", json(&rows));
+            } else {
+                print!("{}", table(&rows));
+            }
+            let all_right = rows.iter().all(|row| row.wrong.is_empty());
+            ExitCode::from(u8::from(!all_right))
+        }
+    }
+}

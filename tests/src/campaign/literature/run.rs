@@ -1,0 +1,42 @@
+//! Runs a case as a user would: a folder, `identify`, `diagnose`.
+
+use std::fs;
+use std::path::Path;
+
+use super::case::Case;
+use super::row::Row;
+use crate::campaign::program::Program;
+
+/// Runs a case. What goes wrong is a row too.
+#[must_use]
+pub fn run(case: &Case, program: &Program) -> Row {
+    let mut row = Row::of(case);
+    let kept = (program.keep.as_ref()).map(|keep| keep.join(row.key.replace('/', "_")));
+    let outcome = match &kept {
+        Some(folder) => fill(&mut row, case, program, folder),
+        None => tempfile::tempdir()
+            .map_err(|e| e.to_string())
+            .and_then(|scratch| fill(&mut row, case, program, scratch.path())),
+    };
+    row.failure = outcome.err();
+    row
+}
+
+fn fill(row: &mut Row, case: &Case, program: &Program, folder: &Path) -> Result<(), String> {
+    let plan = case.plan().map_err(|e| e.to_string())?;
+    let also_right = plan.model.also_right.iter();
+    row.also_right = also_right.map(|name| (*name).to_owned()).collect();
+    let inside = |name: &str| folder.join(name).to_string_lossy().into_owned();
+    let [data, given, found] = ["set", "given.toml", "found.toml"].map(&inside);
+    // Of an earlier run.
+    let _ = fs::remove_dir_all(&data);
+    let _ = fs::remove_file(&found);
+    fs::create_dir_all(folder).map_err(|e| e.to_string())?;
+    let set = plan.build().map_err(|e| e.to_string())?.data;
+    set.save(Path::new(&data)).map_err(|e| e.to_string())?;
+    fs::write(inside("answer.toml"), plan.answer()).map_err(|e| e.to_string())?;
+    row.identify = program.json(&["identify", &data, "-o", &given], folder)?.1;
+    let document;
+    (document, row.diagnose) = program.json(&["diagnose", &given, &data, "-o", &found], folder)?;
+    row.hear(&document)
+}

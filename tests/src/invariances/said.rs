@@ -1,0 +1,236 @@
+//! The answer of the program to a data set, and what differs between two.
+
+use super::Change;
+use super::records::Part;
+use crate::strangers::answer::{Answer, ask};
+use host_fit::data::{DataSet, Record, Use};
+use serde_json::Value;
+use std::path::Path;
+use std::time::Duration;
+
+/// Differences below these shares are rounding where the samples are the same, scatter where they are not.
+const SAME: f64 = 0.02;
+const SCATTER: f64 = 0.15;
+
+/// What the program said.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Said {
+    /// A command that did not end with exit code 0, with its message.
+    failed: Option<String>,
+    structure: String,
+    has_law: bool,
+    delays: Vec<f64>,
+    fit_percent: f64,
+    rmse: f64,
+    /// 1 − the larger of the poles, open and closed.
+    decay: f64,
+    /// Mean of the measured edges, samples.
+    edges: Option<f64>,
+    /// The message of `delay`, where it fails.
+    no_edges: Option<String>,
+    /// Verdict and names; none where nobody asked.
+    finding: Option<String>,
+}
+
+impl Said {
+    /// Asks `identify`, `compare`, `delay` and perhaps `diagnose`.
+    pub(super) fn of(records: &[Part], diagnose: bool, scratch: &Path, limit: Duration) -> Self {
+        let data = scratch.join("data");
+        if let Err(reason) = write(records, &data) {
+            return Self {
+                failed: Some(reason),
+                ..Self::default()
+            };
+        }
+        let model = scratch.join("model.toml").to_string_lossy().into_owned();
+        let data = data.to_string_lossy().into_owned();
+        // A model of the case before is no answer to this one.
+        let _ = std::fs::remove_file(&model);
+        let run = |name: &str, arguments: &[&str]| {
+            let arguments: Vec<String> = arguments.iter().map(|a| (*a).to_owned()).collect();
+            ask(name, &arguments, scratch, limit)
+        };
+        let identified = run("identify", &["identify", &data, "-o", &model]);
+        let compared = run("compare", &["compare", &model, &data]);
+        let delay = run("delay", &["delay", &data]);
+        let diagnosed = diagnose.then(|| run("diagnose", &["diagnose", &model, &data]));
+        let all = [Some(&identified), Some(&compared), diagnosed.as_ref()];
+        let failed = all
+            .into_iter()
+            .flatten()
+            .find(|answer| answer.exit != Some(0));
+        let failed = failed.map(|answer| format!("{}: {}", answer.command, answer.complaint()));
+        let judged = match &compared.document["validate"] {
+            Value::Null => &compared.document["identify"],
+            some => some,
+        };
+        let numbers = |value: &Value| -> Vec<f64> {
+            let list = value.as_array().into_iter().flatten();
+            list.filter_map(Value::as_f64).collect()
+        };
+        let lags = &identified.document["delays"];
+        let poles = numbers(&identified.document["poles"]);
+        Self {
+            failed,
+            structure: format!(
+                "N1 = {}, N2 = {}",
+                numbers(&lags["state"]).len(),
+                numbers(&lags["product"]).len()
+            ),
+            has_law: !lags["law"].is_null(),
+            delays: numbers(&lags["input"]),
+            fit_percent: judged["fit_percent"].as_f64().unwrap_or(f64::NAN),
+            rmse: judged["rmse"].as_f64().unwrap_or(f64::NAN),
+            decay: 1.0 - poles.iter().fold(0.0, |most: f64, pole| most.max(*pole)),
+            edges: delay.document["statistics"]["all"]["mean"].as_f64(),
+            no_edges: (delay.exit != Some(0)).then(|| delay.complaint()),
+            finding: diagnosed.as_ref().map(finding),
+        }
+    }
+}
+
+fn finding(answer: &Answer) -> String {
+    let verdict = answer.document["verdict"].as_str().unwrap_or("none");
+    let names = answer.document["missing"].as_array().into_iter().flatten();
+    let names: Vec<&str> = names.filter_map(Value::as_str).collect();
+    format!("{verdict} {}", names.join(", "))
+        .trim_end()
+        .to_owned()
+}
+
+fn write(records: &[Part], folder: &Path) -> Result<(), String> {
+    // The folder of the case before.
+    let _ = std::fs::remove_dir_all(folder);
+    let records = records.iter().map(|part| {
+        let role = if part.held_out {
+            Use::Validate
+        } else {
+            Use::Identify
+        };
+        Record::new(
+            &part.name,
+            role,
+            part.period_s,
+            part.u.clone(),
+            part.y.clone(),
+        )
+    });
+    let set = DataSet::from_records(None, records.collect()).map_err(|e| e.to_string())?;
+    set.save(folder).map_err(|error| error.to_string())
+}
+
+/// What differs between the answers before and after a change that multiplies errors by `factor`.
+pub(super) fn broken(change: Change, factor: f64, before: &Said, after: &Said) -> Vec<String> {
+    let mut differs = Vec::new();
+    if before.failed.is_some() || after.failed.is_some() {
+        let words = |said: &Said| said.failed.clone().unwrap_or_else(|| "done".to_owned());
+        // A failure of both alike is no difference between them, but no answer either.
+        return vec![format!("{} → {}", words(before), words(after))];
+    }
+    let mut same = |what: &str, one: String, two: String| {
+        if one != two {
+            differs.push(format!("{what} {one} → {two}"));
+        }
+    };
+    same("", before.structure.clone(), after.structure.clone());
+    same("law", before.has_law.to_string(), after.has_law.to_string());
+    let finding = |said: &Said| said.finding.clone().unwrap_or_default();
+    same("verdict", finding(before), finding(after));
+    let (share, samples, points) = match change.changes_samples() {
+        true => (SCATTER, 1.0, 1.0),
+        false => (SAME, 0.5, 0.1),
+    };
+    let near = |one: f64, two: f64, within: f64| (one - two).abs() <= within;
+    let delays_agree = before.delays.len() == after.delays.len() && {
+        let mut pairs = before.delays.iter().zip(&after.delays);
+        pairs.all(|(one, two)| near(*one, *two, samples))
+    };
+    if !delays_agree {
+        differs.push(format!("delay {:?} → {:?}", before.delays, after.delays));
+    }
+    // FIT is relative to the scatter of y, which rest makes smaller.
+    if change != Change::Rest && !near(before.fit_percent, after.fit_percent, points) {
+        let (one, two) = (before.fit_percent, after.fit_percent);
+        differs.push(format!("FIT {one:.2} % → {two:.2} %"));
+    }
+    let expected = factor * before.rmse;
+    if !near(expected, after.rmse, share * expected) {
+        differs.push(format!("error {expected:.5} expected → {:.5}", after.rmse));
+    }
+    // The poles are those at u = 0 and u = 1.
+    let has_poles = !matches!(change, Change::Command);
+    if has_poles && !near(before.decay, after.decay, share * before.decay.abs()) {
+        differs.push(format!(
+            "slowest decay {:.5} → {:.5}",
+            before.decay, after.decay
+        ));
+    }
+    if before.no_edges.is_none()
+        && let Some(words) = &after.no_edges
+    {
+        differs.push(format!("delay: {words}"));
+        return differs;
+    }
+    match (before.edges, after.edges) {
+        (Some(one), Some(two)) if near(one, two, samples) => {}
+        (None, None) => {}
+        (one, two) => differs.push(format!("measured delay {one:?} → {two:?}")),
+    }
+    differs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said() -> Said {
+        Said {
+            structure: "N1 = 1, N2 = 1".to_owned(),
+            delays: vec![15.0],
+            fit_percent: 97.0,
+            rmse: 0.01,
+            decay: 0.02,
+            edges: Some(15.1),
+            finding: Some("nothing-missing".to_owned()),
+            ..Said::default()
+        }
+    }
+
+    #[test]
+    fn answers_that_are_the_same_are_not_broken() {
+        let mut after = said();
+        after.rmse = 0.25;
+        assert!(broken(Change::Output, 25.0, &said(), &after).is_empty());
+        after.rmse = 0.01;
+        after.delays = vec![16.0];
+        assert!(broken(Change::Cut, 1.0, &said(), &after).is_empty());
+        assert_eq!(
+            broken(Change::Clock, 1.0, &said(), &after),
+            ["delay [15.0] → [16.0]"]
+        );
+    }
+
+    #[test]
+    fn every_difference_is_told() {
+        let after = Said {
+            structure: "N1 = 2, N2 = 1".to_owned(),
+            has_law: true,
+            delays: Vec::new(),
+            fit_percent: f64::NAN,
+            rmse: f64::NAN,
+            decay: 0.0,
+            edges: None,
+            finding: None,
+            ..Said::default()
+        };
+        assert_eq!(broken(Change::Cut, 1.0, &said(), &after).len(), 8);
+        let failed = Said {
+            failed: Some("delay: no message".to_owned()),
+            ..said()
+        };
+        assert_eq!(
+            broken(Change::Rest, 1.0, &said(), &failed),
+            ["done → delay: no message"]
+        );
+    }
+}

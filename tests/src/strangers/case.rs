@@ -1,0 +1,123 @@
+//! A case: records, the commands that are run on them, and the right answer.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// A command that is run on a case, beside `import` and `compare`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Step {
+    /// `identify`, and `compare` with the file that it writes.
+    Identify,
+    /// `delay`.
+    Delay,
+    /// `diagnose -o`, and `compare` with the file that it writes.
+    Diagnose,
+    /// `discover -o`, and `compare` with the file that it writes.
+    Discover,
+    /// `extend -o` with one effect, and `compare` with the file that it writes.
+    Extend,
+}
+
+impl Step {
+    /// The step by the name of its command.
+    #[must_use]
+    pub fn named(word: &str) -> Option<Self> {
+        let all = [
+            ("identify", Self::Identify),
+            ("delay", Self::Delay),
+            ("diagnose", Self::Diagnose),
+            ("discover", Self::Discover),
+            ("extend", Self::Extend),
+        ];
+        let found = all.into_iter().find(|(name, _)| *name == word)?;
+        Some(found.1)
+    }
+}
+
+/// Records, commands and the right answer.
+#[derive(Clone, Debug, Default)]
+pub struct Case {
+    /// Name of the set.
+    pub set: String,
+    /// Name of the case.
+    pub name: String,
+    /// What kind of record it is.
+    pub kind: String,
+    /// Estimation records.
+    pub files: Vec<PathBuf>,
+    /// Validation records.
+    pub validate: Vec<PathBuf>,
+    /// Options of `import`; none for CSV files that are given as they are.
+    pub import: Option<Vec<String>>,
+    /// What is run.
+    pub commands: Vec<Step>,
+    /// The case of the same set whose answer must be the same.
+    pub same_answer_as: Option<String>,
+    /// What is right.
+    pub right: Right,
+}
+
+/// The right answer; what is not said is not checked, but for what holds of every case.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Right {
+    /// Exit codes other than 0, by command.
+    pub exit: BTreeMap<String, i32>,
+    /// Range of every input delay of the model, which must be constant, samples.
+    pub delay_samples: Option<[f64; 2]>,
+    /// Range of every delay that `delay` measures, samples.
+    pub edge_delay_samples: Option<[f64; 2]>,
+    /// Most state lags.
+    pub n1_at_most: Option<usize>,
+    /// Most product lags.
+    pub n2_at_most: Option<usize>,
+    /// Verdicts of `diagnose` that are right; all if empty.
+    pub verdicts: Vec<String>,
+    /// Effects that may be named.
+    pub names: Vec<String>,
+    /// Most terms of `discover`.
+    pub terms_at_most: Option<usize>,
+    /// Least FIT of `compare`, in percent.
+    pub fit_at_least: Option<f64>,
+    /// Least share of the samples that is scored; half if not said.
+    pub scored_at_least: Option<f64>,
+    /// Range of the sampling period of the data set, s.
+    pub period_s: Option<[f64; 2]>,
+    /// Range that u of the data set must lie in and reach, within 1 %.
+    pub u: Option<[f64; 2]>,
+    /// Range that y of the data set must lie in.
+    pub y: Option<[f64; 2]>,
+    /// Range of the number of samples of the data set.
+    pub samples: Option<[usize; 2]>,
+    /// Words that the answers together have.
+    pub said: Vec<String>,
+    /// Words that no answer has.
+    pub not_said: Vec<String>,
+}
+
+/// `expected.toml`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Expected {
+    /// What kind of record it is.
+    pub(super) kind: String,
+    #[serde(rename = "case")]
+    pub(super) cases: Vec<ExpectedCase>,
+}
+
+/// `[[case]]` of `expected.toml`.
+#[derive(Debug, Deserialize)]
+pub(super) struct ExpectedCase {
+    pub(super) name: String,
+    pub(super) files: Vec<String>,
+    #[serde(default)]
+    pub(super) validate: Vec<String>,
+    pub(super) import: Option<Vec<String>>,
+    pub(super) commands: Option<Vec<Step>>,
+    pub(super) same_answer_as: Option<String>,
+    /// The rest, which is checked for unknown keys.
+    #[serde(flatten)]
+    pub(super) right: toml::Table,
+}

@@ -1,0 +1,108 @@
+//! The rows as a Markdown table with what is wrong below it, and as JSON.
+
+use super::Row;
+use serde_json::{Value, json as value};
+use std::fmt::Write;
+
+/// A table of all cases, and below it what is wrong and what was skipped.
+#[must_use]
+pub fn table(rows: &[Row]) -> String {
+    let mut text = String::from(
+        "| set | case | scored | FOPDT % | SOPDT % | ARX % | ours % | model | edges | verdict | s | |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for row in rows {
+        let fit = |fit: Option<f64>| fit.map_or("–".to_owned(), |fit| format!("{fit:.1}"));
+        let judged = match (&*row.judged, row.fit_percent) {
+            ("identify", Some(fit)) => format!("{fit:.1} (own)"),
+            (_, found) => fit(found),
+        };
+        let scored = match row.samples {
+            0 => "–".to_owned(),
+            samples => format!("{} of {samples}", row.scored),
+        };
+        let verdict = match (&row.verdict, row.names.is_empty()) {
+            (None, _) => "–".to_owned(),
+            (Some(verdict), true) => verdict.clone(),
+            (Some(verdict), false) => format!("{verdict}: {}", row.names.join(", ")),
+        };
+        let mark = match (row.is_right(), &row.skipped) {
+            (_, Some(_)) => "skipped",
+            (true, _) => "right",
+            (false, _) => "**wrong**",
+        };
+        let edges = row
+            .edge_delay_samples
+            .map_or("–".to_owned(), |d| format!("{d:.1}"));
+        let _ = writeln!(
+            text,
+            "| {} | {} | {scored} | {} | {} | {} | {judged} | {} | {edges} | {verdict} | {:.1} | {mark} |",
+            row.set,
+            row.case,
+            fit(row.baselines.fopdt),
+            fit(row.baselines.sopdt),
+            fit(row.baselines.arx),
+            row.structure,
+            row.seconds,
+        );
+    }
+    let ran = rows.iter().filter(|row| row.skipped.is_none()).count();
+    let right = rows.iter().filter(|row| row.is_right()).count();
+    let _ = writeln!(text, "\n{right} of {ran} cases are right.");
+    for row in rows {
+        if let Some(reason) = &row.skipped {
+            let _ = writeln!(text, "- {} {}: skipped, {reason}", row.set, row.case);
+        }
+        for reason in &row.wrong {
+            let _ = writeln!(text, "- {} {}: {reason}", row.set, row.case);
+        }
+    }
+    text
+}
+
+/// The same as one document: every row, how many ran and how many are right.
+#[must_use]
+pub fn json(rows: &[Row]) -> Value {
+    value!({
+        "rows": rows,
+        "ran": rows.iter().filter(|row| row.skipped.is_none()).count(),
+        "right": rows.iter().filter(|row| row.is_right()).count(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_says_what_is_wrong() {
+        let good = Row {
+            set: "a".to_owned(),
+            case: "one".to_owned(),
+            samples: 100,
+            scored: 90,
+            judged: "identify".to_owned(),
+            fit_percent: Some(98.76),
+            ..Row::default()
+        };
+        let bad = Row {
+            wrong: vec!["verdict unexplained".to_owned()],
+            case: "two".to_owned(),
+            judged: "validate".to_owned(),
+            ..good.clone()
+        };
+        let skipped = Row {
+            skipped: Some("x.csv is not there".to_owned()),
+            ..Row::default()
+        };
+        let rows = [good, bad, skipped];
+        let text = table(&rows);
+        assert!(
+            text.contains("| a | one | 90 of 100 | – | – | – | 98.8 (own) |"),
+            "{text}"
+        );
+        assert!(text.contains("1 of 2 cases are right."), "{text}");
+        assert!(text.contains("- a two: verdict unexplained"), "{text}");
+        assert_eq!(json(&rows)["right"], 1);
+    }
+}

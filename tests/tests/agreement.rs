@@ -1,0 +1,100 @@
+//! Exported models: all of them are compared by `cargo xtask agreement`, some here; and no text of a model file becomes
+//! code in any language.
+
+use host_fit::codegen::portable::{self, Precision};
+use host_fit::codegen::{Language, write};
+use host_fit::model::{Model, Training};
+use host_fit::user_effect::Definition;
+use scenarios::agreement::{Case, Tool, cases, run};
+
+#[test]
+fn exported_models_say_what_the_host_says() {
+    let all = cases();
+    let some: Vec<Case> = all
+        .into_iter()
+        .filter(|case| {
+            let names = [
+                "effects",
+                "slow",
+                "own: every function",
+                "six effects",
+                "command range",
+            ];
+            names.contains(&case.name.as_str())
+        })
+        .collect();
+    assert_eq!(some.len(), 5);
+    for tool in Tool::ALL.into_iter().filter(|tool| tool.is_installed()) {
+        let folder = tempfile::tempdir().expect("a folder");
+        for row in run(tool, &some, folder.path()).expect("the tool runs") {
+            assert!(row.agrees, "{row:?}");
+        }
+    }
+}
+
+/// Ends every kind of comment and string that there is.
+const HOSTILE: &str = "x */ #error\n#error injected\r\nraise SystemExit(7)\n\"\"\"\n'; error('injected'); %{\n\\\n??/\n\u{2028}error(1)";
+
+#[test]
+fn no_text_of_a_model_becomes_code() {
+    let effect = r##"
+name = "hostile"
+place = "jet"
+summary = "*/ \"\"\" ' #error %{"
+source = "\n#error"
+channel = "wind"
+expression = "jet * (1 + gain * (wind - reference))"
+[[parameter]]
+name = "gain"
+unit = "*/ \u2028 raise SystemExit(7)"
+low = -1.0
+high = 1.0
+starts = [0.1]
+"##;
+    let definition = Definition::from_toml(effect, "hostile.toml").expect("an effect");
+    let mut model = Model {
+        training: Training {
+            data_hash: HOSTILE.to_owned(),
+            tool_version: HOSTILE.to_owned(),
+            objective: HOSTILE.to_owned(),
+            ..Training::default()
+        },
+        a: vec![0.9],
+        b: vec![0.1],
+        ..Model::default()
+    };
+    model.define(definition).expect("no other");
+    model.add(definition.spec(), &[0.1], Some(10.0));
+    model.effects[0].channel = Some(HOSTILE.to_owned());
+    // Compiled and run; what got out of a comment or string would not parse, or end the run.
+    let case = Case {
+        name: "hostile".to_owned(),
+        model: model.clone(),
+    };
+    for tool in Tool::ALL.into_iter().filter(|tool| tool.is_installed()) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let rows = run(tool, std::slice::from_ref(&case), folder.path()).expect("it runs");
+        assert!(rows.iter().all(|row| row.agrees), "{rows:?}");
+    }
+    for language in [
+        Language::C(Precision::Double),
+        Language::Python,
+        Language::Matlab(portable::function_name("x'; error(1)")),
+    ] {
+        let text = write(&model, &language).expect("a file");
+        for line in text.lines() {
+            let begins = ["#error", "raise", "error(", "'", "x '"]
+                .iter()
+                .any(|code| line.trim_start().starts_with(code));
+            assert!(!begins, "{language:?}: {line}");
+        }
+    }
+    let rust = write(&model, &Language::Rust).expect("constants");
+    let head = rust.lines().take_while(|line| !line.starts_with("use "));
+    assert!(
+        head.clone().count() > 4
+            && head
+                .clone()
+                .all(|line| line.is_empty() || line.starts_with("//!"))
+    );
+}

@@ -1,0 +1,431 @@
+//! Files and options that are sized to abort the program, hang it, or make it say what is wrong: each kind with the least of its
+//! inputs. Every command ends within its time, with one paragraph that names the key, the file or the option.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use scenarios::program;
+use tempfile::TempDir;
+
+const MODEL: &str = include_str!("../data/hostile/model.toml");
+
+fn data(name: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../data")
+        .join(name);
+    path.to_str().expect("UTF-8").to_owned()
+}
+
+struct Room(TempDir);
+
+impl Room {
+    fn new() -> Self {
+        Self(tempfile::tempdir().expect("a folder"))
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// A file; its path as an argument.
+    fn file(&self, name: &str, text: &str) -> String {
+        fs::write(self.path(name), text).expect("written");
+        self.named(name)
+    }
+
+    fn named(&self, name: &str) -> String {
+        self.path(name).to_str().expect("UTF-8").to_owned()
+    }
+}
+
+/// Runs the program; it has half a minute.
+#[track_caller]
+fn run(arguments: &[&str]) -> Output {
+    let mut child = Command::new(program())
+        .args(arguments)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let until = Instant::now() + Duration::from_secs(60);
+    while child.try_wait().expect("a child").is_none() {
+        if Instant::now() > until {
+            child.kill().expect("ended");
+            panic!("no end: {arguments:?}");
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child.wait_with_output().expect("its output")
+}
+
+/// Exit 1 and one paragraph with every part, of characters that are seen.
+#[track_caller]
+fn refused(arguments: &[&str], parts: &[&str]) -> String {
+    let output = run(arguments);
+    let error = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {error}");
+    let line = error.strip_suffix('\n').unwrap_or(&error);
+    assert!(
+        line.starts_with("error: ") && !line.chars().any(char::is_control),
+        "{error:?}"
+    );
+    for part in parts {
+        assert!(error.contains(part), "no `{part}` in: {error}");
+    }
+    error
+}
+
+#[track_caller]
+fn done(arguments: &[&str]) -> Output {
+    let output = run(arguments);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {error}");
+    output
+}
+
+/// Values of a model file that ask for memory or time, or are none: refused by every command that reads one.
+#[test]
+fn values_of_a_model_are_checked_when_it_is_loaded() {
+    let room = Room::new();
+    let (step, out) = (data("hidden-ramp/step.csv"), room.named("o"));
+    for (from, to, key) in [
+        ("window = 250", "window = 4294967295", "structure.window"),
+        (
+            "delay_floor = 30.0",
+            "delay_floor = 1e18",
+            "delay.delay_floor",
+        ),
+        ("[0.0, 0.84]", "[-inf, inf]", "law.reachable"),
+    ] {
+        let model = room.file("m.toml", &MODEL.replacen(from, to, 1));
+        refused(&["simulate", &model, &step, "-o", &out], &["m.toml", key]);
+        refused(&["codegen", &model, "-o", &out], &["m.toml", key]);
+        refused(
+            &["design", &model, "-o", &out, "--target", "0.5"],
+            &["m.toml", key],
+        );
+    }
+    assert!(!room.path("o").exists());
+}
+
+/// Long lags, horizons and hold times: an answer or a refusal, soon.
+#[test]
+fn no_design_goes_on_for_ever() {
+    let room = Room::new();
+    let out = room.named("d.toml");
+    let lags = ["state_lags = [65535]", "product_lags = [3000]"];
+    for (lag, from) in lags.iter().zip(["state_lags = [1]", "product_lags = [1]"]) {
+        let model = room.file("m.toml", &MODEL.replacen(from, lag, 1));
+        let output = run(&["design", &model, "-o", &out, "--target", "0.02"]);
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            matches!(output.status.code(), Some(0 | 1)) && !error.contains("panicked"),
+            "{error}"
+        );
+    }
+    let model = room.file("m.toml", MODEL);
+    let maximise = ["design", &model, "-o", &out, "--goal", "maximise"];
+    for (option, value) in [
+        ("--horizon", "1e300"),
+        ("--horizon", "4294967295samples"),
+        ("--min-on", "1e300"),
+    ] {
+        refused(&[&maximise[..], &[option, value]].concat(), &["100 s"]);
+    }
+}
+
+/// Memory is counted before it is asked for, and the limit can be moved.
+#[test]
+fn memory_is_counted_before_it_is_asked_for() {
+    let room = Room::new();
+    let rows = (0..30_000).fold("t,u,y\n".to_owned(), |text, k| {
+        format!(
+            "{text}{:.3},{},{}\n",
+            f64::from(k) * 0.001,
+            k / 500 % 2,
+            f64::from(k % 977) * 1e-3
+        )
+    });
+    let (long, out) = (room.file("long.csv", &rows), room.named("m.toml"));
+    let identify = [
+        "identify",
+        &long,
+        "-o",
+        &out,
+        "--n1",
+        "1",
+        "--n2",
+        "1",
+        "--n3",
+        "1",
+        "--evaluations",
+        "2",
+    ];
+    refused(
+        &[&identify[..], &["--max-lag", "12000"]].concat(),
+        &["--max-lag", "GB", "--memory"],
+    );
+    refused(
+        &[&identify[..], &["--max-lag", "3000", "--memory", "0.2"]].concat(),
+        &["0.2 GB", "--memory"],
+    );
+    // Ten million cells in a file of ten lines.
+    let wide = (0..20_000).fold("t,u,y".to_owned(), |text, k| format!("{text},c{k}"));
+    let row = ",0.5".repeat(20_000);
+    let wide = room.file(
+        "wide.csv",
+        &format!("{wide}\n0,0,1{row}\n1,1,1{row}\n2,0,1{row}\n"),
+    );
+    refused(
+        &["import", &wide, "-o", &room.named("set")],
+        &["wide.csv", "16384"],
+    );
+    assert_eq!(run(&["effects", "--memory", "0"]).status.code(), Some(2));
+}
+
+/// What one command writes the next one reads.
+#[test]
+fn what_is_written_can_be_read() {
+    let room = Room::new();
+    let (set, model) = (data("hidden-ramp"), room.named("m.toml"));
+    let identify = [
+        "identify",
+        &set,
+        "-o",
+        &model,
+        "--n1",
+        "1",
+        "--n2",
+        "1",
+        "--n3",
+        "1",
+        "--evaluations",
+        "50",
+    ];
+    for seed in ["9223372036854775808", "18446744073709551615"] {
+        done(&[&identify[..], &["--seed", seed]].concat());
+        done(&["compare", &model, &set]);
+    }
+    let tiny = room.file(
+        "tiny.csv",
+        "t,u,y\n0,0,1e-320\n1e-320,0,1e-320\n2e-320,1,0\n",
+    );
+    refused(
+        &["import", &tiny, "-o", &room.named("out")],
+        &["tiny.csv", "sampling period"],
+    );
+    let late = room.file(
+        "late.csv",
+        "t,u,y\n1700000000.0000001,0,1\n1700000000.0000002,0,1\n1700000000.0000003,1,0\n",
+    );
+    refused(&["import", &late, "-o", &room.named("out")], &["late.csv"]);
+}
+
+/// Names that act on a terminal are written out, in messages, documents and generated code; a path is any bytes.
+#[test]
+fn names_are_shown_and_do_not_act() {
+    let room = Room::new();
+    let acting = "a\\u001b[2J\\u001b]0;x\\u0007b\\u202Ec\\rd";
+    let model = room.file("m.toml", &MODEL.replacen("plenum-droop", acting, 1));
+    refused(&["compare", &model, &data("hidden-ramp")], &["a\\u{1b}[2J"]);
+    let model = room.file(
+        "m.toml",
+        &MODEL.replacen(
+            "tool_version = \"0.1.0\"",
+            &format!("tool_version = \"{acting}\""),
+            1,
+        ),
+    );
+    let out = room.named("o.rs");
+    let told = done(&["codegen", &model, "-o", &out, "--json"]);
+    let written = fs::read_to_string(&out).expect("written");
+    for text in [String::from_utf8(told.stdout).expect("UTF-8"), written] {
+        let acts = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
+        assert!(!text.contains(acts), "{text}");
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::ffi::OsStrExt;
+        let name = room.0.path().join(std::ffi::OsStr::from_bytes(b"o\xff.rs"));
+        let output = Command::new(program())
+            .args(["--json", "codegen", &model, "-o"])
+            .arg(&name)
+            .output();
+        let output = output.expect("the program starts");
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        assert!(
+            document["output"]
+                .as_str()
+                .expect("a name")
+                .ends_with("o\u{fffd}.rs")
+                && name.exists()
+        );
+    }
+}
+
+/// What a rig file says goes into constants of single precision.
+#[test]
+fn a_rig_that_single_precision_cannot_hold_is_refused() {
+    let room = Room::new();
+    let rig = "format_version = 1\nsample_period_s = 0.001\nresidual_envelope = 0.5\n[sensor]\nzero_counts = 800.0\n\
+               per_count = 0.0005\nlower_rail_counts = 8.0\nupper_rail_counts = 4087.0\nstuck_after_samples = 500\n\
+               [valve]\nshortest_on_s = 0.004\nshortest_off_s = 0.004\n";
+    let (model, out) = (room.file("m.toml", MODEL), room.named("identified.rs"));
+    for (from, to, key) in [
+        ("envelope = 0.5", "envelope = 1e300", "residual_envelope"),
+        ("per_count = 0.0005", "per_count = 1e39", "per_count"),
+        ("per_count = 0.0005", "per_count = 1e-300", "per_count"),
+        ("on_s = 0.004", "on_s = inf", "shortest_on_s"),
+    ] {
+        let rig = room.file("rig.toml", &rig.replacen(from, to, 1));
+        refused(
+            &["codegen", &model, "--rig", &rig, "-o", &out],
+            &["rig.toml", key],
+        );
+    }
+    assert!(!room.path("rig.rs").exists());
+    let rig = room.file("rig.toml", rig);
+    done(&["codegen", &model, "--rig", &rig, "-o", &out]);
+}
+
+/// The unit of y is nobody's business: what is unstable at 1 is so at 1e-30 and at 1e12, and nothing else is.
+#[test]
+fn stability_does_not_depend_on_the_unit() {
+    let room = Room::new();
+    let step = fs::read_to_string(data("hidden-ramp") + "/sq4-50.csv").expect("bundled");
+    let header: Vec<&str> = step.lines().next().expect("a header").split(',').collect();
+    let y = header.iter().position(|name| *name == "y").expect("y");
+    for scale in [1e-30, 1e12] {
+        let mut text = "t,u,y\n".to_owned();
+        for line in step.lines().skip(1) {
+            let cells: Vec<&str> = line.split(',').collect();
+            let value: f64 = cells[y].parse().expect("a number");
+            text.push_str(&format!("{},{},{:e}\n", cells[0], cells[1], value * scale));
+        }
+        let (file, model) = (room.file("run.csv", &text), room.named("m.toml"));
+        done(&[
+            "identify",
+            &file,
+            "-o",
+            &model,
+            "--n1",
+            "1",
+            "--n2",
+            "1",
+            "--n3",
+            "1",
+            "--evaluations",
+            "100",
+        ]);
+        let command = room.file(
+            "u.csv",
+            &text
+                .lines()
+                .map(|l| {
+                    let cells: Vec<&str> = l.split(',').collect();
+                    format!("{},{}\n", cells[0], cells[1])
+                })
+                .collect::<String>(),
+        );
+        done(&["simulate", &model, &command, "-o", &room.named("o.csv")]);
+    }
+}
+
+/// Ctrl-C ends every command that works for long, soon, and leaves no half file.
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_every_command() {
+    let room = Room::new();
+    let (set, out, model) = (
+        data("hidden-ramp"),
+        room.named("out.toml"),
+        room.file("m.toml", MODEL),
+    );
+    let commands: [&[&str]; 5] = [
+        &["identify", &set, "-o", &out],
+        &["diagnose", &model, &set],
+        &["discover", &model, &set],
+        &["extend", &model, &set, "--effect", "valve-lag", "-o", &out],
+        &[
+            "design",
+            &model,
+            "--goal",
+            "maximise",
+            "--horizon",
+            "50",
+            "-o",
+            &out,
+        ],
+    ];
+    for command in commands {
+        for after in [0.1, 1.0] {
+            let child = Command::new(program())
+                .args(command)
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .spawn();
+            let mut child = child.expect("the program starts");
+            std::thread::sleep(Duration::from_secs_f64(after));
+            // It may have ended by itself.
+            let _ = Command::new("kill")
+                .args(["-INT", &child.id().to_string()])
+                .stderr(Stdio::null())
+                .status();
+            let asked = Instant::now();
+            while child.try_wait().expect("a child").is_none() {
+                if asked.elapsed() > Duration::from_secs(40) {
+                    child.kill().expect("ended");
+                    panic!("{command:?} goes on after {after} s");
+                }
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            let names = fs::read_dir(room.0.path()).expect("a folder").flatten();
+            let names: Vec<String> = names
+                .map(|e| e.file_name().to_string_lossy().into_owned())
+                .collect();
+            assert!(
+                names.iter().all(|n| !n.contains(".host-fit-")) || after < 1.0,
+                "{names:?}"
+            );
+        }
+    }
+}
+
+/// A text may be checked at every keystroke: nothing of it is kept.
+#[cfg(target_os = "linux")]
+#[test]
+fn checking_a_text_keeps_nothing() {
+    use host_fit::user_effect::Definition;
+    let resident = || -> u64 {
+        let status = fs::read_to_string("/proc/self/status").expect("Linux");
+        let line = status
+            .lines()
+            .find(|l| l.starts_with("VmRSS"))
+            .expect("there");
+        line.split_whitespace()
+            .nth(1)
+            .expect("a number")
+            .parse()
+            .expect("a number")
+    };
+    let filler = "x".repeat(50_000);
+    let before = resident();
+    for i in 0..10_000 {
+        let text = format!(
+            "name = \"warm\"\nplace = \"jet\"\nsummary = \"{filler}{i}\"\nexpression = \"jet * gain + {i}.0\"\n[[parameter]]\n\
+             name = \"gain\"\nunit = \"-\"\nlow = 0.1\nhigh = 2.0\nstarts = [1.0]\n"
+        );
+        assert!(Definition::check(&text, "t").is_ok());
+    }
+    // Kept, they would be 500 MB.
+    let grown = resident().saturating_sub(before);
+    assert!(grown < 100_000, "{grown} kB");
+}

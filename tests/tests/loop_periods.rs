@@ -1,0 +1,138 @@
+//! A law at any loop period: designed, its constants written, and what is no loop's period refused first.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use host_fit::model::{Law, Model};
+use host_fit::terms::Units;
+use model_core::recursion::LagConvention;
+use scenarios::program;
+
+/// The paper's flow on a rig that is as much slower as the period is longer than 1 ms.
+fn paper_at(period_s: f64) -> Model {
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/paper/table-2-state-dependent.toml");
+    let mut model = Model::load(&path).expect("the model");
+    model.convention = LagConvention::OneStep;
+    let spec = model_core::effects::spec("valve-lag").expect("in the catalogue");
+    model.add(spec, &[0.004, 0.006], None);
+    let clock = Units {
+        time: period_s / model.sample_period_s,
+        ..Units::NONE
+    };
+    Model {
+        sample_period_s: period_s,
+        ..clock.model_out(&model)
+    }
+}
+
+fn run(arguments: &[&str]) -> Output {
+    Command::new(program())
+        .args(arguments)
+        .output()
+        .expect("the program starts")
+}
+
+fn error_of(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn a_slower_rig_gets_the_same_law_and_constants_with_its_period() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut laws = Vec::new();
+    for period_s in [0.001, 0.01, 0.1] {
+        let name = |suffix: &str| folder.path().join(suffix).to_string_lossy().into_owned();
+        let [model, controlled, constants] = [name("m.toml"), name("c.toml"), name("c.rs")];
+        paper_at(period_s).save(Path::new(&model)).expect("saved");
+        let output = run(&[
+            "--json",
+            "design",
+            &model,
+            "-o",
+            &controlled,
+            "--target",
+            "0.8",
+            "--min-on",
+            "12samples",
+            "--min-off",
+            "12samples",
+        ]);
+        assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        assert_eq!(json["sample_period_s"].as_f64(), Some(period_s));
+        let law = Model::load(Path::new(&controlled)).expect("a model").law;
+        let Some(Law::Track(law)) = law else {
+            panic!("{law:?}");
+        };
+        laws.push(law);
+        let output = run(&["codegen", &controlled, "--board", "-o", &constants]);
+        assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
+        let text = std::fs::read_to_string(&constants).expect("constants");
+        let line = format!("pub const SAMPLE_PERIOD_S: f32 = {period_s};");
+        assert!(text.contains(&line), "{line}");
+    }
+    let first = &laws[0];
+    for law in &laws {
+        assert_eq!(
+            (law.hold, law.lead, law.look_ahead),
+            (first.hold, first.lead, first.look_ahead)
+        );
+        assert_eq!((law.opening, law.closing), (first.opening, first.closing));
+        for (a, b) in [
+            (law.observer, first.observer),
+            (law.bias_rate, first.bias_rate),
+            (law.play, first.play),
+            (law.reachable[1], first.reachable[1]),
+        ] {
+            assert!((a - b).abs() < 1e-6 * b.abs(), "{law:?} {first:?}");
+        }
+    }
+}
+
+#[test]
+fn what_is_no_loops_period_is_refused_before_anything_else() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = folder.path().join("m.toml").to_string_lossy().into_owned();
+    let out = folder.path().join("c.toml").to_string_lossy().into_owned();
+    for period_s in [0.0001, 0.25, 60.0] {
+        paper_at(period_s).save(Path::new(&model)).expect("saved");
+        // Neither the target, which cannot be held, nor the rig file, which is not there, is looked at.
+        let output = run(&[
+            "design",
+            &model,
+            "-o",
+            &out,
+            "--target",
+            "7",
+            "--rig",
+            "none.toml",
+        ]);
+        let error = error_of(&output);
+        assert_eq!(output.status.code(), Some(1), "{error}");
+        for part in ["m.toml", "`sample_period_s`", "0.2 to 100 ms", "identify"] {
+            assert!(error.contains(part), "no `{part}` in: {error}");
+        }
+    }
+    paper_at(0.1).save(Path::new(&model)).expect("saved");
+    let at = |option: &str, value: &str| {
+        let output = run(&[
+            "design", &model, "-o", &out, "--target", "0.8", option, value,
+        ]);
+        (output.status.code(), error_of(&output))
+    };
+    for option in ["--min-on", "--min-off"] {
+        let (code, error) = at(option, "20ms");
+        assert_eq!(code, Some(1), "{error}");
+        for part in [
+            option,
+            "shorter than a sample",
+            "0.1 s",
+            "`sample_period_s`",
+        ] {
+            assert!(error.contains(part), "no `{part}` in: {error}");
+        }
+        let (code, error) = at(option, "soon");
+        assert_eq!(code, Some(2), "{error}");
+    }
+}

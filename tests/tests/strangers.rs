@@ -1,0 +1,45 @@
+//! Records as strangers bring them: what is identified, printed and measured is right. `cargo xtask strangers` also
+//! diagnoses them, which takes minutes.
+
+use scenarios::strangers::{Options, Step, run, table};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+fn options(folders: Vec<PathBuf>, only: &[&str]) -> Options {
+    Options {
+        folders,
+        only: only.iter().map(|word| (*word).to_owned()).collect(),
+        all_commands: false,
+        without: vec![Step::Diagnose, Step::Discover],
+        limit: Duration::from_secs(120),
+        jobs: 2,
+    }
+}
+
+#[track_caller]
+fn all_right(options: &Options, least: usize) {
+    let rows = run(options, |_| ()).expect("sets that can be read");
+    let ran = rows.iter().filter(|row| row.skipped.is_none()).count();
+    assert!(ran >= least, "{ran} cases were run");
+    let right = rows.iter().all(|row| row.wrong.is_empty());
+    assert!(right, "{}", table(&rows));
+}
+
+#[test]
+fn bundled_sets_are_answered_right() {
+    all_right(&options(Vec::new(), &[]), 12);
+}
+
+/// Measured sets, where the folder with them is there: as good as the best baseline, and printed as written.
+#[test]
+fn measured_sets_are_no_worse_than_the_baselines() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/real");
+    if !folder.is_dir() {
+        eprintln!("skipped: {} is not there", folder.display());
+        return;
+    }
+    // The others have tens of thousands of samples; the ball on its beam integrates twice, and a second order does better
+    // there than what is handed over (`cargo xtask strangers` shows by how much).
+    let small = ["buck", "dc_motor", "gas", "hair", "halogen"];
+    all_right(&options(vec![folder], &small), small.len());
+}

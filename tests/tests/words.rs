@@ -1,0 +1,246 @@
+//! The words of messages and pages: phrases that a control engineer has to read twice stay out, the field's terms stay in.
+
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Phrases that messages and user pages do not use, and what is said for them.
+const BANNED: [(&str, &str); 27] = [
+    ("held-out error", "validation error"),
+    ("Held-out", "validation"),
+    ("held-out record", "validation record"),
+    ("kept back", "validation record"),
+    ("quoted on", "independent estimate on"),
+    ("quote on", "independent estimate on"),
+    ("noise floor", "noise level"),
+    ("times it is left", "× the noise level"),
+    ("is at the floor", "is at the noise level"),
+    ("the excess", "model error above the noise"),
+    ("Noise alone would", "Family-wise p"),
+    ("would do as much", "family-wise p"),
+    ("by chance", "significant, p"),
+    ("cannot tell", "not distinguishable on these data"),
+    ("cannot be told", "not identifiable, not distinguishable"),
+    ("tell apart", "distinguish"),
+    ("tells apart", "distinguishes"),
+    ("told apart", "distinguished"),
+    ("stand in for", "surrogate"),
+    ("stands in for", "surrogate"),
+    ("take the rest", "surrogate"),
+    ("takes the rest", "surrogate"),
+    ("does as well", "fits equally well"),
+    ("do as well", "fit equally well"),
+    (
+        "makes do with less",
+        "fits equally well with fewer parameters",
+    ),
+    ("the leanest", "the fewest lags, the base model"),
+    ("learned from", "estimation records"),
+];
+
+/// Pages for users. What is being rewritten, or is made by a campaign or by a test from the code's own rules, is not here.
+const PAGES: [&str; 10] = [
+    "README.md",
+    "docs/start.md",
+    "docs/pages.md",
+    "docs/glossary.md",
+    "docs/evidence.md",
+    "docs/guide.md",
+    "docs/base-terms.md",
+    "docs/discover.md",
+    "docs/hidden-effects.md",
+    "docs/calibration.md",
+];
+
+/// Files whose messages users read.
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|e| e == "rs" || e == "html") {
+            found.push(path);
+        }
+    }
+}
+
+/// The string literals of a Rust source, comments and unit tests left out; of commands, the doc comments as well, which
+/// are their help.
+fn texts(path: &Path) -> Vec<String> {
+    let source = std::fs::read_to_string(path).expect("a source");
+    if path.extension().is_some_and(|e| e == "html") {
+        return vec![source];
+    }
+    let code = match source.find("#[cfg(test)]\nmod tests") {
+        Some(at) => &source[..at],
+        None => &source,
+    };
+    let help = path.components().any(|c| c.as_os_str() == "commands");
+    let mut all = Vec::new();
+    if help {
+        let comments = code.lines().map(str::trim_start);
+        let comments = comments.filter_map(|line| line.strip_prefix("/// "));
+        all.push(comments.collect::<Vec<_>>().join(" "));
+    }
+    let plain: Vec<&str> = code
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("//"))
+        .collect();
+    let plain = plain.join("\n");
+    let mut letters = plain.chars();
+    let mut literal: Option<String> = None;
+    while let Some(c) = letters.next() {
+        match (&mut literal, c) {
+            (Some(text), '\\') => {
+                // A line that goes on: the break and the indent are no part of the text.
+                match letters.next() {
+                    Some('\n') => {
+                        let rest = letters.clone();
+                        let skipped = rest.take_while(|c| c.is_whitespace()).count();
+                        (0..skipped).for_each(|_| {
+                            letters.next();
+                        });
+                    }
+                    Some('n') => text.push(' '),
+                    Some(other) => text.push(other),
+                    None => {}
+                }
+            }
+            (Some(_), '"') => all.extend(literal.take()),
+            (Some(text), c) => text.push(c),
+            (None, '"') => literal = Some(String::new()),
+            (None, '\'') => {
+                // A character, or a lifetime.
+                let mut ahead = letters.clone();
+                if ahead.next() == Some('"') && ahead.next() == Some('\'') {
+                    letters = ahead;
+                }
+            }
+            (None, _) => {}
+        }
+    }
+    all
+}
+
+#[test]
+fn banned_phrases_are_in_no_message() {
+    let mut files = Vec::new();
+    sources(&root().join("host-fit/src"), &mut files);
+    assert!(files.len() > 200, "{}", files.len());
+    let mut found = Vec::new();
+    for file in &files {
+        // Rules say what decides inside; their page is for whoever changes one.
+        if file.ends_with("rules.rs") {
+            continue;
+        }
+        for text in texts(file) {
+            for (banned, instead) in BANNED {
+                if text.contains(banned) {
+                    let start: String = text.chars().take(120).collect();
+                    found.push(format!(
+                        "{}: \"{banned}\" (say \"{instead}\") in: {start}",
+                        file.display()
+                    ));
+                }
+            }
+        }
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn banned_phrases_are_on_no_page_for_users() {
+    let mut found = Vec::new();
+    for page in PAGES {
+        let text = std::fs::read_to_string(root().join(page)).expect(page);
+        for (number, line) in text.lines().enumerate() {
+            for (banned, instead) in BANNED {
+                if line.contains(banned) {
+                    found.push(format!(
+                        "{page}:{}: \"{banned}\" (say \"{instead}\")",
+                        number + 1
+                    ));
+                }
+            }
+        }
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn the_terms_of_the_field_are_said_and_explained() {
+    let glossary = std::fs::read_to_string(root().join("docs/glossary.md")).expect("the page");
+    for term in [
+        "validation record",
+        "estimation record",
+        "free run",
+        "noise level",
+        "model error above the noise",
+        "model order",
+        "base model",
+        "candidate",
+        "surrogate",
+        "family-wise p-value",
+        "not distinguishable",
+        "identifiable",
+        "dead time",
+        "over-fitting",
+        "cross-validation",
+        "bootstrap",
+        "evidence",
+        "record-to-record offset",
+        "parsimony",
+        "residual autocorrelation",
+        "false discovery",
+    ] {
+        assert!(
+            glossary.contains(&format!("**{term}**")),
+            "{term} is not in the glossary"
+        );
+    }
+    let mut files = Vec::new();
+    sources(&root().join("host-fit/src"), &mut files);
+    let said: Vec<String> = files.iter().flat_map(|file| texts(file)).collect();
+    for term in [
+        "validation error",
+        "noise level",
+        "Family-wise p",
+        "surrogate",
+        "Not distinguishable on these data",
+        "over-fit",
+        "identifiable",
+        "cross-validation",
+        "bootstrap",
+    ] {
+        assert!(
+            said.iter().any(|text| text.contains(term)),
+            "no message says {term}"
+        );
+    }
+}
+
+/// The message that says what p-values and intervals are worth quotes the page that counted them.
+#[test]
+fn the_calibration_that_messages_quote_is_that_of_the_page() {
+    let page = std::fs::read_to_string(root().join("docs/calibration.md")).expect("the page");
+    assert!(page.contains("| named although nothing is missing | 2 of 300 "));
+    let held = page
+        .lines()
+        .filter(|line| line.starts_with("| 95 % intervals that hold"));
+    let counts = held.map(|line| {
+        let cell = line.split('|').nth(2).expect("a cell");
+        let mut words = cell.split_whitespace();
+        let number =
+            |word: Option<&str>| word.and_then(|w| w.parse::<f64>().ok()).expect("a number");
+        let held = number(words.next());
+        (held, number(words.nth(1)))
+    });
+    let (held, all) = counts.fold((0.0, 0.0), |(a, b), (x, y)| (a + x, b + y));
+    assert!((held / all - 0.9).abs() < 0.02, "{held} of {all}");
+    let verdict = root().join("host-fit/src/steps/verdict.rs");
+    let said = texts(&verdict).join(" ");
+    assert!(said.contains("of 300 without a missing effect, 2 got a name"));
+    assert!(said.contains("about 90 % of the cases"));
+}

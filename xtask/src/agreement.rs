@@ -1,0 +1,10 @@
+//! Whether every model says the same in every language that `codegen` writes: `cargo xtask agreement`.
+
+use crate::Task;
+use crate::shell::{run, scenario};
+
+pub(crate) const TASK: Task = Task {
+    name: "agreement",
+    does: "every model, effect and law in C, Python and Octave beside the host, as a table; --all: none may be missing",
+    run: |arguments| run(scenario("agreement").args(arguments)),
+};

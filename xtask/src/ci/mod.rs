@@ -1,0 +1,350 @@
+//! Everything CI runs, in one command: two steps at a time; failures are collected, not fatal.
+
+mod lanes;
+mod slowest;
+
+use crate::Task;
+use crate::setup::TARGETS;
+use crate::shell::{cargo, firmware_cargo, run};
+use anyhow::{Context, Result, bail};
+
+pub(crate) const TASK: Task = Task {
+    name: "ci",
+    does: "everything CI runs; goes on after a failure and lists all at the end",
+    run: ci,
+};
+
+/// A part of CI, which runs beside another.
+struct Step {
+    name: &'static str,
+    /// Steps that have to end before it starts; where one of them fails it is not run.
+    after: &'static [&'static str],
+    /// What no two steps use at a time.
+    room: Option<Room>,
+    run: fn() -> Result<()>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Room {
+    /// The workspace's folder of artefacts, which cargo locks while it compiles and before it runs tests.
+    Host,
+    /// The firmware's, where programs for boards and their constants lie under one name each.
+    Firmware,
+}
+
+/// The step that compiles the workspace, all tests and programs.
+const BUILD: &str = "build";
+const SET_UP: &str = "set-up";
+
+/// In the order in which they start where nothing stands in the way.
+const STEPS: &[Step] = &[
+    Step {
+        name: BUILD,
+        after: &[],
+        room: Some(Room::Host),
+        run: || {
+            run(&mut cargo(&[
+                "test",
+                "--release",
+                "--workspace",
+                "--no-run",
+            ]))
+        },
+    },
+    Step {
+        name: "format",
+        after: &[],
+        room: None,
+        run: || {
+            run(&mut cargo(&["fmt", "--all", "--check"]))?;
+            run(&mut firmware_cargo(&["fmt", "--all", "--check"]))
+        },
+    },
+    Step {
+        name: SET_UP,
+        after: &[],
+        room: None,
+        run: || crate::setup::setup(&[]),
+    },
+    // The README's test command; documentation examples are part of it.
+    Step {
+        name: "tests",
+        after: &[BUILD],
+        room: Some(Room::Host),
+        run: || run(&mut cargo(&["test", "--release", "--workspace"])),
+    },
+    Step {
+        name: "lints",
+        after: &[],
+        room: Some(Room::Host),
+        run: || {
+            run(&mut cargo(&[
+                "clippy",
+                "--release",
+                "--workspace",
+                "--all-targets",
+                "--",
+                "-Dwarnings",
+            ]))
+        },
+    },
+    Step {
+        name: "documentation",
+        after: &[],
+        room: Some(Room::Host),
+        run: || {
+            run(cargo(&["doc", "--release", "--workspace", "--no-deps"])
+                .env("RUSTDOCFLAGS", "-Dwarnings"))
+        },
+    },
+    // The fitter does not depend on the simulator that it is judged by.
+    Step {
+        name: "library alone",
+        after: &[],
+        room: Some(Room::Host),
+        run: || {
+            run(&mut cargo(&[
+                "check",
+                "--release",
+                "--package=host-fit",
+                "--lib",
+                "--no-default-features",
+            ]))
+        },
+    },
+    Step {
+        name: "msrv",
+        after: &[],
+        room: None,
+        run: crate::msrv::msrv,
+    },
+    Step {
+        name: "supply",
+        after: &[],
+        room: None,
+        run: crate::supply::supply,
+    },
+    // An effect and a delay law are one file and one line each.
+    Step {
+        name: "new effect",
+        after: &[BUILD],
+        room: Some(Room::Host),
+        run: crate::new_effect::proof,
+    },
+    // 20 s a target.
+    Step {
+        name: "fuzz",
+        after: &[BUILD],
+        room: None,
+        run: crate::fuzz::brief,
+    },
+    // What a report carries is what the sources give.
+    Step {
+        name: "pages",
+        after: &[SET_UP],
+        room: None,
+        run: || crate::pages::pages(&["--check".to_owned()]),
+    },
+    // The book's pages are what the catalogue gives, and every link of them leads somewhere.
+    Step {
+        name: "book",
+        after: &[BUILD],
+        room: None,
+        run: || crate::book::book(&["--check".to_owned()]),
+    },
+    Step {
+        name: "firmware lints",
+        after: &[],
+        room: Some(Room::Firmware),
+        run: || {
+            run(&mut firmware_cargo(&[
+                "clippy",
+                "--release",
+                "--all-targets",
+                "--package=firmware",
+                "--package=identified",
+                "--package=log-reader",
+                // As in tests; otherwise every dependency is checked once for them and once for the rest.
+                "--config=profile.release.panic=\"unwind\"",
+                "--",
+                "-Dwarnings",
+            ]))
+        },
+    },
+    Step {
+        name: "firmware tests",
+        after: &[],
+        room: Some(Room::Firmware),
+        run: || run(&mut firmware_cargo(&["test", "--release"])),
+    },
+    Step {
+        name: "board lints",
+        after: &[SET_UP],
+        room: Some(Room::Firmware),
+        run: board_lints,
+    },
+    // The loop and the model without board code, also for smaller and newer cores.
+    Step {
+        name: "no_std",
+        after: &[SET_UP],
+        room: Some(Room::Firmware),
+        run: || {
+            TARGETS
+                .iter()
+                .try_for_each(|target| crate::firmware::libraries(target))
+        },
+    },
+    // Link only without panics.
+    Step {
+        name: "boards",
+        after: &[SET_UP],
+        room: Some(Room::Firmware),
+        run: || {
+            for board in crate::firmware::BOARDS {
+                crate::firmware::firmware(&["--board".to_owned(), board.to_owned()])?;
+            }
+            crate::firmware::build("nucleo-f446re", "nucleo-pil", &[], None).map(|_| ())
+        },
+    },
+    Step {
+        name: "nucleo",
+        after: &[SET_UP],
+        room: Some(Room::Firmware),
+        run: crate::nucleo::nucleo,
+    },
+    // The exported models say what the host says.
+    Step {
+        name: "agreement",
+        after: &[SET_UP, BUILD],
+        room: None,
+        run: || (crate::agreement::TASK.run)(&["--all".to_owned()]),
+    },
+    Step {
+        name: "examples",
+        after: &[SET_UP, BUILD],
+        room: None,
+        run: || (crate::examples::TASK.run)(&[]),
+    },
+    Step {
+        name: "constants",
+        after: &[BUILD],
+        room: None,
+        run: || crate::identified::identified(&["--check".to_owned()]),
+    },
+    Step {
+        name: "faults",
+        after: &[SET_UP, BUILD],
+        room: Some(Room::Firmware),
+        run: || crate::faults::faults(&[]),
+    },
+    // Links only without panics; runs the constants; checks the budgets.
+    Step {
+        name: "pil",
+        after: &[SET_UP, BUILD],
+        room: Some(Room::Firmware),
+        run: crate::budgets::check,
+    },
+    // The same at other periods, and the emulated board at one of them.
+    Step {
+        name: "periods",
+        after: &[SET_UP, BUILD],
+        room: Some(Room::Firmware),
+        run: || crate::periods::periods(&[]),
+    },
+    // The whole circle, unattended.
+    Step {
+        name: "rig-day",
+        after: &[SET_UP, BUILD],
+        room: Some(Room::Firmware),
+        run: || crate::rig_day::rig_day(&["--brief".to_owned()]),
+    },
+    // The whole way: what the demo found is built for the board and runs there.
+    Step {
+        name: "demo on board",
+        after: &[SET_UP, BUILD],
+        room: Some(Room::Firmware),
+        run: demo_on_board,
+    },
+    Step {
+        name: "browser",
+        after: &[BUILD, "pages"],
+        room: None,
+        run: || crate::browser::browser(&[]),
+    },
+];
+
+fn board_lints() -> Result<()> {
+    let mut clippy = crate::setup::cross_cargo("clippy", TARGETS[0])?;
+    clippy
+        .args(["--package", "board", "--package", "qemu-mps2"])
+        .args(["--package", "nucleo-f446re"])
+        .args(["--features", "qemu-mps2/peer", "--", "-Dwarnings"])
+        .current_dir(crate::shell::root().join("firmware"))
+        .env("CARGO_TARGET_DIR", crate::shell::firmware_target());
+    run(&mut clippy)
+}
+
+fn demo_on_board() -> Result<()> {
+    let out = crate::shell::target().join("demo");
+    run(crate::shell::program()?.args(["demo", "--out"]).arg(&out))?;
+    let model = out.join("controlled.toml").to_string_lossy().into_owned();
+    let with = |option: &str, value: &str| ["--model", &model, option, value].map(str::to_owned);
+    crate::firmware::firmware(&with("--board", crate::firmware::BOARDS[0]))?;
+    crate::pil::pil(&with("--steps", "5000")).map(|_| ())
+}
+
+fn ci(arguments: &[String]) -> Result<()> {
+    let names: Vec<&str> = STEPS.iter().map(|step| step.name).collect();
+    let find = |name: &String| {
+        STEPS
+            .iter()
+            .find(|step| step.name == name)
+            .with_context(|| {
+                format!(
+                    "no step `{name}`; the steps are: {} (none named: all)",
+                    names.join(", ")
+                )
+            })
+    };
+    let mut chosen = arguments
+        .iter()
+        .map(find)
+        .collect::<Result<Vec<&'static Step>>>()?;
+    if let [only] = chosen[..] {
+        return lanes::alone(only);
+    }
+    if chosen.is_empty() {
+        chosen = STEPS.iter().collect();
+    }
+    let mut done = lanes::run(&chosen)?;
+    let place = |name: &str| names.iter().position(|other| *other == name);
+    done.sort_by_key(|done| place(done.name));
+    for line in done.iter().flat_map(|done| slowest::lines(&done.output)) {
+        println!("{line}");
+    }
+    println!("\nci: {} steps", done.len());
+    for done in &done {
+        println!("{}", done.line());
+    }
+    let failed = done.iter().filter(|done| done.failure.is_some()).count();
+    if failed > 0 {
+        bail!("{failed} of {} steps failed", done.len());
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Otherwise CI would wait for ever.
+    #[test]
+    fn steps_come_after_steps_above_them() {
+        for (at, step) in STEPS.iter().enumerate() {
+            for need in step.after {
+                let above = STEPS[..at].iter().any(|other| other.name == *need);
+                assert!(above, "{} after {need}", step.name);
+            }
+        }
+    }
+}

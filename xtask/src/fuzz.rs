@@ -1,0 +1,17 @@
+//! Mutated input for everything that reads what others wrote.
+
+use anyhow::Result;
+
+use crate::Task;
+use crate::shell::{run, scenario};
+
+pub(crate) const TASK: Task = Task {
+    name: "fuzz",
+    does: "mutated files, frames and texts on every reader: `--minutes N`, shared by the targets; their names run only those",
+    run: |arguments| run(scenario("fuzz").args(arguments)),
+};
+
+/// A while for each target: what breaks at once is seen.
+pub(crate) fn brief() -> Result<()> {
+    run(scenario("fuzz").args(["--minutes", "3"]))
+}

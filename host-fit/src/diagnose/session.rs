@@ -127,6 +127,7 @@ impl Session<'_> {
         let claims = verdict == Verdict::EffectMissing;
         let way = self.way(&last, effects, &found.root, claims);
         let order = way.order;
+        let refitted = first[1].step.clone();
         let mut ladder = first.to_vec();
         if !context.terms.is_empty() {
             let step = format!("with {}", context.words());
@@ -143,6 +144,15 @@ impl Session<'_> {
             .collect();
         let end = judge.final_fit(&last.judged);
         let model = units.model_out(&end.model);
+        // It ends with the model that is handed over.
+        if order.is_empty() && ladder.last().and_then(|rung| rung.model.as_ref()) != Some(&model) {
+            let step = match last.terms.is_empty() {
+                true => refitted,
+                false => format!("with {}", last.words()),
+            };
+            ladder.pop_if(|rung| rung.step == step);
+            ladder.push(self.rung(&last.judged, &[], &step));
+        }
         let alike = found.as_good_as(&last);
         let parameters: BTreeMap<_, _> = order
             .iter()

@@ -6,7 +6,9 @@ use super::verdict::times;
 use super::{Answer, Onlooker, StepError, Tone, check_period, trained_in_free_run};
 use crate::data::{DataSet, Record};
 use crate::diagnose::Rung;
-use crate::discover::{Discovery, FoundTerm, Options, Smallest, Trace, discover as search};
+use crate::discover::{
+    Discovery, FoundTerm, Options, RULES as DISCOVER, Smallest, Trace, discover as search,
+};
 use crate::experiment::Separation;
 use crate::indicators::{Scores, score};
 use crate::model::{Model, Training};
@@ -229,7 +231,7 @@ fn answer(discovery: &Discovery) -> Answer {
             format!("= {}", significant(term.p_value, 1))
         };
         let stable = term.stability_percent;
-        let stable = match stable >= 90.0 {
+        let stable = match stable >= 100.0 * DISCOVER.stable {
             true => {
                 format!("stable: the same term wins in {stable:.0} % of the bootstrap resamples")
             }

@@ -169,14 +169,14 @@ fn a_term_that_no_catalogue_has_is_found_and_taken_as_a_formula() {
 fn the_experiment_that_tells_is_drawn_and_saved() {
     let folder = tempfile::tempdir().expect("a folder");
     let data = folder.path().join("slow-valve");
-    // A valve that opens gradually, a sensor and a flow that lag: slow squares show the same of all three.
+    // A valve that opens gradually and closes more slowly, a sensor and a flow that lag: slow squares show the same of all three.
     let records: &[Asked] = &[
         ("a", "identify", |_| 250),
         ("b", "identify", |_| 150),
         ("c", "validate", |_| 250),
     ];
     set(&data, 3000, records, |open, u, _| {
-        *open += 0.1 * (u - *open);
+        *open += if u > *open { 0.1 } else { 0.03 } * (u - *open);
         *open
     });
     let mut steps = Steps::new("what the records cannot tell");

@@ -6,6 +6,8 @@ rules! {
     /// Which commands are tried to tell models apart.
     pub struct Rules in "experiment";
 
+    /// A command distinguishes two models whose free runs differ by this under it.
+    distinguishes: f64 = 3.0, "standard deviations of the noise", "convention";
     /// Rest at the end of a run, so that runs can follow one another.
     rest: f64 = 0.15, "share of the run", "judgement";
     /// Periods of square waves that are tried …

@@ -1,6 +1,6 @@
 //! Models that the records cannot tell apart, and the command that would.
 
-use super::{Experiment, Limits, separating};
+use super::{Experiment, Limits, RULES, separating};
 use crate::model::Model;
 use serde::{Serialize, Serializer};
 
@@ -27,7 +27,8 @@ impl Separation {
     ) -> Option<Self> {
         let noise = noise_rmse.max(f64::MIN_POSITIVE);
         let experiment = separating(&models, noise, &Limits::default(), seed).ok()?;
-        Some(Self {
+        let distinguishes = experiment.separation_sigmas >= RULES.distinguishes;
+        distinguishes.then_some(Self {
             effects,
             models,
             experiment,

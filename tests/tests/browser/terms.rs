@@ -168,16 +168,17 @@ fn a_term_that_no_catalogue_has_is_found_and_taken_as_a_formula() {
 #[ignore = "needs chromium: cargo xtask browser"]
 fn the_experiment_that_tells_is_drawn_and_saved() {
     let folder = tempfile::tempdir().expect("a folder");
-    let data = folder.path().join("slow-valve");
-    // A valve that opens gradually and closes more slowly, a sensor and a flow that lag: slow squares show the same of all three.
+    let data = folder.path().join("saturation");
+    // A pull that grows with the cube of y, or with how long it lasted: slow squares show the same of both.
     let records: &[Asked] = &[
         ("a", "identify", |_| 250),
         ("b", "identify", |_| 150),
         ("c", "validate", |_| 250),
     ];
-    set(&data, 3000, records, |open, u, _| {
-        *open += if u > *open { 0.1 } else { 0.03 } * (u - *open);
-        *open
+    set(&data, 3000, records, |y, u, _| {
+        let pull = 0.02 / 0.03 * y.powi(3);
+        *y += 0.03 * (u - pull - *y);
+        u - pull
     });
     let mut steps = Steps::new("what the records cannot tell");
     let project = folder.path().join("project");

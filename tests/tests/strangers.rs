@@ -1,7 +1,6 @@
-//! Records as strangers bring them: what is identified, printed and measured is right. `cargo xtask strangers` also
-//! diagnoses them, which takes minutes.
+//! Records as strangers bring them: what is identified, measured, named and printed is right.
 
-use scenarios::strangers::{Options, Step, run, table};
+use scenarios::strangers::{Options, run, table};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -10,7 +9,7 @@ fn options(folders: Vec<PathBuf>, only: &[&str]) -> Options {
         folders,
         only: only.iter().map(|word| (*word).to_owned()).collect(),
         all_commands: false,
-        without: vec![Step::Diagnose, Step::Discover],
+        without: Vec::new(),
         limit: Duration::from_secs(120),
         jobs: 2,
     }

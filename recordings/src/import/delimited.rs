@@ -97,10 +97,9 @@ fn merge<'a>(line: &'a str, cells: &mut Vec<&'a str>) {
     let mut kept = 0;
     for at in 1..cells.len() {
         let (before, cell) = (cells[kept], cells[at]);
-        let is_half = ["AM", "PM"].iter().any(|h| cell.eq_ignore_ascii_case(h));
         let belongs = match before.contains([':', '-', '/', '.']) {
             true if cell.contains(':') => Stamp::is_date(before) && Stamp::is_clock(cell),
-            true if is_half => Stamp::of(before).is_some(),
+            true if Stamp::is_half_of_day(cell) => Stamp::of(before).is_some(),
             _ => false,
         };
         let is_number =

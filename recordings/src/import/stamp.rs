@@ -107,6 +107,14 @@ impl Stamp {
         Self::of(cell).is_some_and(|stamp| stamp.kind() == Kind::Date)
     }
 
+    /// Whether a cell holds AM or PM alone.
+    pub(super) fn is_half_of_day(cell: &str) -> bool {
+        let words = HALVES.iter().flat_map(|(words, _)| words);
+        words
+            .into_iter()
+            .any(|word| cell.eq_ignore_ascii_case(word))
+    }
+
     /// Whether a cell holds a time of day and no date.
     pub(super) fn is_clock(cell: &str) -> bool {
         Self::of(cell).is_some_and(|stamp| stamp.kind() == Kind::Clock)
@@ -216,13 +224,23 @@ fn days_from_civil(year: i32, month: u32, day: u32) -> Option<i64> {
     Some(era * 146_097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719_468)
 }
 
+/// What stands behind the times of each half of a day, and its hours.
+const HALVES: [([&str; 2], u8); 2] = [(["AM", "a.m."], 0), (["PM", "p.m."], 12)];
+
 /// Seconds since midnight of `23:55:01.250`, `11:55 PM`, `23:55:01+02:00`, and one unit in their last printed place.
 fn clock(text: &str) -> Option<(f64, f64)> {
     let (text, offset) = without_offset(text.trim());
-    let (text, half) = match text.get(text.len().saturating_sub(2)..)? {
-        "AM" | "am" | "Am" => (text.get(..text.len() - 2)?.trim_end(), Some(0)),
-        "PM" | "pm" | "Pm" => (text.get(..text.len() - 2)?.trim_end(), Some(12)),
-        _ => (text, None),
+    let half = HALVES.iter().find_map(|(words, hours)| {
+        let ends = |word: &&&str| {
+            let from = text.len().checked_sub(word.len());
+            let end = from.and_then(|from| text.get(from..));
+            end.is_some_and(|end| end.eq_ignore_ascii_case(word))
+        };
+        Some((words.iter().find(ends)?.len(), *hours))
+    });
+    let (text, half) = match half {
+        Some((length, hours)) => (text.get(..text.len() - length)?.trim_end(), Some(hours)),
+        None => (text, None),
     };
     let mut parts: Vec<&str> = text.split(':').collect();
     // Some write the milliseconds after another colon.
@@ -391,6 +409,7 @@ mod tests {
             ["Tue, 17 Sep 2024 23:59:59", "Wed, 18 Sep 2024 00:00:01"],
             ["23:59:59", "00:00:01"],
             ["11:59:59 PM", "12:00:01 AM"],
+            ["11:59:59 a.m.", "12:00:01 p.m."],
             ["23:59:59,000", "00:00:01,000"],
             ["23:59:59:000", "00:00:01:000"],
             ["0 days 23:59:59", "1 days 00:00:01"],

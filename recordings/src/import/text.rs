@@ -8,6 +8,7 @@ use super::delimited::{Rows, Separator, is_comment};
 use super::labelled::{Labels, arrows, leading};
 use super::problem::ImportProblem;
 use super::source::{Budget, Source, fault};
+use super::stamp::Stamp;
 use crate::error::{DataError, DataProblem, FilePlace, printable};
 
 /// Most cells of a row: as many columns as a spreadsheet has.
@@ -144,13 +145,21 @@ pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, Dat
         cells.iter().for_each(|cell| marks.see(cell));
     }
     let decimals = marks.decimals(layout.is_parted_by_commas());
+    let halves = halves(&layout, &lines, &rows);
+    let joined = |cells: &[&str], index: usize| -> Option<String> {
+        let half = halves.filter(|half| index + 1 == *half)?;
+        Some(format!("{} {}", cells.get(index)?, cells.get(half)?))
+    };
     let mut columns = vec![Column::default(); names.len()];
     let mut monitor = Column::default();
     for &at in &rows {
         let line = at as u64 + 1;
         layout.split(lines.get(at).copied().unwrap_or_default(), &mut cells);
-        for (cell, column) in cells.iter().zip(&mut columns) {
-            column.push(cell, line, decimals);
+        for (index, (cell, column)) in cells.iter().zip(&mut columns).enumerate() {
+            match joined(&cells, index) {
+                Some(clock) => column.push(&clock, line, decimals),
+                None => column.push(cell, line, decimals),
+            }
         }
         if let Some(stamp) = stamps.as_ref().and_then(|stamps| stamps.get(at)) {
             monitor.push(stamp, line, decimals);
@@ -171,6 +180,9 @@ pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, Dat
         described.push(((MONITOR.to_owned(), None), monitor));
     }
     for (index, ((name, unit), column)) in described.into_iter().enumerate() {
+        if halves == Some(index) {
+            continue;
+        }
         if column.is_empty() {
             if !name.starts_with("column ") {
                 source
@@ -185,7 +197,7 @@ pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, Dat
             layout.split(lines.get(at).copied().unwrap_or_default(), &mut cells);
             let stamp = || stamps.as_ref().and_then(|stamps| stamps.get(at));
             let cell = cells.get(index).or_else(stamp);
-            cell.copied().unwrap_or_default().to_owned()
+            joined(&cells, index).unwrap_or_else(|| cell.copied().unwrap_or_default().to_owned())
         };
         match column.variable(name, unit, &source.lines, text) {
             Ok(variable) => source.variables.push(variable),
@@ -194,6 +206,24 @@ pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, Dat
     }
     source.dialect = format!("{}, decimal {}", layout.words(), decimals.words(marks));
     Ok(source)
+}
+
+/// The column that says AM or PM of the clock time in the column before it.
+fn halves(layout: &Layout, lines: &[&str], rows: &[usize]) -> Option<usize> {
+    let mut cells = Vec::new();
+    let mut is_half = |at: usize, column: usize| {
+        layout.split(lines.get(at).copied().unwrap_or_default(), &mut cells);
+        let clock = |text: &&str| text.contains(':');
+        cells
+            .get(column)
+            .copied()
+            .is_some_and(Stamp::is_half_of_day)
+            && cells.get(column - 1).is_some_and(clock)
+    };
+    let first = *rows.first()?;
+    let column = (1..layout.width()).find(|column| is_half(first, *column))?;
+    let all = rows.iter().all(|at| is_half(*at, column));
+    all.then_some(column)
 }
 
 /// Indices of the lines that are rows; what is passed over is remarked.
@@ -339,6 +369,16 @@ mod tests {
         assert_eq!(sparse.variables[1].blanks, [1, 2]);
         let plain = read("0,5 100,2\n1,5 100,3\n");
         expect(&plain, &["column 1", "column 2"], &[1.5, 100.3]);
+    }
+
+    #[test]
+    fn the_half_of_the_day_may_stand_in_a_column_of_its_own() {
+        let noon = read("time,,u\n12:59:59,PM,0\n01:00:01,pm,1\n");
+        expect(&noon, &["time", "u"], &[2.0, 1.0]);
+        assert!(noon.unread.is_empty() && noon.skipped.is_empty());
+        let other = read("time,state,u\n12:59:59,PM,0\n13:00:01,idle,1\n");
+        expect(&other, &["time", "u"], &[2.0, 1.0]);
+        assert_eq!(other.unread[0].name, "state");
     }
 
     #[test]

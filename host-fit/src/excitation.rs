@@ -115,6 +115,8 @@ pub struct Excitation {
     pub records: Vec<RecordExcitation>,
     /// Whether the command is 0 or 1 throughout; if not, edges are changes from and to 0.
     pub on_off: bool,
+    /// How often the command changes from one sample to the next, in all identify records.
+    pub changes: usize,
     /// Different times on, of all identify records, to the sample.
     pub distinct_on_times: usize,
     /// Different times off.
@@ -155,6 +157,10 @@ impl Excitation {
         let (lags_tried, lags_separated, condition) = separated_lags(&records, max_lag);
         let mut found = Self {
             on_off: records.iter().all(|r| r.is_on_off()),
+            changes: records
+                .iter()
+                .map(|r| r.u.windows(2).filter(|pair| pair[0] != pair[1]).count())
+                .sum(),
             records: described,
             distinct_on_times: distinct(on),
             distinct_off_times: distinct(off),
@@ -176,9 +182,14 @@ impl Excitation {
             .iter()
             .map(|r| r.rising_edges + r.falling_edges)
             .sum();
-        if edges < RULES.fewest_edges {
+        if self.changes < RULES.fewest_edges {
+            let (changes, does) = (
+                self.changes,
+                if self.on_off { "switches" } else { "changes" },
+            );
+            let times = if changes == 1 { "time" } else { "times" };
             remarks.push(format!(
-                "The command switches only {edges} time(s): a delay and time constants are identifiable, but not how they depend on y."
+                "The command {does} only {changes} {times}: a delay and time constants are identifiable, but not how they depend on y."
             ));
         }
         if let Some((first, last)) = self.alike.first() {

@@ -87,8 +87,11 @@ impl Beginning {
             )
         };
         let answering = |y: &[f64]| {
-            let arrivals = [0.5, 0.7, 0.85, 1.0, 1.15, 1.3, 1.6].map(|factor| factor * dead_time);
-            let arrivals = arrivals.into_iter().filter(|at| at + 3.0 < y.len() as f64);
+            let shares = [0.15, 0.3, 0.5, 0.7, 0.85, 1.0, 1.15, 1.3, 1.6];
+            let arrivals = shares
+                .map(|share| share * dead_time)
+                .into_iter()
+                .filter(|at| at + 3.0 < y.len() as f64);
             let each = arrivals.flat_map(|at| {
                 let answer = move |k: usize, time: f64| {
                     let since = (k as f64 - at).max(0.0);
@@ -130,6 +133,8 @@ impl Beginning {
             && !known_edge
             && record.u_before.is_none()
             && answer.left < RULES.answer * relaxes_early.left
+            // An answer that comes sooner is that of an edge before the record.
+            && *at >= RULES.surely_before * dead_time
         {
             let rest = (RULES.surely_before * at).floor() as usize;
             return at_rest(other, rest.max(1));

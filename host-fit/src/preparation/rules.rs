@@ -15,7 +15,7 @@ rules! {
     /// Less than this explained by it, and y is taken not to follow u.
     related: f64 = 0.2, "share of the variance", "judgement";
 
-    /// A record rests until its first edge and this much of the dead time longer.
+    /// A record rests until its first edge and this much of the dead time longer; what answers sooner answers an edge before it.
     surely_before: f64 = 0.6, "dead times", "delays that follow the state differ by less on the bundled flows";
     /// So many time constants are enough to tell rest from motion.
     times_of_rest: f64 = 3.0, "time constants", "5 % are left of a motion";

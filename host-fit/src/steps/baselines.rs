@@ -56,7 +56,7 @@ impl Beside {
         (behind.is_nan() || behind > BEHIND_POINTS).then(|| {
             format!(
                 "A {name} reaches {best:.1} % FIT on the same samples, more than this model ({fit_percent:.1} %): the \
-                 structure over-fits these records. Record more, or use `--n1 1 --n2 0`."
+                 structure over-fits these records. Record for longer, with a more varied command."
             )
         })
     }

@@ -295,16 +295,21 @@ fn located(set: &DataSet, error: IdentifyError) -> StepError {
 }
 
 /// What to do about a model that holds on its own records only.
-fn overfitted(scores: &Scores) -> Option<String> {
+fn overfitted(scores: &Scores, model: &Model) -> Option<String> {
     let (own, held_out) = (
         finite_fit(scores.identify.as_ref())?,
         finite_fit(scores.validate.as_ref())?,
     );
+    // No advice that is followed already.
+    let fewer = match (model.state_lags.len(), model.product_lags.len()) {
+        (0..=1, 0..=1) => "",
+        (0..=2, 0..=2) => "fewer lags (`--n1 1 --n2 1`), ",
+        _ => "fewer lags (`--n1 2 --n2 2`), ",
+    };
     (held_out < own - RULES.overfitted_points).then(|| {
         format!(
             "The model over-fits: FIT {own:.0} % on the estimation records, {held_out:.0} % on the validation records. Use \
-             fewer lags (`--n1 2 --n2 2`), more varied records, or `host-fit diagnose`, which adds physical effects to \
-             the fewest lags."
+             {fewer}more varied records, or `host-fit diagnose`, which adds physical effects to the fewest lags."
         )
     })
 }
@@ -458,7 +463,7 @@ fn with_effects(
     if let Some(diverged) = diverged.into_iter().next() {
         return Err(StepError::Unstable(diverged));
     }
-    remarks.extend(overfitted(&scores));
+    remarks.extend(overfitted(&scores, &model));
     let beside = Beside::of(records);
     let fit = scores.held_out().map_or(f64::NAN, |all| all.fit_percent);
     remarks.extend(beside.better_than(fit));

@@ -114,6 +114,7 @@ fn a_valve_of_second_order_is_a_valve_and_no_echo() {
 
 /// In the first round the edges' delay comes with a valve's lag at the end of its range, which hides it.
 #[test]
+#[ignore = "two minutes of processor time: cargo xtask kept-rigs"]
 fn what_was_added_with_a_stand_in_stays_without_it() {
     let row = asked(&Case {
         nuisances: vec![Nuisance::Offset],
@@ -185,6 +186,7 @@ fn an_effect_of_the_flow_is_found_with_its_parameters() {
 /// Hysteresis alone bends to imitate the friction as well, and friction added to it
 /// so bent finds nothing left: they are found the other way round.
 #[test]
+#[ignore = "90 s of processor time: cargo xtask kept-rigs"]
 fn two_effects_of_which_one_imitates_both_are_found() {
     let names = ["dry-friction", "bouc-wen-hysteresis"];
     let row = diagnosed(Group::Pair, Family::FirstOrder, &names, 712);

@@ -102,7 +102,8 @@ fn study(records: Vec<Record>) -> DelayStudy {
 
 #[test]
 fn dead_times_of_known_plants_are_right_and_within_their_intervals() {
-    let (mut held, mut off, mut edges, mut edges_off, mut unmeasured) = (0, 0, 0, 0, 0);
+    let (mut held, mut edges, mut edges_off, mut unmeasured) = (0, 0, 0, 0);
+    let mut off = Vec::new();
     let cases = 60;
     for seed in 0..cases {
         let case = case(1000 + seed, if seed % 2 == 0 { 0.01 } else { 8.0 });
@@ -111,7 +112,9 @@ fn dead_times_of_known_plants_are_right_and_within_their_intervals() {
         let found = study.dead_time.unwrap();
         assert!(found.standard_error > 0.0 && found.high > found.low);
         held += usize::from(found.low <= case.delay && case.delay <= found.high);
-        off += usize::from((found.samples - case.delay).abs() > tolerance);
+        if (found.samples - case.delay).abs() > tolerance {
+            off.push((seed, found.samples, case.delay));
+        }
         edges += case.edges;
         for edge in &study.edges {
             match edge.onset {
@@ -122,7 +125,7 @@ fn dead_times_of_known_plants_are_right_and_within_their_intervals() {
         assert!(study.law.is_none(), "seed {seed}: {:?}", study.law);
     }
     assert!(held * 10 >= 9 * cases as usize, "{held} of {cases}");
-    assert!(off <= 1, "{off} of {cases}");
+    assert!(off.len() <= 1, "{off:?} of {cases}");
     assert!(edges_off * 50 <= edges, "{edges_off} of {edges}");
     assert!(unmeasured * 20 <= edges, "{unmeasured} of {edges}");
 }

@@ -8,6 +8,7 @@
 
 use super::plant::{Plant, Switching};
 use super::spread::mean;
+use crate::data::Record;
 use crate::linalg::{dot, solve_symmetric};
 
 /// Samples that the grid search is allowed; longer records are decimated.
@@ -28,20 +29,32 @@ const STEPS: usize = 40;
 /// One record, ready for fits.
 #[derive(Debug, Clone)]
 pub(crate) struct Series {
-    /// y less its mean.
+    /// y less its mean; 0 before `from`.
     pub(crate) y: Vec<f64>,
     /// The changes of u.
     pub(crate) switching: Switching,
+    /// The first sample that counts: earlier ones answer commands that the record does not show.
+    pub(crate) from: usize,
 }
 
 impl Series {
-    /// A record whose command was `before` before its first sample and is on above `middle`.
-    pub(crate) fn new(y: &[f64], u: &[f64], before: f64, middle: f64) -> Self {
-        let level = mean(y);
+    /// A prepared record whose command is on above `middle`.
+    pub(crate) fn new(record: &Record, middle: f64) -> Self {
+        let first = record.u.first().copied().unwrap_or(0.0);
+        let before = record.u_before.unwrap_or(first);
+        let from = record.follow.min(record.len());
+        let level = mean(&record.y[from..]);
+        let counted = record.y[from..].iter().map(|y| y - level);
         Self {
-            y: y.iter().map(|y| y - level).collect(),
-            switching: Switching::of(u, before, middle),
+            y: std::iter::repeat_n(0.0, from).chain(counted).collect(),
+            switching: Switching::of(&record.u, before, middle),
+            from,
         }
+    }
+
+    /// Sets what does not count to 0.
+    fn counted(&self, values: &mut [f64]) {
+        values.iter_mut().take(self.from).for_each(|v| *v = 0.0);
     }
 
     /// Means of `factor` samples each in place of samples; each stands for the middle of its block.
@@ -57,6 +70,7 @@ impl Series {
         Self {
             y: self.y.chunks_exact(factor).map(mean).collect(),
             switching,
+            from: self.from.div_ceil(factor),
         }
     }
 
@@ -70,7 +84,27 @@ impl Series {
         Self {
             y: self.y.iter().step_by(factor).copied().collect(),
             switching,
+            from: self.from.div_ceil(factor),
         }
+    }
+
+    /// The response of a plant from rest with gain 1, where it counts, into `out`.
+    fn respond(&self, plant: &Plant, out: &mut [f64]) {
+        plant.respond(&self.switching, out);
+        self.counted(out);
+    }
+
+    /// What a plant with a gain leaves of y; level and initial state are the record's own.
+    pub(crate) fn residual(&self, plant: &Plant, gain: f64) -> Vec<f64> {
+        let mut residual = self.y.clone();
+        let mut response = vec![0.0; residual.len()];
+        self.respond(plant, &mut response);
+        residual
+            .iter_mut()
+            .zip(&response)
+            .for_each(|(y, r)| *y -= gain * r);
+        self.without_nuisance(plant, &mut residual);
+        residual
     }
 
     /// An orthonormal basis of what y does without the command: a level and the free courses.
@@ -78,6 +112,7 @@ impl Series {
         let n = self.y.len();
         let mut basis: Vec<Vec<f64>> = Vec::with_capacity(3);
         for mut column in std::iter::once(vec![1.0; n]).chain(plant.free(&self.switching, n)) {
+            self.counted(&mut column);
             let before = dot(&column, &column);
             // Twice: once leaves rounding errors.
             for _ in 0..2 {
@@ -159,7 +194,7 @@ fn gain_and_rss(
     for (((s, basis), y), response) in series.iter().zip(&parts.bases).zip(&parts.y).zip(responses)
     {
         response.resize(s.y.len(), 0.0);
-        plant.respond(&s.switching, response);
+        s.respond(plant, response);
         remove(basis, response);
         with_y += dot(response, y);
         square += dot(response, response);

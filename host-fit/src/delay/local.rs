@@ -82,12 +82,15 @@ fn shifted(
         .and_then(|i| changes.get(i))
         .map_or(0.0, arrival);
     let next = changes.get(index + 1).map_or(end, arrival);
-    let from = (middle - sum.max(least)).max(before).max(0.0).floor();
+    let from = (middle - sum.max(least))
+        .max(before)
+        .max(series.from as f64);
+    let from = from.floor();
     let to = (middle + (1.5 * sum).max(2.0 * least))
         .min(next.max(middle + least))
         .min(end)
         .floor();
-    if to < middle + least || to < from + 4.0 {
+    if middle < from || to < middle + least || to < from + 4.0 {
         return Err(Unmeasured::CutOff);
     }
     let window = residual
@@ -198,7 +201,7 @@ impl<'a> Window<'a> {
         let next = arrivals.get(index + 1).copied().unwrap_or(end);
         let from = (middle - (1.5 * sum).max(8.0))
             .max(before.map_or(0.0, |b| b + 0.5))
-            .max(0.0)
+            .max(series.from as f64)
             .ceil();
         let to = (middle + (2.0 * sum).max(8.0))
             .min(next + 0.5)
@@ -234,6 +237,7 @@ impl<'a> Window<'a> {
                 }],
                 on: !self.change.on,
             },
+            from: 0,
         };
         let here = Plant {
             delay: [0.0; 2],

@@ -15,8 +15,6 @@ const FIT_SAMPLES: usize = 12_000;
 pub(crate) struct Pooled {
     /// Smallest and largest command.
     pub(crate) range: (f64, f64),
-    /// Whether records start from rest with u = 0 where nothing in them says otherwise.
-    from_rest: bool,
     /// The plant.
     pub(crate) plant: Plant,
     /// K, units of y per unit of u.
@@ -63,84 +61,6 @@ pub(crate) fn spacing(records: &[&Record]) -> usize {
     *times.select_nth_unstable(middle).1
 }
 
-/// The value that u starts with.
-fn first_command(record: &Record) -> f64 {
-    record.u.first().copied().unwrap_or(0.0)
-}
-
-/// The best plant under each of two assumptions about u before the records: its first value, and 0. Says whether 0 is
-/// the better one.
-fn start_from_rest(
-    records: &[&Record],
-    middle: f64,
-    max_delay: f64,
-    spacing: usize,
-) -> Option<Start> {
-    let samples: usize = records.iter().map(|r| r.y.len()).sum();
-    let factor = samples.div_ceil(FIT_SAMPLES / 2).min((spacing / 8).max(1));
-    let best = |from_rest: bool| -> Option<(f64, Start)> {
-        let thin: Vec<Series> = records
-            .iter()
-            .map(|r| {
-                let before = if from_rest { 0.0 } else { first_command(r) };
-                Series::new(&r.y, &r.u, before, middle).thinned(factor)
-            })
-            .collect();
-        let limit = max_delay / factor as f64;
-        let starts = coarse(&thin, limit, (spacing / factor).max(1));
-        fit(&thin, &starts, limit)
-            .into_iter()
-            .map(|r| r.at)
-            .min_by(|a, b| a.rss.total_cmp(&b.rss))
-            .map(|at| {
-                let start = Start {
-                    from_rest,
-                    plant: at.plant.slower(factor as f64),
-                    gain: at.gain,
-                    noise: widened_variance(&at) * factor as f64,
-                };
-                (at.rss, start)
-            })
-    };
-    match (best(false), best(true)) {
-        // A start from rest must be seen; otherwise u was before the record what it is at its start.
-        (Some(held), Some(rest)) => {
-            let seen = held.0 - rest.0 > RULES.detection * rest.1.noise / factor as f64;
-            Some(if seen { rest.1 } else { held.1 })
-        }
-        (held, rest) => held.or(rest).map(|(_, start)| start),
-    }
-}
-
-/// How records start, from one assumption for all of them.
-#[derive(Debug, Clone, Copy)]
-struct Start {
-    from_rest: bool,
-    plant: Plant,
-    gain: f64,
-    noise: f64,
-}
-
-/// What u was before one record: its first value, unless y answers a step from 0 at the first sample.
-fn command_before(record: &Record, middle: f64, start: &Start) -> f64 {
-    let held = first_command(record);
-    if held == 0.0 {
-        return held;
-    }
-    let left = |before: f64| -> f64 {
-        let series = Series::new(&record.y, &record.u, before, middle);
-        let residual = series.residual(&start.plant, start.gain);
-        dot(&residual, &residual)
-    };
-    let gained = (left(held) - left(0.0)) / start.noise.max(f64::MIN_POSITIVE);
-    // The step must have been answered; a record that does not say is like the others.
-    if gained > RULES.detection || (start.from_rest && gained > -RULES.detection) {
-        0.0
-    } else {
-        held
-    }
-}
-
 /// Variance of white noise in some records, from the median of the squared second differences of y: few of them are in
 /// the bend of a response.
 fn white_noise(records: &[&Record]) -> f64 {
@@ -165,19 +85,9 @@ impl Pooled {
         let middle = f64::midpoint(range.0, range.1);
         let spacing = spacing(records);
         let max_delay = max_delay.unwrap_or_else(|| longest_delay(records)) as f64;
-        let starts_on = records.iter().any(|r| first_command(r) != 0.0);
-        let start = if starts_on {
-            Some(start_from_rest(records, middle, max_delay, spacing)?)
-        } else {
-            None
-        };
-        let before = |record: &Record| {
-            let start = start.as_ref();
-            start.map_or(0.0, |start| command_before(record, middle, start))
-        };
         let all: Vec<Series> = records
             .iter()
-            .map(|r| Series::new(&r.y, &r.u, before(r), middle))
+            .map(|r| Series::new(r, middle))
             .filter(|s| !s.switching.changes.is_empty())
             .collect();
         let starts = coarse(&all, max_delay, spacing);
@@ -203,7 +113,6 @@ impl Pooled {
         let left = at.rss / samples.max(1) as f64;
         Some(Self {
             range,
-            from_rest: start.is_some_and(|s| s.from_rest),
             plant: at.plant,
             gain: at.gain,
             dead_time: estimate.scaled(scale),
@@ -223,14 +132,7 @@ impl Pooled {
 
     /// A record with the command before it.
     pub(crate) fn series(&self, record: &Record) -> Series {
-        let start = Start {
-            from_rest: self.from_rest,
-            plant: self.plant,
-            gain: self.gain,
-            noise: self.noise,
-        };
-        let before = command_before(record, self.middle(), &start);
-        Series::new(&record.y, &record.u, before, self.middle())
+        Series::new(record, self.middle())
     }
 }
 
@@ -290,19 +192,4 @@ fn with_directions(series: &[Series], fits: Vec<Refined>, max_delay: f64) -> (Ve
         }
     }
     (known, free)
-}
-
-impl Series {
-    /// What a plant with a gain leaves of y; level and initial state are the record's own.
-    pub(crate) fn residual(&self, plant: &Plant, gain: f64) -> Vec<f64> {
-        let mut residual = self.y.clone();
-        let mut response = vec![0.0; residual.len()];
-        plant.respond(&self.switching, &mut response);
-        residual
-            .iter_mut()
-            .zip(&response)
-            .for_each(|(y, r)| *y -= gain * r);
-        self.without_nuisance(plant, &mut residual);
-        residual
-    }
 }

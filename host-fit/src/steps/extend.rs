@@ -10,7 +10,7 @@ use super::{Answer, Onlooker, StepError, check_period, level, trained_in_free_ru
 use crate::data::{DataSet, Use};
 use crate::diagnose::ParameterEstimate;
 use crate::extend::{Extended, StructureKept, extend as refit};
-use crate::indicators::{Indicators, Scores, score};
+use crate::indicators::{Indicators, Scores, score, score_new};
 use crate::model::Model;
 use crate::picture::significant;
 
@@ -81,7 +81,10 @@ fn refuse_worse(
     Err(StepError::NoGain {
         effects: effects.join(" and "),
         before: significant(before.rmse, 5),
-        after: significant(after.rmse, 5),
+        after: match after.rmse.is_finite() {
+            true => significant(after.rmse, 5),
+            false => "it diverges".to_owned(),
+        },
         on: match after.role {
             Use::Validate => "validation",
             Use::Identify => "estimation",
@@ -124,7 +127,12 @@ pub fn extend(
     } = watched(onlooker, "refitting everything", || {
         refit(model, &records, effects, onlooker.interrupt())
     })?;
-    let (scores_after, _) = score(&extended, &records)?;
+    let (scores_after, diverged) = score_new(&extended, &records)?;
+    if scores_before.is_none()
+        && let Some(diverged) = diverged.into_iter().next()
+    {
+        return Err(diverged.into());
+    }
     refuse_worse(effects, scores_before.as_ref(), &scores_after)?;
     extended.training = trained_in_free_run(set, &scores_after, model.training.seed);
     let several = parameters.len() > 1;

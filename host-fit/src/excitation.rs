@@ -136,6 +136,34 @@ pub struct Excitation {
     pub remarks: Vec<String>,
 }
 
+/// How often the command of `records` changes from one sample to the next.
+fn changes(records: &[&Record]) -> usize {
+    let each = records.iter().map(|r| {
+        let pairs = r.u.windows(2);
+        pairs.filter(|pair| pair[0] != pair[1]).count()
+    });
+    each.sum()
+}
+
+/// What is said of a command that changes so seldom.
+fn too_few(changes: usize, on_off: bool) -> Option<String> {
+    let does = if on_off { "switches" } else { "changes" };
+    let times = if changes == 1 { "time" } else { "times" };
+    (changes < RULES.fewest_edges).then(|| {
+        format!(
+            "The command {does} only {changes} {times}: a delay and time constants are identifiable, but not how they depend on y."
+        )
+    })
+}
+
+/// A remark on records whose command changes too seldom to tell how the response depends on anything; none if it does not.
+#[must_use]
+pub fn says_little(records: &[Record]) -> Option<String> {
+    let learning: Vec<&Record> = records.iter().filter(|r| r.role == Use::Identify).collect();
+    let on_off = learning.iter().all(|r| r.is_on_off());
+    too_few(changes(&learning), on_off)
+}
+
 impl Excitation {
     /// Judges the identify records of a data set for a model that reaches `max_lag` samples back.
     #[must_use]
@@ -157,10 +185,7 @@ impl Excitation {
         let (lags_tried, lags_separated, condition) = separated_lags(&records, max_lag);
         let mut found = Self {
             on_off: records.iter().all(|r| r.is_on_off()),
-            changes: records
-                .iter()
-                .map(|r| r.u.windows(2).filter(|pair| pair[0] != pair[1]).count())
-                .sum(),
+            changes: changes(&records),
             records: described,
             distinct_on_times: distinct(on),
             distinct_off_times: distinct(off),
@@ -182,16 +207,7 @@ impl Excitation {
             .iter()
             .map(|r| r.rising_edges + r.falling_edges)
             .sum();
-        if self.changes < RULES.fewest_edges {
-            let (changes, does) = (
-                self.changes,
-                if self.on_off { "switches" } else { "changes" },
-            );
-            let times = if changes == 1 { "time" } else { "times" };
-            remarks.push(format!(
-                "The command {does} only {changes} {times}: a delay and time constants are identifiable, but not how they depend on y."
-            ));
-        }
+        remarks.extend(too_few(self.changes, self.on_off));
         if let Some((first, last)) = self.alike.first() {
             remarks.push(format!(
                 "Input delays that differ by {first} to {last} samples ({:.3} to {:.3} s) predict nearly the same, because the command repeats: their weights are not identifiable. Add a record with random on and off times.",

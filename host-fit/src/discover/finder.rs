@@ -10,10 +10,8 @@ use super::{Options, RULES};
 use crate::diagnose::RULES as DIAGNOSE;
 use crate::experiment::Separation;
 use crate::model::Model;
-use crate::residual::NoiseSource;
 use crate::terms::{
-    HeldOut, HeldOutBy, Hypothesis, Judge, Judged, Screen, Search, Table, Units, is_out, p_value,
-    shares_won,
+    HeldOut, Hypothesis, Judge, Judged, Screen, Search, Table, Units, is_out, p_value, shares_won,
 };
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
@@ -99,12 +97,6 @@ impl Finder<'_> {
     /// Whether `base` leaves next to nothing.
     fn is_near_the_floor(&self, base: &Hypothesis) -> bool {
         self.search.judge.over_noise(base.judged.rmse()) < RULES.near_the_floor
-    }
-
-    /// Whether neither the noise level is known nor a record was held out.
-    fn in_the_dark(&self) -> bool {
-        let judge = self.search.judge;
-        judge.noise_source == NoiseSource::Scatter && judge.held_out_by != HeldOutBy::Records
     }
 
     /// Whether a term beside `base` may be told: near the noise floor a sensitivity or a change with time is what
@@ -196,9 +188,6 @@ impl Finder<'_> {
         let rivals = all.iter().enumerate();
         let of_the_same = rivals.filter(|(_, rival)| same(&rival.term));
         let stability = shares[0] + of_the_same.map(|(i, _)| shares[i + 1]).sum::<f64>();
-        if self.in_the_dark() && stability < RULES.stable {
-            return None;
-        }
         let (mut alike, mut rivals): (Vec<Alike>, Vec<Candidate>) = (Vec::new(), Vec::new());
         for (index, rival) in all.iter().enumerate() {
             // Of one kind with several times, the best is told.

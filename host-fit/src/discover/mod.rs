@@ -29,6 +29,7 @@ pub use trace::{Signal, TRACED, Trace, TracedRecord};
 
 use crate::data::Record;
 use crate::diagnose::{DiagnoseError, Rung};
+use crate::excitation::says_little;
 use crate::model::Model;
 use crate::terms::{Bench, Found as Searched, Hypothesis, Known, Search};
 use finder::Finder;
@@ -167,7 +168,12 @@ pub fn discover(
     let mut found = Vec::new();
     let mut smallest = None;
     let (mut looked_at, mut names) = (0, Vec::new());
-    while found.len() < options.terms && !interrupt.load(Ordering::Relaxed) {
+    // A term is how the response depends on something.
+    let most = match says_little(records) {
+        Some(_) => 0,
+        None => options.terms,
+    };
+    while found.len() < most && !interrupt.load(Ordering::Relaxed) {
         let next = finder.next(&contexts, &current, found.len() + 1);
         looked_at += next.looked_at;
         smallest.get_or_insert(next.smallest);

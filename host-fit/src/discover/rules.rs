@@ -55,8 +55,7 @@ rules! {
     level_of_search: f64 = 0.02, "p-value", "as for effects of the catalogue: three false terms in a hundred are too many";
     /// Level of comparisons of two curves.
     level: f64 = 0.05, "p-value", "convention";
-    /// A term is stable if it wins in this share of the bootstrap resamples; where neither a noise level nor a record of its own
-    /// decides, only a stable term is told.
+    /// A term is stable if it wins in this share of the bootstrap resamples.
     stable: f64 = 0.9, "share of the resamples", "judgement";
     /// Held-out errors that differ by less than this are the same for any purpose.
     alike: f64 = 0.01, "share of the rms error", "judgement: twice what is asked of effects; a curve has more freedom";

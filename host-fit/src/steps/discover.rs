@@ -9,6 +9,7 @@ use crate::diagnose::Rung;
 use crate::discover::{
     Discovery, FoundTerm, Options, RULES as DISCOVER, Smallest, Trace, discover as search,
 };
+use crate::excitation::says_little;
 use crate::experiment::Separation;
 use crate::indicators::{Scores, score};
 use crate::model::{Model, Training};
@@ -103,6 +104,9 @@ pub fn discover(
     let runs_before = score(model, &records).ok().map(|(_, runs)| runs);
     let (scores, runs) = as_written(&mut discovery, model, &records)?;
     let mut answer = answer(&discovery);
+    if let Some(remark) = says_little(&records) {
+        answer.note(remark);
+    }
     if let Some(trace) = &discovery.trace {
         answer.note(where_it_enters(trace));
     }
@@ -182,10 +186,12 @@ fn answer(discovery: &Discovery) -> Answer {
         };
         let mut answer = Answer::new(Tone::Warning, "no term was found")
             .evidence(format!("The {error} stays at {level}."))
-            .confidence(format!(
-                "None of {} candidate curves lowers it significantly and by more than additional lags do.",
-                discovery.looked_at
-            ));
+            .confidence(match discovery.looked_at {
+                0 => "No candidate curve was tried.".to_owned(),
+                looked_at => format!(
+                    "None of {looked_at} candidate curves lowers it significantly and by more than additional lags do."
+                ),
+            });
         for (place, smallest) in &discovery.smallest_seen {
             answer.note(format!(
                 "At the {place}, a term of {} to {} (rms) would have been found; the value depends on its coordinate.",

@@ -90,6 +90,8 @@ pub struct Host {
     waiting: VecDeque<Streamed>,
     /// The board's sample period, µs; until it has said so, that of the bundled model.
     period_us: u32,
+    /// Whether a whole frame has come: until then a board sends its operator's lines.
+    is_framed: bool,
     /// Frames that came damaged.
     pub damaged: u64,
     /// Of an emulated board, whose time waits for its host.
@@ -109,6 +111,7 @@ impl Host {
             unheard: 0,
             waiting: VecDeque::new(),
             period_us: 1000,
+            is_framed: false,
             damaged: 0,
             presence: pace.map(|pace| pace.enter()),
         }
@@ -338,13 +341,13 @@ impl Host {
         for byte in bytes {
             let content = match self.receiver.receive(byte) {
                 None => continue,
-                // The operator's lines before the first frame are none, too.
                 Some(Err(_)) => {
-                    self.damaged += 1;
+                    self.damaged += u64::from(self.is_framed);
                     continue;
                 }
                 Some(Ok(content)) => content,
             };
+            self.is_framed = true;
             if let Some(samples) = Samples::read(content) {
                 if samples.session == self.session {
                     let all: Vec<_> = samples.iter().collect();

@@ -445,6 +445,19 @@ mod tests {
     }
 
     #[test]
+    fn three_changes_of_a_graded_command_say_little_and_four_do_not() {
+        let levels = |levels: &[f64]| {
+            let each = levels.iter().flat_map(|u| std::iter::repeat_n(*u, 50));
+            says_little(&set(each.collect()).records)
+        };
+        let three = levels(&[0.2, 0.4, 1.0, 0.2]).expect("a remark");
+        assert!(three.contains("changes only 3 times"), "{three}");
+        let one = levels(&[0.0, 1.0]).expect("a remark");
+        assert!(one.contains("switches only 1 time:"), "{one}");
+        assert_eq!(levels(&[0.2, 0.4, 1.0, 0.2, 0.6]), None);
+    }
+
+    #[test]
     fn random_switching_separates_more_than_a_square_wave_and_a_step() {
         let random = Excitation::of(&set(random(10_000, 1)), 500);
         assert!(

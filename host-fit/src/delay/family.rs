@@ -150,6 +150,33 @@ fn level_scale_and_sign_of_y_and_of_u_change_nothing() {
     }
 }
 
+/// What answers a command that the record does not show moves no edge that it does: cut at rest, and 3, 9 and 18 samples
+/// behind an edge.
+#[test]
+fn a_record_may_be_cut_anywhere() {
+    let (delay, at) = (20.0, 500);
+    for since in [200, 18, 9, 3] {
+        let mut rng = ChaCha8Rng::seed_from_u64(since);
+        let mut u = vec![0.0; at - since as usize];
+        for (i, hold) in [260, 90, 140, 110, 80, 150].into_iter().enumerate() {
+            u.extend(std::iter::repeat_n(f64::from(u8::from(i % 2 == 0)), hold));
+        }
+        let y: Vec<f64> = respond(30.0, 0.0, delay, &u, [0.0; 2])
+            .into_iter()
+            .map(|y| {
+                let z: f64 = StandardNormal.sample(&mut rng);
+                y + 0.01 * z
+            })
+            .collect();
+        let part = |from: usize, to: usize| {
+            let (u, y) = (u[from..to].to_vec(), y[from..to].to_vec());
+            Record::new("r", Use::Identify, 0.001, u, y)
+        };
+        let found = study(vec![part(at, u.len())]).dead_time.unwrap();
+        assert!((found.samples - delay).abs() < 1.0, "{since}: {found:?}");
+    }
+}
+
 #[test]
 fn heating_and_cooling_at_different_rates_have_one_dead_time() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);

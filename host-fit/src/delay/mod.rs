@@ -5,6 +5,7 @@
 //! delays with the averaged output (1) at that time, fits h̃(ỹ) = p0 + p1·exp(−p2·ỹ) to the edges of the identify
 //! records, and keeps the law where the data bear it out. Theory 1.5 has the method.
 
+mod begun;
 mod dead_time;
 mod dependence;
 mod drawing;

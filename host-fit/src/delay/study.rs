@@ -1,5 +1,6 @@
 //! All delays of a data set, the law through them, their statistics, and whether the data bear the law out.
 
+use super::begun::Begun;
 use super::dead_time::DeadTime;
 use super::dependence::{Tests, words};
 use super::edge::{Edge, edges};
@@ -14,7 +15,6 @@ use super::spread::{Spread, correlation, spread};
 use super::verdict::DelayVerdict;
 use crate::averages::averaged_past;
 use crate::data::{DataError, DataSet, Record, Use};
-use crate::preparation::Preparation;
 use model_core::average::WINDOW;
 
 /// How delays are measured. What is `None` follows from the time scales of the data.
@@ -168,49 +168,6 @@ pub struct DelayStudy {
 /// The edges of one record with what was measured.
 type Measured = Vec<(Edge, Result<Onset, Unmeasured>)>;
 
-/// A record with what is known of its beginning.
-struct Begun {
-    whole: Record,
-    /// The same where an edge before its first sample was only inferred: what answers that does not count.
-    shown: Option<Record>,
-}
-
-impl Begun {
-    fn is_learned(&self) -> bool {
-        self.whole.role == Use::Identify
-    }
-
-    /// What a plant is fitted to: an edge that is a few samples off makes a dead time of that and another time constant.
-    fn sure(&self) -> &Record {
-        self.shown.as_ref().unwrap_or(&self.whole)
-    }
-}
-
-fn begun(set: &DataSet) -> Vec<Begun> {
-    let prepared = Preparation::of(&set.records);
-    let answers = prepared.reference.map_or(0.0, |r| r.dead_time);
-    let answers = answers.ceil() as usize + 2;
-    let each = set.records.iter().zip(&prepared.records);
-    each.map(|(record, begun)| {
-        let whole = Record {
-            u_before: begun.u_before,
-            // What is slower is the free state of a plant.
-            follow: begun.follow.min(answers),
-            ..record.clone()
-        };
-        let first = record.u.first().copied();
-        let inferred = record.u_before.is_none() && whole.u_before != first;
-        let is_shown = whole.u.iter().any(|u| Some(*u) != first);
-        let shown = (inferred && is_shown).then(|| Record {
-            u_before: first,
-            follow: answers.min(whole.len() / 4),
-            ..whole.clone()
-        });
-        Begun { whole, shown }
-    })
-    .collect()
-}
-
 /// All edges of a data set, and what they have in common.
 struct Measurement {
     edges: Vec<Measured>,
@@ -226,7 +183,7 @@ struct Measurement {
 
 impl Measurement {
     fn of(set: &DataSet, options: &DelayOptions) -> Self {
-        let begun = begun(set);
+        let begun = Begun::all(set);
         let records: Vec<&Record> = begun.iter().map(|begun| &begun.whole).collect();
         let learned: Vec<&Begun> = begun.iter().filter(|b| b.is_learned()).collect();
         let learned = match learned.is_empty() {

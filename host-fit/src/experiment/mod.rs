@@ -286,6 +286,23 @@ mod tests {
     }
 
     #[test]
+    fn nothing_is_proposed_that_does_not_distinguish() {
+        let base = base(&records(&[], &[], 1));
+        let with = |gain| with(&base, "starting-vortex", &[gain, 0.05]);
+        let proposed = |noise| {
+            let models = vec![with(0.3), with(0.301)];
+            Separation::of(models, vec!["a".to_owned()], noise, 1)
+        };
+        let sigmas = proposed(1e-6)
+            .expect("no noise")
+            .experiment
+            .separation_sigmas;
+        // So much noise leaves two standard deviations, and four.
+        assert!(proposed(1e-6 * sigmas / 2.0).is_none());
+        assert!(proposed(1e-6 * sigmas / 4.0).is_some());
+    }
+
+    #[test]
     fn impossible_requests_are_refused() {
         let base = base(&records(&[], &[], 1));
         let limits = Limits::default();

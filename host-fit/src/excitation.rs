@@ -164,6 +164,13 @@ pub fn says_little(records: &[Record]) -> Option<String> {
     too_few(changes(&learning), on_off)
 }
 
+/// Whether records bear no more than a delay and time constants: the command says little, and nothing else was measured
+/// that moves y.
+#[must_use]
+pub fn bears_little(records: &[Record]) -> bool {
+    says_little(records).is_some() && records.iter().all(|record| record.channels.is_empty())
+}
+
 impl Excitation {
     /// Judges the identify records of a data set for a model that reaches `max_lag` samples back.
     #[must_use]

@@ -68,8 +68,8 @@ pub struct Signals<'a> {
     pub u_before: Option<f64>,
     /// y before the first sample; none for the first one.
     pub y_before: Option<f64>,
-    /// First samples at which the run takes the measured y over.
-    pub follow: usize,
+    /// y that the run takes over at its first samples.
+    pub followed: &'a [f64],
 }
 
 impl<'a> Signals<'a> {
@@ -90,7 +90,7 @@ impl<'a> Signals<'a> {
             channels: channels.collect::<Result<_, _>>()?,
             u_before: record.u_before.map(|u| model.command.share(u)),
             y_before: record.y_before,
-            follow: record.follow,
+            followed: &record.followed,
             ..Self::commanded(model, &record.u)
         })
     }
@@ -109,7 +109,7 @@ impl<'a> Signals<'a> {
             channels: Vec::new(),
             u_before: None,
             y_before: None,
-            follow: 0,
+            followed: &[],
         }
     }
 
@@ -200,9 +200,8 @@ impl<T: Real> Simulator<T> {
             if sink(k, &output).is_break() {
                 return None;
             }
-            let follows = k + 1 < signals.follow;
-            let measured = signals.y.and_then(|y| y.get(k + 1)).filter(|_| follows);
-            let next = measured.map_or(output.next, |y| T::from_f64(*y) - self.zero);
+            let followed = signals.followed.get(k + 1);
+            let next = followed.map_or(output.next, |y| T::from_f64(*y) - self.zero);
             let size = next.value().abs();
             if size > bound || size.is_nan() {
                 return Some(k + 1);
@@ -272,7 +271,7 @@ impl<T: Real> Simulator<T> {
     /// Whether something else than rest under no command was before the first sample.
     fn begins_held(&self, signals: &Signals<'_>) -> bool {
         self.start == Start::Measured
-            || signals.follow > 0
+            || !signals.followed.is_empty()
             || signals.u_before.is_some_and(|u| u != 0.0)
     }
 
@@ -292,6 +291,7 @@ impl<T: Real> Simulator<T> {
         let full = self.memory.outputs.max(self.memory.jets);
         let held = signals
             .y_before
+            .or_else(|| signals.followed.first().copied())
             .or_else(|| signals.y.and_then(<[f64]>::first).copied());
         if let Some(y) = held {
             for _ in 0..full.max(self.fades) {

@@ -47,9 +47,9 @@ pub struct Record {
     pub lead: usize,
     /// y before the first sample, where it is known; prepared from the data, no part of a file.
     pub y_before: Option<f64>,
-    /// Number of first samples at which a free run takes the measured y over, as the past that they answer is not
-    /// recorded: 0 for a record that begins at rest. Prepared from the data, no part of a file.
-    pub follow: usize,
+    /// y that a free run takes over at its first samples, as the past that they answer is not recorded; empty for a
+    /// record that begins at rest. Prepared from the data, no part of a file.
+    pub followed: Vec<f64>,
     /// Command (or input) per sample; 0 and 1 for an on/off actuator, any finite value otherwise.
     pub u: Vec<f64>,
     /// Measured output per sample (normalised friction gain), as long as `u`.
@@ -86,7 +86,7 @@ impl Record {
             },
             lead: self.lead.min(to).saturating_sub(from),
             y_before: self.y_before.filter(|_| from == 0),
-            follow: self.follow.min(to).saturating_sub(from),
+            followed: cut(&self.followed),
             u: cut(&self.u),
             y: cut(&self.y),
             y_sd: self.y_sd.as_ref().map(cut),
@@ -111,7 +111,7 @@ impl Record {
             u_before: None,
             lead: 0,
             y_before: None,
-            follow: 0,
+            followed: Vec::new(),
             u,
             y,
             y_sd: None,

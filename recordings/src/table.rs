@@ -141,7 +141,7 @@ impl Table {
             u_before: None,
             lead: 0,
             y_before: None,
-            follow: 0,
+            followed: Vec::new(),
             u,
             y,
             y_sd: self.columns.remove("y_sd"),

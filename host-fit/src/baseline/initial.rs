@@ -1,6 +1,7 @@
 //! The initial state of a free run, from the beginning of the record.
 
 use crate::linalg::dot;
+use std::ops::Range;
 
 /// The fewest samples of a record that its initial state is estimated from.
 const FEWEST: usize = 20;
@@ -9,12 +10,13 @@ const SHARE: f64 = 0.05;
 
 /// Free responses of a process over a record: what different initial states differ by. The state itself is estimated
 /// from the beginning alone: the first twentieth of the record, at least 20 samples, and longer where the process has
-/// no time constant as short as half of that.
+/// no time constant as short as half of that. Of a record that begins in mid-run the beginning is what free runs follow,
+/// from where commands before the record are answered.
 #[derive(Clone, Debug)]
 pub(super) struct InitialState {
     /// Orthonormal over the beginning.
     columns: Vec<Vec<f64>>,
-    beginning: usize,
+    beginning: Range<usize>,
 }
 
 /// Σ of products over the shorter of two.
@@ -29,6 +31,16 @@ pub(super) fn inner(a: &[f64], b: &[f64]) -> f64 {
 impl InitialState {
     /// Of free responses over a record of `samples`; `fastest` is the shortest time of the process, samples.
     pub(super) fn new(free: Vec<Vec<f64>>, samples: usize, fastest: f64) -> Self {
+        Self::between(free, samples, fastest, 0..0)
+    }
+
+    /// The same from the first of the samples `known` on, and through all of them.
+    pub(super) fn between(
+        free: Vec<Vec<f64>>,
+        samples: usize,
+        fastest: f64,
+        known: Range<usize>,
+    ) -> Self {
         let mut beginning = FEWEST.max((SHARE * samples as f64) as usize);
         // Doubled, so that it does not change with every change of the time constant.
         while beginning < samples && (beginning as f64) < 2.0 * fastest {
@@ -36,7 +48,7 @@ impl InitialState {
         }
         let mut new = Self {
             columns: Vec::new(),
-            beginning: beginning.min(samples),
+            beginning: known.start..(known.start + beginning).max(known.end).min(samples),
         };
         for mut column in free {
             let size = new.over_the_beginning(&column, &column).sqrt();
@@ -54,7 +66,9 @@ impl InitialState {
     }
 
     fn over_the_beginning(&self, a: &[f64], b: &[f64]) -> f64 {
-        inner(a.get(..self.beginning).unwrap_or(a), b)
+        let both = a.len().min(b.len()).min(self.beginning.end);
+        let from = self.beginning.start.min(both);
+        inner(&a[from..both], &b[from..both])
     }
 
     /// Takes out of `values` what the initial state explains that fits their beginning best.
@@ -100,7 +114,7 @@ mod tests {
 
     #[test]
     fn a_slow_process_has_a_long_beginning() {
-        let beginning = |fastest| InitialState::new(Vec::new(), 1000, fastest).beginning;
+        let beginning = |fastest| InitialState::new(Vec::new(), 1000, fastest).beginning.end;
         assert_eq!(
             (beginning(3.0), beginning(90.0), beginning(1e6)),
             (50, 200, 1000)

@@ -123,7 +123,11 @@ fn run(shape: Shape, dead_time: f64, level: f64, gain: f64, record: &Record) -> 
     let forced = response.forced(&around, before).into_iter();
     let forced: Vec<f64> = forced.map(|x| level + gain * (mean + x)).collect();
     let free = response.free(record.len());
-    let initial = InitialState::new(free, record.len(), response.fastest());
+    let known = match record.followed.len() {
+        0 => 0..0,
+        followed => (dead_time.ceil() as usize + 1).min(record.len() / 4)..followed,
+    };
+    let initial = InitialState::between(free, record.len(), response.fastest(), known);
     let run = initial.added_to(&forced, &record.y);
     run.iter().all(|y| y.is_finite()).then_some(run)
 }

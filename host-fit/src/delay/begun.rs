@@ -27,7 +27,7 @@ impl Begun {
         let whole = Record {
             u_before: prepared.u_before,
             // What is slower is the free state of a plant.
-            follow: prepared.follow.min(answers),
+            followed: first_of(&prepared.followed, answers),
             ..record.clone()
         };
         let first = record.u.first().copied();
@@ -35,7 +35,7 @@ impl Begun {
         let is_shown = whole.u.iter().any(|u| Some(*u) != first);
         let shown = (inferred && is_shown).then(|| Record {
             u_before: first,
-            follow: answers.min(whole.len() / 4),
+            followed: first_of(&whole.y, answers.min(whole.len() / 4)),
             ..whole.clone()
         });
         Self { whole, shown }
@@ -49,4 +49,8 @@ impl Begun {
     pub(super) fn sure(&self) -> &Record {
         self.shown.as_ref().unwrap_or(&self.whole)
     }
+}
+
+fn first_of(series: &[f64], count: usize) -> Vec<f64> {
+    series.iter().take(count).copied().collect()
 }

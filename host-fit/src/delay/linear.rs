@@ -42,7 +42,7 @@ impl Series {
     pub(crate) fn new(record: &Record, middle: f64) -> Self {
         let first = record.u.first().copied().unwrap_or(0.0);
         let before = record.u_before.unwrap_or(first);
-        let from = record.follow.min(record.len());
+        let from = record.followed.len().min(record.len());
         let level = mean(&record.y[from..]);
         let counted = record.y[from..].iter().map(|y| y - level);
         Self {

@@ -26,6 +26,7 @@ pub use ranking::{FLOW_LAG, FLOW_MEMORY};
 pub use rules::{RULES, Rules};
 
 use crate::data::Record;
+use crate::excitation::bears_little;
 use crate::model::{Model, Start};
 use crate::simulate::SimulateError;
 use crate::terms::{Bench, Hypothesis, Known, Search};
@@ -134,6 +135,13 @@ fn chosen(
     );
     if let Some(diagnosis) = session.nothing_at_once(given, &given_inside, &as_given, &first) {
         return Ok(diagnosis);
+    }
+    if bears_little(records) {
+        // An effect is how the response depends on something, and so are further lags.
+        let given_alone = Hypothesis::new(judge.refitted(&given_inside)?);
+        let second = session.rung(&given_alone.judged, &[], "refitted");
+        let rungs = [first, second];
+        return Ok(session.conclude(given_alone.alone(), rungs, &given_inside, &as_given, None));
     }
     progress("the model with the fewest lags");
     // Rigs that are no blown ramp: their dynamics is the user's choice of lags.

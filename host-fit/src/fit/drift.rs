@@ -45,7 +45,8 @@ pub(crate) fn pieces(record: &Record, samples: usize) -> Vec<Record> {
         let before = from.saturating_sub(follow);
         let mut part = record.part(before, end(piece));
         if from > 0 {
-            (part.follow, part.lead) = (from - before, from - before);
+            part.lead = from - before;
+            part.followed = part.y[..part.lead].to_vec();
         }
         part
     };

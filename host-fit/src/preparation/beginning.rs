@@ -133,11 +133,16 @@ impl Beginning {
             && !known_edge
             && record.u_before.is_none()
             && answer.left < RULES.answer * relaxes_early.left
-            // An answer that comes sooner is that of an edge before the record.
-            && *at >= RULES.surely_before * dead_time
+            // An answer that comes sooner is that of an edge before the record; in doubt the run follows the measurement.
+            && *at >= 0.5 * (1.0 + RULES.surely_before) * dead_time
         {
-            let rest = (RULES.surely_before * at).floor() as usize;
-            return at_rest(other, rest.max(1));
+            let rest = ((RULES.surely_before * at).floor() as usize).max(1);
+            // What still moves before that answer does not rest.
+            let trend = Shape::of(&y[..rest.min(window)], |k| k as f64);
+            let noise = trend.left / (rest as f64 - 2.0).max(1.0);
+            if rest < RULES.fewest_at_rest || trend.motion <= RULES.motion_over_noise * noise {
+                return at_rest(other, rest);
+            }
         }
         in_mid_run(dead_time, time)
     }
@@ -157,7 +162,8 @@ impl Beginning {
     }
 
     /// Takes rests that are too short to be sure of for what they are: where records rest at different levels under the
-    /// same command, something slow is still on its way, and those that show less than a motion takes begin in mid-run.
+    /// same command, something is still on its way, and those that show less than a motion takes and do not rest where
+    /// most do begin in mid-run.
     pub(super) fn reconcile(beginnings: &mut [Self], records: &[Record], reference: &FirstOrder) {
         let level = |record: &Record, own: &Self| {
             let rest = &record.y[..own.rest.min(record.y.len())];
@@ -175,11 +181,11 @@ impl Beginning {
                 .iter()
                 .flatten()
                 .filter(|(command, _)| *command == own.command);
-            let (low, high) = same
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (_, y)| {
-                    (low.min(*y), high.max(*y))
-                });
-            if own.rest > 0 && (own.rest as f64) < enough && high - low > apart {
+            let same: Vec<f64> = same.map(|(_, level)| *level).collect();
+            if own.rest > 0
+                && (own.rest as f64) < enough
+                && !rests_with_most(level(record, own), &same, apart)
+            {
                 let (dead_time, time) = (reference.dead_time, reference.time_constant);
                 *own = Self::in_mid_run(record, own.command, dead_time, time);
             }
@@ -234,14 +240,22 @@ impl Beginning {
     pub(super) fn filled_in(&self, record: &Record) -> Record {
         let mut record = record.clone();
         record.u_before.get_or_insert(self.command);
-        record.follow = self.follow;
-        record.lead = record.lead.max(self.follow);
         if self.rest > 0 && record.y_before.is_none() {
             let rest = &record.y[..self.rest.min(record.y.len())];
             record.y_before = Some(rest.iter().sum::<f64>() / rest.len().max(1) as f64);
         }
         record
     }
+}
+
+/// Whether a level is one of the `apart`-wide group in which more than half of all levels are.
+fn rests_with_most(level: f64, all: &[f64], apart: f64) -> bool {
+    let mut sorted = all.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.iter().any(|low| {
+        let group = |y: &f64| (*low..=low + apart).contains(y);
+        2 * sorted.iter().filter(|y| group(y)).count() > sorted.len() && group(&level)
+    })
 }
 
 /// The distance from the least y of all records to the largest.

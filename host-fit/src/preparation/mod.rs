@@ -10,14 +10,17 @@ mod levels;
 mod reference;
 mod rest;
 mod rules;
+mod smoothing;
 
 pub use reference::FirstOrder;
 pub use rest::MovingZero;
 pub use rules::{RULES, Rules};
 
-use crate::data::Record;
+use crate::baseline::Baselines;
+use crate::data::{Record, Use};
 use crate::model::CommandRange;
 use beginning::Beginning;
+use smoothing::{half_width, smoothed};
 use std::fmt::Write as _;
 
 /// Records made ready, and what that found.
@@ -63,6 +66,7 @@ impl Preparation {
         if moving_zero.is_some() {
             rest::tare(&mut prepared, &beginnings, command.off);
         }
+        follow(&mut prepared, &beginnings);
         let zero = rest::level_of_rest(&prepared, &beginnings, command.off)
             .unwrap_or_else(|| rest::estimated_zero(&prepared, command, reference.as_ref()));
         Self {
@@ -80,7 +84,11 @@ impl Preparation {
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
-        let begun: Vec<&Record> = self.records.iter().filter(|r| r.follow > 0).collect();
+        let begun: Vec<&Record> = self
+            .records
+            .iter()
+            .filter(|r| !r.followed.is_empty())
+            .collect();
         if let Some(first) = begun.first() {
             let mut text = format!(
                 "{} of {} records begin in mid-run: free runs follow the measurement for their first ",
@@ -90,8 +98,8 @@ impl Preparation {
             let _ = write!(
                 text,
                 "{} samples ({} s), which are not scored.",
-                first.follow,
-                crate::picture::significant(first.follow as f64 * first.sample_period_s, 3)
+                first.lead,
+                crate::picture::significant(first.lead as f64 * first.sample_period_s, 3)
             );
             remarks.push(text);
         }
@@ -103,6 +111,37 @@ impl Preparation {
         }
         remarks.extend(self.moving_zero.iter().map(ToString::to_string));
         remarks
+    }
+}
+
+/// Fills in what free runs take over where records begin in mid-run: a second order with dead time that begins as they
+/// do, and what is left of y beside it, smoothed. Single samples do not show how fast y moves, and a smoothed y alone
+/// lags behind its own turns.
+fn follow(records: &mut [Record], beginnings: &[Beginning]) {
+    if beginnings.iter().all(|own| own.follow == 0) {
+        return;
+    }
+    let learning: Vec<&Record> = records.iter().filter(|r| r.role == Use::Identify).collect();
+    let second = Baselines::fit(&learning).sopdt;
+    for (record, own) in records.iter_mut().zip(beginnings) {
+        if own.follow == 0 {
+            continue;
+        }
+        let follow = own.follow.min(record.len());
+        record.followed = record.y[..follow].to_vec();
+        let run = second.and_then(|second| second.simulate(record));
+        let run = run.unwrap_or_else(|| vec![0.0; record.len()]);
+        let left: Vec<f64> = record.y.iter().zip(&run).map(|(y, run)| y - run).collect();
+        // Until commands before the record are answered the run knows nothing of y.
+        let answered = second.map_or(0.0, |second| second.dead_time_s / record.sample_period_s);
+        let from = (answered.ceil() as usize + 1).min(follow / 2);
+        let half = half_width(&left[from..], 0..follow - from).min((follow - from) / 2);
+        // What is taken over at the last sample comes from as many after it, which are not scored either.
+        let follow = follow - half;
+        let answered = (from..follow).map(|k| run[k] + smoothed(&left[from..], k - from, half));
+        record.followed.truncate(from);
+        record.followed.extend(answered);
+        record.lead = record.lead.max(follow + half);
     }
 }
 

@@ -12,6 +12,7 @@ use crate::diagnose::{
     RULES as DIAGNOSE, Ranked, Rung, Verdict, diagnose as search,
 };
 use crate::discover::{Glance, glance};
+use crate::excitation::says_little;
 use crate::experiment::Separation;
 use crate::indicators::{Scores, score, score_new};
 use crate::model::{Model, Training};
@@ -186,6 +187,9 @@ pub fn diagnose(
         Err(_) => (score_new(&diagnosis.model, &records)?.0, None),
     };
     let mut answer = verdict::answer(&diagnosis, judged_rmse, channel.as_ref(), set.plant);
+    if let Some(remark) = says_little(&records) {
+        answer.note(remark);
+    }
     if let Some(beyond) = &beyond {
         answer.note(verdict::beyond(beyond));
     }

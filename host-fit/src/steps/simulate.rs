@@ -102,7 +102,7 @@ pub fn simulate(model: &Model, input: &InputFile) -> Result<Simulation, StepErro
         y: begun.map(|record| record.y.as_slice()),
         u_before: begun.and_then(|record| record.u_before.map(|u| model.command.share(u))),
         y_before: begun.and_then(|record| record.y_before),
-        follow: begun.map_or(0, |record| record.follow),
+        followed: begun.map_or(&[], |record| &record.followed),
         channels: channels.collect::<Result<_, _>>()?,
         ..Signals::commanded(model, &input.u)
     };

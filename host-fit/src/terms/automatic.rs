@@ -4,12 +4,13 @@
 use super::bench::Bench;
 use super::evidence::p_value;
 use super::judge::{Judge, Judged};
-use super::linear;
-use super::search::{Hypothesis, Search};
+use super::linear::{self, second_order};
+use super::search::{Found, Hypothesis, Search};
 use super::settled::{Settled, settled};
-use super::term::take_delay_law;
+use super::term::{Term, take_delay_law};
 use super::{Known, RULES};
 use crate::data::Record;
+use crate::excitation::bears_little;
 use crate::model::{Delay, Model};
 use crate::search::{Progress, Settings, StopReason};
 use crate::simulate::SimulateError;
@@ -87,6 +88,17 @@ pub fn base_model(
         interrupt,
         progress,
     };
+    if bears_little(records) {
+        progress("first and second order with dead time");
+        if let Some(model) = linear::alone(&judge, &given) {
+            return Some(Ok(Automatic {
+                model: units.model_out(&model),
+                tried: 2,
+                evaluations: 0,
+                stop: StopReason::LocallyOptimal,
+            }));
+        }
+    }
     let with_law = |law: &Delay| Model {
         delay: law.clone(),
         ..given.clone()
@@ -102,12 +114,13 @@ pub fn base_model(
     }
     let by_score = |a: &&Hypothesis, b: &&Hypothesis| a.judged.size().total_cmp(&b.judged.size());
     progress("first and second order with dead time");
-    let linear: Vec<Model> = linear::baselines(&given, &judge.learning(0))
-        .into_iter()
-        .filter(|_| laws.iter().any(|law| matches!(law, Delay::Fixed { .. })))
-        .collect();
+    let constant = |law: &Delay| matches!(law, Delay::Fixed { .. });
+    let linear = match laws.iter().any(constant) {
+        true => linear::baselines(&given, &judge.learning(0)),
+        false => Vec::new(),
+    };
+    let linear = linear.into_par_iter();
     let linear: Vec<Hypothesis> = linear
-        .into_par_iter()
         .filter_map(|model| judge.refitted(&model).ok())
         .map(Hypothesis::new)
         .collect();
@@ -118,14 +131,26 @@ pub fn base_model(
     else {
         return refused.map(Err);
     };
-    let mut found = search.run(root.clone(), || None);
-    // What a linear model of two lags does better than the best structure so far is where to set out from.
-    if let Some(better) = linear.iter().min_by(by_score)
+    // A law that says no more than a constant delay is no place to set out from.
+    let root = Hypothesis::new(without_needless_law(&judge, root.judged.clone(), laws));
+    progress("the same of second order");
+    let second = second_order(&judge, &root);
+    let mut found = search.run(root, || second);
+    // Inputs of which one takes back what another does are no first or second order: where they do better than the best
+    // structure so far is where to set out from.
+    let lead = |hypothesis: &&Hypothesis| {
+        let b = &hypothesis.judged.model().b;
+        b.iter().any(|b| *b > 0.0) && b.iter().any(|b| *b < 0.0)
+    };
+    if let Some(better) = linear.iter().filter(lead).min_by(by_score)
         && better.judged.size() + RULES.linear_better < found.best.judged.size()
     {
         let tried = found.tried;
         found = search.run(better.clone(), || None);
         found.tried += tried;
+    }
+    if let Some(plain) = plain_enough(&found) {
+        found.best = plain;
     }
     // With the lags that were found another law may do better than the one that was chosen without them.
     let mut others: Vec<Delay> = roots
@@ -193,6 +218,20 @@ pub fn base_model(
         evaluations,
         stop,
     }))
+}
+
+/// The best first or second order among what was fitted, where no test tells the best structure from it: lags further
+/// back and terms in the path of the jets imitate a second lag and move the delay with it.
+fn plain_enough(found: &Found) -> Option<Hypothesis> {
+    let is_plain = |hypothesis: &&Hypothesis| {
+        let mut terms = hypothesis.terms.iter();
+        terms.all(|term| matches!(term, Term::Inertia(_) | Term::Offset))
+    };
+    let plain = found.all.iter().filter(is_plain);
+    let plain = plain.min_by(|a, b| a.score().total_cmp(&b.score()))?;
+    let best = &found.best;
+    let told = p_value(&plain.judged.held_out, &best.judged.held_out) <= RULES.level;
+    (!told && !is_plain(&best)).then(|| plain.clone())
 }
 
 /// The model with a constant delay where its law is no more than that over the levels of the records: a law has to vary

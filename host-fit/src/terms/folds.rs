@@ -129,7 +129,7 @@ mod tests {
             u_before: None,
             lead: 0,
             y_before: None,
-            follow: 0,
+            followed: Vec::new(),
             u: vec![0.0; 10],
             y: (0..10).map(f64::from).collect(),
             y_sd: Some(vec![0.1; 10]),

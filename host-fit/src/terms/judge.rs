@@ -299,13 +299,25 @@ impl Judge {
         if self.held_out_by == HeldOutBy::Records && self.options.level_scatter.is_none() {
             return own;
         }
-        let all: Vec<&Record> = self.identify.iter().collect();
+        self.fitted_to_all(&own.model).unwrap_or(own)
+    }
+
+    /// Every record that may be learned from.
+    pub(super) fn everything(&self) -> Vec<&Record> {
+        self.identify.iter().collect()
+    }
+
+    /// A model fitted to everything that may be learned from.
+    ///
+    /// # Errors
+    /// As [`fit`].
+    pub(super) fn fitted_to_all(&self, model: &Model) -> Result<Fit, SimulateError> {
         // What is handed over is off by as little as can be, wherever that comes from.
         let options = FitOptions {
             level_scatter: None,
-            ..self.options_for(&own.model)
+            ..self.options_for(model)
         };
-        fit(&own.model, &all, &options).unwrap_or(own)
+        fit(model, &self.everything(), &options)
     }
 
     /// The held-out error of the model that is handed over for `judged`, where that can be told.

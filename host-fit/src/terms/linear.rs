@@ -1,7 +1,11 @@
 //! The baselines as models of ours: a base that such a simple model beats is not handed over.
 
+use super::judge::{Judge, size};
+use super::search::Hypothesis;
+use super::term::Term;
 use crate::baseline::{Arx, Baselines, Recursion};
 use crate::data::Record;
+use crate::fit::Fit;
 use crate::model::{Delay, Model, Start};
 use model_core::effects::ConstantDelay;
 
@@ -43,6 +47,70 @@ fn linear(frame: &Model, a: Vec<f64>, b: Vec<f64>, constant: f64, delay: f64) ->
         effects: Vec::new(),
         ..frame.clone()
     }
+}
+
+/// The better one of first and second order, one delay and no products: what records can bear whose
+/// command changes too seldom to say how anything depends on y. All of them are fitted and judged: what could be held
+/// out is not moved by the command.
+pub(super) fn alone(judge: &Judge, frame: &Model) -> Option<Model> {
+    let found = Baselines::fit(&judge.everything());
+    let period = frame.sample_period_s;
+    let first = found.fopdt.map(|first| first.recursion(period));
+    let second = found.sopdt.map(|second| second.recursion(period));
+    let all = [first, second].into_iter().flatten();
+    let fitted = all.filter_map(|found| {
+        let linear = Model {
+            product_lags: Vec::new(),
+            c: Vec::new(),
+            ..one_input(frame, found)
+        };
+        judge.fitted_to_all(&linear).ok()
+    });
+    let size = |fit: &Fit| size(fit.mean_square().sqrt(), &fit.model);
+    let best = fitted.min_by(|a, b| size(a).total_cmp(&size(b)));
+    best.map(|fit| fit.model)
+}
+
+/// The second order of `judge`'s records with the delay law and the products of `root`, a first order: what a search
+/// over single terms finds late, for the delay of the first order holds the second lag as well.
+pub(super) fn second_order(judge: &Judge, root: &Hypothesis) -> Option<Hypothesis> {
+    let first = root.judged.model();
+    let period = first.sample_period_s;
+    let found = Baselines::fit(&judge.learning(0)).sopdt?;
+    let linear = one_input(first, found.recursion(period));
+    // The lags in series, with the products of the first order; and the linear one, which may swing.
+    let in_series = found.time_constants_s.map(|[_, lag]| {
+        let lag = lag / period;
+        let mut model = first.clone();
+        let later = linear.delay.present(0.0, period) + lag - model.delay.present(0.0, period);
+        model.delay_later(later);
+        Term::Inertia(lag).added_to(&model, &[])
+    });
+    let swings = Model {
+        start: first.start,
+        constant: first.constant,
+        product_lags: vec![1, 2],
+        c: vec![0.0; 2],
+        effects: first.effects.clone(),
+        ..linear
+    };
+    let all = [in_series, Some(swings)].into_iter().flatten();
+    let judged = all.filter_map(|model| judge.refitted(&model).ok());
+    let judged = judged.min_by(|a, b| a.rmse().total_cmp(&b.rmse()))?;
+    Some(Hypothesis {
+        terms: vec![Term::Inertia(0.0)],
+        from_given: true,
+        ..Hypothesis::new(judged)
+    })
+}
+
+/// A recursion with its inputs as one, between samples.
+fn one_input(frame: &Model, found: Recursion) -> Model {
+    let whole: f64 = found.b.iter().sum();
+    let moment: f64 = found.b.iter().enumerate().map(|(i, b)| i as f64 * b).sum();
+    let later = if whole == 0.0 { 0.0 } else { moment / whole };
+    let delay = found.delay as f64 + later;
+    linear(frame, found.a, vec![whole], found.constant, delay)
 }
 
 fn recursion(frame: &Model, found: Recursion) -> Model {

@@ -63,8 +63,8 @@ rules! {
     /// Steps between the lags that are screened.
     lag_step: usize = 8, "samples", "a wrong lag of half a step leaves a tenth of what the right one takes";
 
-    /// A linear model of two lags and inputs is set out from where it errs less than the best structure by this.
-    linear_better: f64 = 0.03, "share of the rms error", "judgement: a second input a sample later stands for a fraction of a delay";
+    /// A linear model whose inputs take back what others do is set out from where it errs less than the best structure by this.
+    linear_better: f64 = 0.03, "share of the rms error", "judgement: a first response in the wrong direction errs by more";
     /// Evaluations of the mesh adaptive direct search that settles the delays of a chosen structure, at most …
     settling: usize = 300, "", "judgement: each is a brief fit; a structure of five delays needs 60 to 150";
     /// … the iterations of the fit at each …

@@ -42,6 +42,17 @@ impl Hypothesis {
         }
     }
 
+    /// What a search found that tried nothing else.
+    pub(crate) fn alone(self) -> Found {
+        Found {
+            root: self.clone(),
+            best: self.clone(),
+            bare: self.clone(),
+            all: vec![self],
+            tried: 0,
+        }
+    }
+
     /// Whether no effect is among its terms.
     #[must_use]
     pub fn is_bare(&self) -> bool {

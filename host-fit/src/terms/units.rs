@@ -84,6 +84,7 @@ impl Units {
             u: record.u.iter().map(u).collect(),
             u_before: record.u_before.as_ref().map(u),
             y: y(&record.y),
+            followed: y(&record.followed),
             y_before: record.y_before.map(|y| (y - self.zero) / self.y),
             y_sd: record
                 .y_sd

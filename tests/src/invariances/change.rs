@@ -108,7 +108,7 @@ impl Change {
             Self::Rest => {
                 let samples = random.random_range(10..300);
                 each(&mut changed, |part| {
-                    let level = part.y.first().copied().unwrap_or(0.0);
+                    let level = part.level_at_rest();
                     let rest = (0..samples).map(|_| level + base.noise * normal(random));
                     let y: Vec<f64> = rest.chain(part.y.iter().copied()).collect();
                     let command = part.u.first().copied().unwrap_or(0.0);

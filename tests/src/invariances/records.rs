@@ -39,6 +39,15 @@ pub(super) struct Part {
     pub(super) y: Vec<f64>,
 }
 
+impl Part {
+    /// The mean of y before the command first changes: a single sample is off by its noise.
+    pub(super) fn level_at_rest(&self) -> f64 {
+        let changes = self.u.windows(2).position(|pair| pair[0] != pair[1]);
+        let rest = self.y.get(..=changes.unwrap_or(0)).unwrap_or(&self.y);
+        rest.iter().sum::<f64>() / rest.len().max(1) as f64
+    }
+}
+
 impl fmt::Display for Rig {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {

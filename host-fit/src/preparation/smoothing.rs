@@ -1,0 +1,124 @@
+//! Smoothing by a parabola over neighbouring samples (Savitzky and Golay, Anal. Chem. 36, 1964): value and slope of a
+//! slow signal without the noise of single samples.
+
+use std::ops::Range;
+
+/// Half-widths that are tried, samples.
+const HALVES: [usize; 6] = [2, 4, 8, 16, 32, 64];
+
+/// A parabola over so many samples on both sides, fitted by least squares.
+struct Parabola {
+    value: f64,
+    /// Share of the sample's own value in it.
+    leverage: f64,
+}
+
+impl Parabola {
+    /// At sample `at` of `y`, over the `2·half + 1` samples around it or, near the ends, next to it; none where there
+    /// are fewer.
+    fn of(y: &[f64], at: usize, half: usize) -> Option<Self> {
+        let width = 2 * half + 1;
+        let from = at.saturating_sub(half).min(y.len().checked_sub(width)?);
+        let window = y.get(from..from + width)?;
+        let (n, center) = (width as f64, half as f64);
+        // Σx², Σx⁴ over −half … half: the parabola's second part is x² less its mean.
+        let squares = n * (n * n - 1.0) / 12.0;
+        let mean = squares / n;
+        let (mut sum, mut along, mut bend, mut bends) = (0.0, 0.0, 0.0, 0.0);
+        for (k, y) in window.iter().enumerate() {
+            let x = k as f64 - center;
+            let curved = x * x - mean;
+            sum += y;
+            along += x * y;
+            bend += curved * y;
+            bends += curved * curved;
+        }
+        let x = at as f64 - from as f64 - center;
+        let curved = x * x - mean;
+        Some(Self {
+            value: sum / n + along * x / squares + bend * curved / bends,
+            leverage: 1.0 / n + x * x / squares + curved * curved / bends,
+        })
+    }
+}
+
+/// y at sample `at`, smoothed over `half` samples on both sides; as it is for 0 or where there are too few samples.
+pub(super) fn smoothed(y: &[f64], at: usize, half: usize) -> f64 {
+    let own = y.get(at).copied().unwrap_or(0.0);
+    let parabola = (half > 0).then(|| Parabola::of(y, at, half)).flatten();
+    parabola.map_or(own, |parabola| parabola.value)
+}
+
+/// The widest half-width with which the samples `range` of `y` are foretold by their neighbours (leave-one-out) as well
+/// as with any other, within one standard error of the difference; 0 where there are too few. At most as long as the
+/// range.
+pub(super) fn half_width(y: &[f64], range: Range<usize>) -> usize {
+    let errors = |half: usize| -> Option<Vec<f64>> {
+        let each = range.clone().map(|at| {
+            let parabola = Parabola::of(y, at, half)?;
+            Some(((y.get(at)? - parabola.value) / (1.0 - parabola.leverage)).powi(2))
+        });
+        each.collect()
+    };
+    let tried = HALVES.into_iter().filter(|half| *half <= range.len());
+    let tried: Vec<(usize, Vec<f64>)> = tried
+        .filter_map(|half| Some((half, errors(half)?)))
+        .collect();
+    let sum = |errors: &[f64]| errors.iter().sum::<f64>();
+    let Some((_, least)) = tried.iter().min_by(|a, b| sum(&a.1).total_cmp(&sum(&b.1))) else {
+        return 0;
+    };
+    let as_good = |errors: &[f64]| {
+        let more = errors.iter().zip(least).map(|(own, least)| own - least);
+        let square: f64 = more.clone().map(|more| more * more).sum();
+        more.sum::<f64>() <= square.sqrt()
+    };
+    let widest = tried.iter().rev().find(|(_, errors)| as_good(errors));
+    widest.map_or(0, |(half, _)| *half)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn noise(k: usize) -> f64 {
+        let state = (k as u32).wrapping_mul(2_654_435_761).wrapping_add(12_345);
+        f64::from((state ^ (state >> 15)).wrapping_mul(2_246_822_519) >> 8) / f64::from(1 << 24)
+            - 0.5
+    }
+
+    #[test]
+    fn a_parabola_stays_as_it_is() {
+        let y: Vec<f64> = (0..40)
+            .map(f64::from)
+            .map(|k| 2.0 - 0.3 * k + 0.01 * k * k)
+            .collect();
+        for at in [0, 1, 7, 20, 38, 39] {
+            for half in HALVES.into_iter().filter(|half| 2 * half < y.len()) {
+                assert!((smoothed(&y, at, half) - y[at]).abs() < 1e-9, "{at} {half}");
+            }
+        }
+        assert_eq!(smoothed(&y, 3, 0), y[3]);
+        assert_eq!(smoothed(&y[..4], 3, 2), y[3]);
+    }
+
+    #[test]
+    fn the_slope_of_a_slow_signal_is_known_better_than_from_two_samples() {
+        let y: Vec<f64> = (0..200).map(|k| 0.01 * k as f64 + noise(k)).collect();
+        let half = half_width(&y, 0..60);
+        assert!(half >= 16, "{half}");
+        let slope = |half: usize| smoothed(&y, 60, half) - smoothed(&y, 59, half);
+        assert!((slope(half) - 0.01).abs() < 0.02, "{}", slope(half));
+        assert!((slope(0) - 0.01).abs() > 0.1);
+    }
+
+    #[test]
+    fn a_fast_signal_is_hardly_smoothed() {
+        let y: Vec<f64> = (0..200)
+            .map(|k| (0.4 * k as f64).sin() + 0.01 * noise(k))
+            .collect();
+        assert!(half_width(&y, 0..60) <= 4);
+        assert_eq!(half_width(&y[..4], 0..4), 0);
+        assert_eq!(half_width(&y, 0..1), 0);
+    }
+}

@@ -19,6 +19,7 @@ mod invariances;
 mod msrv;
 mod new_effect;
 mod nucleo;
+mod package;
 mod pages;
 mod periods;
 mod pil;
@@ -61,6 +62,7 @@ const TASKS: &[Task] = &[
     msrv::TASK,
     new_effect::TASK,
     nucleo::TASK,
+    package::TASK,
     pages::TASK,
     periods::TASK,
     pil::TASK,

@@ -124,6 +124,13 @@ const STEPS: &[Step] = &[
         room: None,
         run: crate::supply::supply,
     },
+    // Every crate can be published.
+    Step {
+        name: "package",
+        after: &[BUILD],
+        room: Some(Room::Host),
+        run: || (crate::package::TASK.run)(&[]),
+    },
     // An effect and a delay law are one file and one line each.
     Step {
         name: "new effect",

@@ -23,6 +23,7 @@ mod package;
 mod pages;
 mod periods;
 mod pil;
+mod release;
 mod rig_day;
 mod setup;
 mod shell;
@@ -66,6 +67,7 @@ const TASKS: &[Task] = &[
     pages::TASK,
     periods::TASK,
     pil::TASK,
+    release::TASK,
     rig_day::TASK,
     setup::TASK,
     size::TASK,

@@ -131,6 +131,13 @@ const STEPS: &[Step] = &[
         room: Some(Room::Host),
         run: || (crate::package::TASK.run)(&[]),
     },
+    // What is handed to people without a compiler: archive and wheel, installed elsewhere.
+    Step {
+        name: "release",
+        after: &[SET_UP, BUILD],
+        room: None,
+        run: || crate::release::release(&[]),
+    },
     // An effect and a delay law are one file and one line each.
     Step {
         name: "new effect",

@@ -55,6 +55,7 @@ fn in_folder(folder: &Path) -> Result<()> {
         Ok(output(&mut command)?.trim().to_owned())
     };
     let python = crate::setup::python()?;
+    crate::fmu::check(folder, python, &[])?;
     let expected = format!("FIT {fit:.2} %");
     for (tool, arguments) in [
         (python, &["free_run.py", "record.csv"][..]),

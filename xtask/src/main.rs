@@ -13,6 +13,7 @@ mod elf;
 mod examples;
 mod faults;
 mod firmware;
+mod fmu;
 mod fuzz;
 mod identified;
 mod invariances;
@@ -51,6 +52,7 @@ const TASKS: &[Task] = &[
     examples::TASK,
     faults::TASK,
     firmware::TASK,
+    fmu::TASK,
     fuzz::TASK,
     campaigns::EFFECTS,
     campaigns::CALIBRATE,

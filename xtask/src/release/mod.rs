@@ -2,6 +2,7 @@
 //! of parts, and a Python wheel that carries the same. Each is tried after it was made. Nothing is asked of the network but
 //! crates that `cargo fetch` has not brought yet.
 
+mod notices;
 mod sbom;
 mod tried;
 
@@ -34,6 +35,7 @@ const SHELLS: [(&str, &str); 3] = [
 ];
 
 const PARTS: &str = "host-fit.cdx.json";
+const NOTICES: &str = "THIRD-PARTY.txt";
 
 /// What was made.
 struct Made {
@@ -89,7 +91,9 @@ fn make() -> Result<Made> {
     for text in TEXTS {
         std::fs::copy(root().join(text), unpacked.join(text)).context(text)?;
     }
-    let parts = sbom::document(&triple)?;
+    let tree = sbom::Parts::new(&triple)?;
+    std::fs::write(unpacked.join(NOTICES), notices::text(&tree)?)?;
+    let parts = tree.document()?;
     std::fs::write(unpacked.join(PARTS), &parts)?;
     std::fs::write(folder.join(format!("{name}.cdx.json")), &parts)?;
 

@@ -4,7 +4,10 @@ use crate::shell::{cargo, output, root};
 use anyhow::{Context, Result, ensure};
 use serde::Deserialize;
 use serde_json::{Value, json};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+const PAGES: &str = "host-fit/web/package-lock.json";
 
 #[derive(Deserialize)]
 struct Metadata {
@@ -13,12 +16,14 @@ struct Metadata {
 }
 
 #[derive(Deserialize)]
-struct Package {
+pub(super) struct Package {
     id: String,
-    name: String,
-    version: String,
-    license: Option<String>,
-    source: Option<String>,
+    pub(super) name: String,
+    pub(super) version: String,
+    pub(super) license: Option<String>,
+    /// None where it is of this project.
+    pub(super) source: Option<String>,
+    pub(super) manifest_path: PathBuf,
 }
 
 #[derive(Deserialize)]
@@ -57,101 +62,174 @@ struct Locked {
     checksum: Option<String>,
 }
 
-/// The document for the program `host-fit` as built for the target `triple`. It has neither a time nor a number of its own:
-/// the same tree gives the same bytes.
-pub(super) fn document(triple: &str) -> Result<String> {
-    let metadata = output(&mut cargo(&[
-        "metadata",
-        "--locked",
-        "--format-version=1",
-        "--filter-platform",
-        triple,
-    ]))?;
-    let metadata: Metadata = serde_json::from_str(&metadata).context("cargo metadata")?;
-    let lock = std::fs::read_to_string(root().join("Cargo.lock")).context("Cargo.lock")?;
-    let lock: Lock = toml::from_str(&lock).context("Cargo.lock")?;
-    Ok(serde_json::to_string_pretty(&bom(&metadata, &lock)?)? + "\n")
+/// The crates that the program is made of on the target `triple`, and the checksums of all.
+pub(super) struct Parts {
+    metadata: Metadata,
+    lock: Lock,
+    pages: Value,
 }
 
-fn bom(metadata: &Metadata, lock: &Lock) -> Result<Value> {
-    let packages: BTreeMap<&str, &Package> = metadata
-        .packages
-        .iter()
-        .map(|one| (one.id.as_str(), one))
-        .collect();
-    let nodes: BTreeMap<&str, &Node> = metadata
-        .resolve
-        .nodes
-        .iter()
-        .map(|node| (node.id.as_str(), node))
-        .collect();
-    let checksums: BTreeMap<(&str, &str), &str> = lock
-        .package
-        .iter()
-        .filter_map(|one| {
-            Some((
-                (one.name.as_str(), one.version.as_str()),
-                one.checksum.as_deref()?,
-            ))
+impl Parts {
+    pub(super) fn new(triple: &str) -> Result<Self> {
+        let metadata = output(&mut cargo(&[
+            "metadata",
+            "--locked",
+            "--format-version=1",
+            "--filter-platform",
+            triple,
+        ]))?;
+        let read = |path: &str| std::fs::read_to_string(root().join(path)).context(path.to_owned());
+        Ok(Self {
+            metadata: serde_json::from_str(&metadata).context("cargo metadata")?,
+            lock: toml::from_str(&read("Cargo.lock")?).context("Cargo.lock")?,
+            pages: serde_json::from_str(&read(PAGES)?).context(PAGES)?,
         })
-        .collect();
-    let program = metadata.packages.iter().find(|one| one.name == "host-fit");
-    let program = program.context("no package `host-fit`")?;
-    let needs = |id: &str| -> BTreeSet<&str> {
-        let edges = nodes.get(id).map_or(&[][..], |node| &node.deps);
+    }
+
+    /// Everything that is reached from the program, by name, without what only tests and builds need.
+    pub(super) fn crates(&self) -> Result<Vec<&Package>> {
+        let program = self.program()?;
+        let (mut reached, mut open) = (BTreeSet::new(), vec![program.id.as_str()]);
+        while let Some(id) = open.pop() {
+            if reached.insert(id) {
+                open.extend(self.needs(id));
+            }
+        }
+        let packages = self.metadata.packages.iter();
+        let mut crates: Vec<&Package> = packages
+            .filter(|one| reached.contains(one.id.as_str()))
+            .collect();
+        ensure!(
+            crates.len() == reached.len(),
+            "cargo metadata lacks packages of its own graph"
+        );
+        crates.sort_by_key(|one| (&one.name, &one.version));
+        Ok(crates)
+    }
+
+    fn program(&self) -> Result<&Package> {
+        let program = self
+            .metadata
+            .packages
+            .iter()
+            .find(|one| one.name == "host-fit");
+        program.context("no package `host-fit`")
+    }
+
+    fn needs(&self, id: &str) -> BTreeSet<&str> {
+        let node = self
+            .metadata
+            .resolve
+            .nodes
+            .iter()
+            .find(|node| node.id == id);
+        let edges = node.map_or(&[][..], |node| &node.deps);
         let part = |edge: &&Edge| edge.dep_kinds.iter().any(|kind| kind.kind.is_none());
         edges
             .iter()
             .filter(part)
             .map(|edge| edge.pkg.as_str())
             .collect()
-    };
-    // Everything that is reached from the program.
-    let (mut reached, mut open) = (BTreeSet::new(), vec![program.id.as_str()]);
-    while let Some(id) = open.pop() {
-        if reached.insert(id) {
-            open.extend(needs(id));
-        }
     }
-    let find = |id: &str| {
-        packages
-            .get(id)
-            .copied()
-            .with_context(|| format!("no package {id}"))
-    };
-    let mut made_of = reached
-        .iter()
-        .map(|id| find(id))
-        .collect::<Result<Vec<_>>>()?;
-    made_of.sort_by_key(|one| (&one.name, &one.version));
-    let mut components = Vec::new();
-    let mut dependencies = Vec::new();
-    for package in made_of {
-        let mut on = needs(&package.id)
-            .into_iter()
-            .map(|id| find(id).map(locator))
-            .collect::<Result<Vec<_>>>()?;
-        on.sort();
-        dependencies.push(json!({ "ref": locator(package), "dependsOn": on }));
-        if package.id != program.id {
-            let checksum = checksums.get(&(package.name.as_str(), package.version.as_str()));
+
+    /// The document. It has neither a time nor a number of its own: the same tree gives the same bytes.
+    pub(super) fn document(&self) -> Result<String> {
+        Ok(serde_json::to_string_pretty(&self.bom()?)? + "\n")
+    }
+
+    fn bom(&self) -> Result<Value> {
+        let (program, crates) = (self.program()?, self.crates()?);
+        let (mut components, mut dependencies) = (Vec::new(), Vec::new());
+        let pages = pages(&self.pages)?;
+        for package in &crates {
+            let needs = self.needs(&package.id);
+            let on = crates.iter().filter(|one| needs.contains(one.id.as_str()));
+            let mut on: Vec<Value> = on.map(|one| locator(one).into()).collect();
+            let is_program = package.id == program.id;
+            if is_program {
+                on.extend(pages.iter().map(|one| one["bom-ref"].clone()));
+            }
+            dependencies.push(json!({ "ref": locator(package), "dependsOn": on }));
+            if is_program {
+                continue;
+            }
+            let is_it = |one: &&Locked| one.name == package.name && one.version == package.version;
+            let checksum = self
+                .lock
+                .package
+                .iter()
+                .find(is_it)
+                .and_then(|one| one.checksum.as_deref());
             ensure!(
                 package.source.is_none() || checksum.is_some(),
                 "Cargo.lock has no checksum of {} {}",
                 package.name,
                 package.version
             );
-            components.push(component(package, "library", checksum.copied())?);
+            components.push(component(package, "library", checksum)?);
         }
+        components.extend(pages);
+        Ok(json!({
+            "bomFormat": "CycloneDX",
+            "specVersion": "1.5",
+            "version": 1,
+            "metadata": { "component": component(program, "application", None)? },
+            "components": components,
+            "dependencies": dependencies,
+        }))
     }
-    Ok(json!({
-        "bomFormat": "CycloneDX",
-        "specVersion": "1.5",
-        "version": 1,
-        "metadata": { "component": component(program, "application", None)? },
-        "components": components,
-        "dependencies": dependencies,
-    }))
+}
+
+/// What the report pages are made of, which the program carries.
+fn pages(lock: &Value) -> Result<Vec<Value>> {
+    let packages = lock["packages"]
+        .as_object()
+        .with_context(|| format!("{PAGES}: no packages"))?;
+    let mut components = Vec::new();
+    for (path, package) in packages {
+        let Some(name) = path.strip_prefix("node_modules/") else {
+            continue;
+        };
+        if package["dev"] == true {
+            continue;
+        }
+        let text = |key: &str| {
+            package[key]
+                .as_str()
+                .with_context(|| format!("{PAGES}: {name} has no {key}"))
+        };
+        let (version, sum) = (text("version")?, text("integrity")?);
+        let sum = sum.strip_prefix("sha512-").and_then(hexadecimal);
+        let locator = format!("pkg:npm/{name}@{version}");
+        components.push(json!({
+            "type": "library",
+            "bom-ref": locator,
+            "name": name,
+            "version": version,
+            "purl": locator,
+            "licenses": [{ "expression": text("license")? }],
+            "hashes": [{ "alg": "SHA-512", "content": sum.with_context(|| format!("{PAGES}: the checksum of {name}"))? }],
+        }));
+    }
+    Ok(components)
+}
+
+/// Base64 as digits of four bits.
+fn hexadecimal(base64: &str) -> Option<String> {
+    const DIGITS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let digits = base64.trim_end_matches('=');
+    let mut bits = String::new();
+    for byte in digits.bytes() {
+        let value = DIGITS.iter().position(|digit| *digit == byte)?;
+        bits.push_str(&format!("{value:06b}"));
+    }
+    let whole = bits.get(..bits.len() / 8 * 8)?;
+    let nibbles = (0..whole.len())
+        .step_by(4)
+        .map(|at| u8::from_str_radix(whole.get(at..at + 4)?, 2).ok());
+    nibbles
+        .map(|nibble| Some(format!("{:x}", nibble?)))
+        .collect()
 }
 
 fn locator(package: &Package) -> String {
@@ -193,7 +271,7 @@ mod tests {
     use super::*;
 
     fn tree(checksum: &str) -> Result<Value> {
-        let package = |name: &str, source: Option<&str>| json!({ "id": name, "name": name, "version": "1.0.0", "license": "MIT/Apache-2.0", "source": source });
+        let package = |name: &str, source: Option<&str>| json!({ "id": name, "name": name, "version": "1.0.0", "license": "MIT/Apache-2.0", "source": source, "manifest_path": "/p" });
         let edge =
             |to: &str, kind: Option<&str>| json!({ "pkg": to, "dep_kinds": [{ "kind": kind }] });
         let metadata = json!({
@@ -209,7 +287,18 @@ mod tests {
             ] },
         });
         let lock = format!("[[package]]\nname = \"far\"\nversion = \"1.0.0\"\n{checksum}");
-        bom(&serde_json::from_value(metadata)?, &toml::from_str(&lock)?)
+        let pages = json!({ "packages": {
+            "": { "license": "MIT" },
+            "node_modules/drawn": { "version": "2.0.0", "license": "MIT", "integrity": "sha512-q80=" },
+            "node_modules/checked": { "version": "3.0.0", "dev": true },
+        } });
+        let metadata = serde_json::from_value(metadata)?;
+        Parts {
+            metadata,
+            lock: toml::from_str(&lock)?,
+            pages,
+        }
+        .bom()
     }
 
     #[test]
@@ -227,11 +316,16 @@ mod tests {
                     "type": "library", "bom-ref": "pkg:cargo/own@1.0.0", "name": "own", "version": "1.0.0",
                     "purl": "pkg:cargo/own@1.0.0", "licenses": [{ "expression": "MIT OR Apache-2.0" }],
                 },
+                {
+                    "type": "library", "bom-ref": "pkg:npm/drawn@2.0.0", "name": "drawn", "version": "2.0.0",
+                    "purl": "pkg:npm/drawn@2.0.0", "licenses": [{ "expression": "MIT" }],
+                    "hashes": [{ "alg": "SHA-512", "content": "abcd" }],
+                },
             ])
         );
         assert_eq!(
             bom["dependencies"][1],
-            json!({ "ref": "pkg:cargo/host-fit@1.0.0", "dependsOn": ["pkg:cargo/own@1.0.0"] })
+            json!({ "ref": "pkg:cargo/host-fit@1.0.0", "dependsOn": ["pkg:cargo/own@1.0.0", "pkg:npm/drawn@2.0.0"] })
         );
     }
 

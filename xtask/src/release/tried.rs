@@ -1,6 +1,6 @@
 //! What was made, as a stranger takes it: unpacked or installed elsewhere, without the project's sources.
 
-use super::{Made, PARTS, SHELLS, TEXTS};
+use super::{Made, NOTICES, PARTS, SHELLS, TEXTS};
 use crate::shell::{command, exists, output, root, run};
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
@@ -90,6 +90,15 @@ pub(super) fn archive(made: &Made) -> Result<()> {
     let parts: Value = serde_json::from_str(&read(&unpacked.join(PARTS))?)?;
     let parts = parts["components"].as_array().map_or(0, Vec::len);
     ensure!(parts > 50, "{PARTS} lists {parts} crates");
+    // Crates that are deep in the tree, and the pages' library.
+    let notices = read(&unpacked.join(NOTICES))?;
+    for part in ["faer ", "serde_core "] {
+        ensure!(notices.contains(part), "{NOTICES} does not name {part}");
+    }
+    let locators = read(&unpacked.join(PARTS))?;
+    for part in ["pkg:cargo/faer@", "pkg:npm/uplot@"] {
+        ensure!(locators.contains(part), "{PARTS} does not list {part}");
+    }
     println!(
         "archive: {} commands with pages and completions, {parts} crates listed",
         commands.len()

@@ -31,6 +31,7 @@ Summary: From recordings of an on/off actuator and a sensor to a model with dela
 License: MIT OR Apache-2.0
 License-File: LICENSE-MIT
 License-File: LICENSE-APACHE
+License-File: THIRD-PARTY.txt
 Requires-Python: >=3.8
 Description-Content-Type: text/markdown
 
@@ -46,7 +47,7 @@ files = {
 }
 for page in sorted((release / "man/man1").iterdir()):
     files[f"{data}/data/share/man/man1/{page.name}"] = page.read_bytes()
-for licence in ["LICENSE-MIT", "LICENSE-APACHE"]:
+for licence in ["LICENSE-MIT", "LICENSE-APACHE", "THIRD-PARTY.txt"]:
     files[f"{info}/licenses/{licence}"] = (release / licence).read_bytes()
 
 record = ""

@@ -91,7 +91,6 @@ EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
 
 EXPORT Status fmi3SetDebugLogging(struct instance *i, bool on, size_t n, const char *const categories[])
 {
-    (void)i, (void)on, (void)n, (void)categories;
     return OK;
 }
 
@@ -99,7 +98,6 @@ EXPORT void *fmi3InstantiateCoSimulation(const char *name, const char *token, co
     bool events, bool early, const uint32_t intermediate[], size_t n, void *environment, Log log, void *update)
 {
     struct instance *i = calloc(1, sizeof *i);
-    (void)name, (void)resources, (void)visible, (void)logging, (void)events, (void)early, (void)intermediate, (void)n, (void)update;
     if (i == NULL) {
         return NULL;
     }
@@ -118,13 +116,12 @@ EXPORT void fmi3FreeInstance(struct instance *i) { free(i); }
 
 EXPORT Status fmi3EnterInitializationMode(struct instance *i, bool tolerant, double tolerance, double start, bool ends, double stop)
 {
-    (void)tolerant, (void)tolerance, (void)ends, (void)stop;
     i->now.start = start;
     return OK;
 }
 
-EXPORT Status fmi3ExitInitializationMode(struct instance *i) { (void)i; return OK; }
-EXPORT Status fmi3Terminate(struct instance *i) { (void)i; return OK; }
+EXPORT Status fmi3ExitInitializationMode(struct instance *i) { return OK; }
+EXPORT Status fmi3Terminate(struct instance *i) { return OK; }
 EXPORT Status fmi3Reset(struct instance *i) { at_start(i); return OK; }
 
 static double now(const struct progress *p) { return p->start + (double)p->samples * PERIOD; }
@@ -164,7 +161,7 @@ EXPORT Status fmi3SetFloat64(struct instance *i, const uint32_t references[], si
     return OK;
 }
 
-EXPORT Status fmi3EnterStepMode(struct instance *i) { (void)i; return OK; }
+EXPORT Status fmi3EnterStepMode(struct instance *i) { return OK; }
 
 EXPORT Status fmi3DoStep(struct instance *i, double point, double size, bool final, bool *event, bool *terminate, bool *early,
     double *last)
@@ -172,7 +169,6 @@ EXPORT Status fmi3DoStep(struct instance *i, double point, double size, bool fin
     const double periods = size / PERIOD;
     const double whole = floor(periods + 0.5);
     double k;
-    (void)point, (void)final;
     *event = *terminate = *early = false;
     *last = now(&i->now);
     if (!(whole >= 1.0 && fabs(periods - whole) <= 1e-6 * whole)) {
@@ -206,7 +202,6 @@ EXPORT Status fmi3SetFMUState(struct instance *i, const void *state)
 
 EXPORT Status fmi3FreeFMUState(struct instance *i, void **state)
 {
-    (void)i;
     free(*state);
     *state = NULL;
     return OK;
@@ -214,7 +209,6 @@ EXPORT Status fmi3FreeFMUState(struct instance *i, void **state)
 
 EXPORT Status fmi3SerializedFMUStateSize(struct instance *i, void *state, size_t *size)
 {
-    (void)state;
     *size = sizeof i->now;
     return OK;
 }
@@ -247,12 +241,10 @@ EXPORT Status fmi3DeserializeFMUState(struct instance *i, const uint8_t bytes[],
 #define NONE(type, get)                                                                                                     \
     EXPORT Status fmi3Get##type(struct instance *i, const uint32_t r[], size_t n, get v[], size_t m)                        \
     {                                                                                                                       \
-        (void)r, (void)v, (void)m;                                                                                          \
         return n == 0 ? OK : refuse(i, "there are no variables of type " #type);                                            \
     }                                                                                                                       \
     EXPORT Status fmi3Set##type(struct instance *i, const uint32_t r[], size_t n, const get v[], size_t m)                  \
     {                                                                                                                       \
-        (void)r, (void)v, (void)m;                                                                                          \
         return n == 0 ? OK : refuse(i, "there are no variables of type " #type);                                            \
     }
 NONE(Float32, float)
@@ -274,7 +266,6 @@ NONE(String, String)
     EXPORT Status fmi3##name(struct instance *i) { return refuse(i, "fmi3" #name " is not provided"); }
 typedef const uint32_t *R;
 typedef const uint8_t *Binary;
-#pragma GCC diagnostic ignored "-Wunused-parameter"
 NOT(GetBinary, R r, size_t n, size_t s[], Binary v[], size_t m)
 NOT(SetBinary, R r, size_t n, const size_t s[], const Binary v[], size_t m)
 NOT(GetClock, R r, size_t n, bool v[])

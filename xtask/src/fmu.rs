@@ -8,74 +8,63 @@ use std::path::Path;
 pub(crate) const TASK: Task = Task {
     name: "fmu",
     does: "validates and simulates the recipe's FMUs with FMPy, which it installs into target/fmpy",
-    run: |arguments| {
-        ensure!(arguments.is_empty(), "there are no options");
-        by_fmpy()
-    },
+    run: by_fmpy,
 };
 
 const FMPY: &str = "fmpy==0.3.32";
 
-/// Models and a record for each: one of the paper, one with a channel and effects of its own, one in volts.
-const CASES: [(&str, &str, &str); 3] = [
-    ("data/paper/table-2-state-dependent.toml", "t,u", "on"),
+/// Models, the columns of a record for each, and its commands of no jet and of a full one.
+const CASES: [(&str, &str, [u8; 2]); 3] = [
+    ("data/paper/table-2-state-dependent.toml", "t,u", [0, 1]),
     (
         "firmware/identified/models/own.toml",
         "t,u,temperature",
-        "on",
+        [0, 1],
     ),
-    ("firmware/identified/models/volts.toml", "t,u", "volts"),
+    ("firmware/identified/models/volts.toml", "t,u", [2, 7]),
 ];
 
-fn by_fmpy() -> Result<()> {
-    let environment = target().join("fmpy");
-    let python = environment.join("bin/python");
-    if !python.is_file() {
+fn by_fmpy(arguments: &[String]) -> Result<()> {
+    ensure!(arguments.is_empty(), "there are no options");
+    let (environment, folder) = (target().join("fmpy"), target().join("fmu"));
+    let python = environment
+        .join("bin/python")
+        .to_string_lossy()
+        .into_owned();
+    if !Path::new(&python).is_file() {
         run(command(crate::setup::python()?, &["-m", "venv"]).arg(&environment))?;
     }
-    let python = python.to_string_lossy().into_owned();
     run(&mut command(
         &python,
         &["-m", "pip", "install", "--quiet", FMPY],
     ))?;
-    let folder = target().join("fmu");
     std::fs::create_dir_all(&folder)?;
     check(&folder, &python, &["--fmpy"])
 }
 
 /// Exports each case into `folder`, makes its FMU, and compares its run with the host's, bit for bit.
 pub(crate) fn check(folder: &Path, python: &str, options: &[&str]) -> Result<()> {
-    for (number, (model, columns, level)) in CASES.into_iter().enumerate() {
-        let file = |name: &str| folder.join(format!("fmu-{number}-{name}"));
-        let (record, host, source, fmu) = (
-            file("in.csv"),
-            file("out.csv"),
-            file("flow.c"),
-            file("flow.fmu"),
-        );
-        std::fs::write(&record, commands(columns, level))?;
-        let mut simulate = program()?;
-        simulate
-            .args(["simulate", model])
-            .arg(&record)
-            .arg("-o")
-            .arg(&host);
-        output(&mut simulate)?;
-        let mut export = program()?;
-        export
-            .args([
-                "codegen",
-                model,
-                "--lang",
-                "c",
-                "--precision",
-                "double",
-                "-o",
-            ])
-            .arg(&source);
-        output(&mut export)?;
+    for (number, (model, columns, levels)) in CASES.into_iter().enumerate() {
+        let [record, host, source, fmu] = ["in.csv", "out.csv", "flow.c", "flow.fmu"]
+            .map(|name| folder.join(format!("fmu-{number}-{name}")));
+        std::fs::write(&record, commands(columns, levels))?;
+        output(
+            program()?
+                .args(["simulate", model, "-o"])
+                .args([&host, &record]),
+        )?;
+        let double = [
+            "codegen",
+            model,
+            "--lang",
+            "c",
+            "--precision",
+            "double",
+            "-o",
+        ];
+        output(program()?.args(double).arg(&source))?;
         let recipe = root().join("examples/fmu/make_fmu.py");
-        let made = output(command(python, &[]).arg(recipe).arg(&source).arg(&fmu))?;
+        let made = output(command(python, &[]).arg(recipe).args([&source, &fmu]))?;
         let script = root().join("xtask/src/fmu.py");
         let mut compare = command(python, &[]);
         compare
@@ -93,21 +82,14 @@ pub(crate) fn check(folder: &Path, python: &str, options: &[&str]) -> Result<()>
 }
 
 /// Pulses of several lengths and a channel that drifts in steps, 4000 samples.
-fn commands(columns: &str, level: &str) -> String {
+fn commands(columns: &str, [off, full]: [u8; 2]) -> String {
     let mut text = format!("{columns}\n");
-    let (off, full) = if level == "volts" {
-        (2.0, 7.0)
-    } else {
-        (0.0, 1.0)
-    };
     for k in 0..4000_u32 {
         let on = (k / 70) % 3 == 0 || k % 900 > 600;
         let u = if on { full } else { off };
-        text.push_str(&format!("{},{u}", f64::from(k) / 1000.0));
-        if columns.ends_with("temperature") {
-            text.push_str(&format!(",{}", 20.0 + f64::from(k / 16) / 64.0));
-        }
-        text.push('\n');
+        let channel = format!(",{}", 20.0 + f64::from(k / 16) / 64.0);
+        let channel = if columns == "t,u" { "" } else { &channel };
+        text.push_str(&format!("{},{u}{channel}\n", f64::from(k) / 1000.0));
     }
     text
 }

@@ -10,7 +10,7 @@ mod rig_port;
 use std::io::Write;
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use commands::{Console, threads};
 use host_fit::data::{memory, visible};
 
@@ -46,6 +46,8 @@ enum Command {
     Watch(commands::watch::Args),
     Codegen(commands::codegen::Args),
     Workbench(commands::workbench::Args),
+    Completions(commands::completions::Args),
+    ManPages(commands::man_pages::Args),
 }
 
 /// Bytes of so many GB.
@@ -79,6 +81,8 @@ fn main() -> ExitCode {
         Command::Watch(args) => commands::watch::run(args, console),
         Command::Codegen(args) => commands::codegen::run(args, console),
         Command::Workbench(args) => commands::workbench::run(args, console),
+        Command::Completions(args) => commands::completions::run(args, Cli::command(), console),
+        Command::ManPages(args) => commands::man_pages::run(args, Cli::command(), console),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -90,5 +94,29 @@ fn main() -> ExitCode {
             );
             ExitCode::FAILURE
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_effect_s_name_may_be_one_that_the_shell_does_not_know() {
+        let line = [
+            "host-fit", "extend", "--effect", "my-own", "m.toml", "set", "-o", "n.toml",
+        ];
+        let cli = Cli::try_parse_from(line).expect("a command line");
+        let Command::Extend(args) = cli.command else {
+            panic!("another command");
+        };
+        assert_eq!(args.effects(), ["my-own"]);
+        // Twenty names would hide what the option is for.
+        let help = Cli::command()
+            .find_subcommand_mut("extend")
+            .expect("the command")
+            .render_long_help()
+            .to_string();
+        assert!(!help.contains("plenum-droop"), "{help}");
     }
 }

@@ -54,11 +54,8 @@ fn in_folder(folder: &Path) -> Result<()> {
         command.args(arguments).current_dir(folder);
         Ok(output(&mut command)?.trim().to_owned())
     };
-    let python = if crate::setup::imports_numpy("python3") {
-        "python3"
-    } else {
-        "/usr/bin/python3"
-    };
+    let python = crate::setup::python()?;
+    crate::fmu::check(folder, python, &[])?;
     let expected = format!("FIT {fit:.2} %");
     for (tool, arguments) in [
         (python, &["free_run.py", "record.csv"][..]),

@@ -17,7 +17,7 @@ pub(crate) const TASK: Task = Task {
 const RIG: &str = "rig";
 
 /// The model files in `firmware/identified/models`, without `.toml`.
-const MODELS: [&str; 5] = ["full", "averaged", "effects", "own", "slow"];
+const MODELS: [&str; 6] = ["full", "averaged", "effects", "own", "slow", "volts"];
 
 pub(crate) fn identified(arguments: &[String]) -> Result<()> {
     let check = match arguments {

@@ -13,15 +13,18 @@ mod elf;
 mod examples;
 mod faults;
 mod firmware;
+mod fmu;
 mod fuzz;
 mod identified;
 mod invariances;
 mod msrv;
 mod new_effect;
 mod nucleo;
+mod package;
 mod pages;
 mod periods;
 mod pil;
+mod release;
 mod rig_day;
 mod setup;
 mod shell;
@@ -49,6 +52,7 @@ const TASKS: &[Task] = &[
     examples::TASK,
     faults::TASK,
     firmware::TASK,
+    fmu::TASK,
     fuzz::TASK,
     campaigns::EFFECTS,
     campaigns::CALIBRATE,
@@ -61,9 +65,11 @@ const TASKS: &[Task] = &[
     msrv::TASK,
     new_effect::TASK,
     nucleo::TASK,
+    package::TASK,
     pages::TASK,
     periods::TASK,
     pil::TASK,
+    release::TASK,
     rig_day::TASK,
     setup::TASK,
     size::TASK,

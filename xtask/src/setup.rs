@@ -12,7 +12,7 @@ use std::process::Command;
 
 pub(crate) const TASK: Task = Task {
     name: "setup",
-    does: "installs the cross targets, QEMU, the C peer's compiler, node, chromium, GCC, NumPy and Octave",
+    does: "installs the cross targets, QEMU, the C peer's compiler, node, chromium, GCC, NumPy, venv and Octave",
     run: setup,
 };
 
@@ -52,7 +52,9 @@ pub(crate) fn setup(_arguments: &[String]) -> Result<()> {
     .filter(|(program, _)| !exists(program))
     .map(|(_, package)| package)
     // No program of its own: asked for as Python would ask for it.
-    .chain((!has_numpy()).then_some("python3-numpy"))
+    .chain(python().is_err().then_some("python3-numpy"))
+    // Makes virtual environments.
+    .chain((!python().is_ok_and(|python| imports(python, "ensurepip"))).then_some("python3-venv"))
     .collect();
     install(&packages)?;
     if core_source().is_none() && exists("rustup") {
@@ -103,13 +105,20 @@ fn install(packages: &[&str]) -> Result<()> {
     run(&mut apt(&arguments))
 }
 
-fn has_numpy() -> bool {
-    imports_numpy("python3") || imports_numpy("/usr/bin/python3")
+/// A Python that has NumPy: the first in the path, or the system's.
+pub(crate) fn python() -> Result<&'static str> {
+    PYTHONS
+        .into_iter()
+        .find(|python| imports(python, "numpy"))
+        .context("no Python has NumPy; run `cargo xtask setup`")
 }
 
-/// Whether a Python has NumPy.
-pub(crate) fn imports_numpy(python: &str) -> bool {
-    output(&mut command(python, &["-c", "import numpy"])).is_ok()
+const PYTHONS: [&str; 2] = ["python3", "/usr/bin/python3"];
+
+fn imports(python: &str, module: &str) -> bool {
+    let import = format!("import {module}");
+    let found = command(python, &["-c", &import]).output();
+    found.is_ok_and(|output| output.status.success())
 }
 
 fn is_root() -> bool {

@@ -26,6 +26,13 @@ pub const JETS: usize = 63;
 pub const CHANNELS: [&str; 0] = [];
 /// Usual values of the channels, in their units.
 pub const REFERENCES: [f32; 0] = [];
+/// The share of a full jet at a command in the unit of the records: 0.0 is no jet, 1.0 a full one.
+///
+/// `Identified` and its state take this share, not the command.
+#[must_use]
+pub fn share(command: f32) -> f32 {
+    command
+}
 /// Past outputs.
 pub type Outputs = model_core::history::DelayLine<f32, OUTPUTS>;
 /// Past jet strengths.

@@ -45,6 +45,26 @@ mod tests {
     decides_what_the_host_decided!(full: law_of_full, effects: law_of_effects, slow: law_of_slow);
 
     #[test]
+    fn commands_have_the_unit_of_the_records() {
+        use super::volts::{REFERENCES, model, share, state};
+        use model_core::model::{Input, step};
+        assert_eq!([2.0, 7.0, 3.25].map(share), [0.0, 1.0, 0.25]);
+        assert_eq!(super::full::share(0.75), 0.75);
+        let model = model();
+        let last = |command: f32| {
+            let mut state = state(&model);
+            let input = Input {
+                command: share(command),
+                channels: &REFERENCES,
+            };
+            (0..2000).fold(0.0, |_, _| step(&model, &mut state, &input).measured)
+        };
+        // Nothing drives the flow without a jet; b/(1 − a − c) is 1.
+        assert_eq!(last(2.0), 0.0);
+        assert!((last(7.0) - 1.0_f32).abs() < 1e-5, "{}", last(7.0));
+    }
+
+    #[test]
     fn pulses_come_as_designed() {
         use super::averaged::{LAW, LAW_GOLDEN};
         use model_core::control::pulses::Played;

@@ -1,7 +1,7 @@
 //! Whether the boards of this project can run a model.
 
 use super::items::{buffer, setting};
-use crate::model::{Law, Model};
+use crate::model::{CommandRange, Law, Model};
 use crate::user_effect::line_lengths;
 use model_core::control::period::{LONGEST_US, SHORTEST_US, loop_period_us};
 use model_core::effect::RustType;
@@ -23,6 +23,17 @@ pub enum BoardError {
          Run `host-fit design` on it and take the file that it writes."
     )]
     NoLaw,
+    /// The jet blows at the lower command, and a board opens the valve with its output on.
+    #[error(
+        "key `command`: a full jet is the lower command ({full:?}, and {off:?} is none), and a board blows with its \
+         output on. Record u the other way round, 1 for a jet, and identify again."
+    )]
+    Inverted {
+        /// The command of no jet.
+        off: f64,
+        /// The command of a full one.
+        full: f64,
+    },
     /// More measured channels than converters.
     #[error(
         "key `effect`: the model's effects need the measured channels {names}, and the board has one \
@@ -75,6 +86,10 @@ pub fn check(model: &Model) -> Result<(), BoardError> {
     let period = model.sample_period_s;
     if loop_period_us(period).is_none() {
         return Err(BoardError::Period { period });
+    }
+    let CommandRange { off, full } = model.command;
+    if full < off {
+        return Err(BoardError::Inverted { off, full });
     }
     let memory = model.memory();
     if memory.channels.len() > 1 {
@@ -194,6 +209,10 @@ mod tests {
             }
         };
         refused(&|model| model.law = None, ["`law`", "host-fit design"]);
+        refused(
+            &|model| (model.command.off, model.command.full) = (1.0, 0.0),
+            ["`command`", "the other way round"],
+        );
         refused(
             &|model| model.sample_period_s = 1.0,
             ["`sample_period_s`", "Identify"],

@@ -3,7 +3,7 @@
 use super::delay::Written;
 use super::pieces::{count, lags, listed, with_units};
 use super::{CodegenError, spec_of};
-use crate::model::{Added, Footprint, Model};
+use crate::model::{Added, CommandRange, Footprint, Model};
 use crate::user_effect::{number, rust_module};
 use model_core::effect::{RustType, Setting};
 use model_core::effects;
@@ -44,6 +44,7 @@ pub(super) fn sizes(model: &Model, memory: &Footprint) -> TokenStream {
     let names = memory.channels.iter().map(|channel| channel.name.as_str());
     let references: Vec<f64> = memory.references();
     let (channels, references) = (count(references.len()), listed(&references));
+    let command = command(model.command);
     quote! {
         /// Sample period, s.
         pub const SAMPLE_PERIOD_S: f32 = #period;
@@ -59,10 +60,44 @@ pub(super) fn sizes(model: &Model, memory: &Footprint) -> TokenStream {
         pub const CHANNELS: [&str; #channels] = [#(#names),*];
         /// Usual values of the channels, in their units.
         pub const REFERENCES: [f32; #channels] = #references;
+        #command
         /// Past outputs.
         pub type Outputs = model_core::history::DelayLine<f32, OUTPUTS>;
         /// Past jet strengths.
         pub type Jets = #kept;
+    }
+}
+
+/// The range of the command, and what becomes of one: the other languages do the same at every step.
+fn command(range: CommandRange) -> TokenStream {
+    let (off, full) = (range.off, range.full);
+    let (off_value, size) = (double(off), double(full - off));
+    let share = if range.is_unit() {
+        quote!(command)
+    } else {
+        quote!(((f64::from(command) - #off_value) / #size) as f32)
+    };
+    let doc = format!(
+        " The share of a full jet at a command in the unit of the records: {off:?} is no jet, {full:?} a full one."
+    );
+    quote! {
+        #[doc = #doc]
+        ///
+        /// `Identified` and its state take this share, not the command.
+        #[must_use]
+        pub fn share(command: f32) -> f32 {
+            #share
+        }
+    }
+}
+
+/// A number in double precision, in brackets where it is negative.
+fn double(value: f64) -> TokenStream {
+    let size = Literal::f64_suffixed(value.abs());
+    if value.is_sign_negative() {
+        quote!((-#size))
+    } else {
+        quote!(#size)
     }
 }
 

@@ -11,6 +11,7 @@
 //! | `IdentifiedState`, `state(&model)` | what it remembers, at rest |
 //! | `Outputs`, `OUTPUTS`, `Jets`, `JETS` | its memories and their lengths, samples |
 //! | `CHANNELS`, `REFERENCES` | measured channels, and what they usually are |
+//! | `share(command)` | the share of a full jet, which the model takes, at a command of the records |
 //! | `SAMPLE_PERIOD_S`, `WINDOW`, `READINGS` | period, averaging window, readings to average |
 //! | `Law`, `LAW`, `LOOK_AHEAD` | the designed law; `()` for none |
 //! | `CHECKSUM`, `GOLDEN`, `LAW_GOLDEN` | what a board checks before it trusts them |
@@ -248,7 +249,7 @@ fn header_lines(model: &Model) -> Vec<String> {
     if !model.command.is_unit() {
         let range = model.command;
         line(format!(
-            "- command: {:?} is no jet, {:?} a full one; in Rust the model is given the share of a full jet",
+            "- command: {:?} is no jet, {:?} a full one; in Rust the model takes `share(command)`",
             range.off, range.full
         ));
     }
@@ -306,6 +307,7 @@ fn golden(model: &Model, memory: &Footprint) -> Result<TokenStream, CodegenError
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::CommandRange;
     use model_core::effect::Place;
 
     fn with_effects(extra: &str) -> Model {
@@ -340,6 +342,30 @@ mod tests {
             model.add(spec, &values, Some(1.0));
             let text = generate(&model).expect(spec.name);
             assert!(text.contains(&format!("/// {}.\n", spec.name)), "{text}");
+        }
+    }
+
+    #[test]
+    fn commands_of_any_range_become_shares() {
+        let text = |off, full| {
+            let mut model = with_effects("");
+            model.command = CommandRange { off, full };
+            generate(&model).expect("constants")
+        };
+        for (range, share) in [
+            ((0.0, 1.0), "f32 {\n    command\n}"),
+            ((2.0, 7.0), "((f64::from(command) - 2f64) / 5f64) as f32\n}"),
+            (
+                (1.0, 0.0),
+                "((f64::from(command) - 1f64) / (-1f64)) as f32\n}",
+            ),
+            (
+                (-0.5, 0.25),
+                "((f64::from(command) - (-0.5f64)) / 0.75f64) as f32\n}",
+            ),
+        ] {
+            let text = text(range.0, range.1);
+            assert!(text.contains(share), "{range:?}: {text}");
         }
     }
 

@@ -20,7 +20,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     period: f64,
     /// Folder for the data set (dataset.toml and one CSV per recording).
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_hint = clap::ValueHint::DirPath)]
     out: PathBuf,
     /// Time after the first row at which the first period starts; best while the flow is at rest.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = not_negative)]

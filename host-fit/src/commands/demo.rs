@@ -34,7 +34,7 @@ use super::words::aligned;
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Folder for the report, the pictures, the models and the data.
-    #[arg(long, value_name = "DIR", default_value = "out/demo")]
+    #[arg(long, value_name = "DIR", default_value = "out/demo", value_hint = clap::ValueHint::DirPath)]
     out: PathBuf,
 }
 
@@ -42,7 +42,7 @@ macro_rules! bundled {
     ($folder:literal, $file:literal) => {
         (
             concat!($folder, "/", $file),
-            include_str!(concat!("../../../data/", $folder, "/", $file)),
+            include_str!(concat!("../../data/", $folder, "/", $file)),
         )
     };
 }
@@ -68,7 +68,7 @@ const FILES: [(&str, &str); 16] = [
 ];
 
 /// What really made the hidden set; only the loop is run on it.
-const ANSWER: &str = include_str!("../../../data/hidden-ramp/answer.toml");
+const ANSWER: &str = include_str!("../../data/hidden-ramp/answer.toml");
 /// What no effect of the catalogue does, hidden in a rig of this seed, and the folder of its recordings.
 const BEYOND: (&str, u64, &str) = ("tiring-jet", 4, "tiring-ramp");
 /// Friction to hold in the loop (y), about 0.8 of steady blowing.

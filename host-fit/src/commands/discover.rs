@@ -9,6 +9,7 @@ use host_fit::output::write_atomic;
 use host_fit::steps;
 
 use super::effect_files::EffectFiles;
+use super::effect_names::EffectName;
 use super::load::ModelAndData;
 use super::{Console, page};
 
@@ -39,7 +40,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "COUNT", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=6))]
     terms: u32,
     /// Leave this effect of the catalogue out of the comparison (repeatable).
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = EffectName, hide_possible_values = true)]
     without: Vec<String>,
     /// Accepted for scripts that seed every command; this one draws no random numbers.
     #[arg(long, default_value_t = 0)]

@@ -5,6 +5,7 @@ use host_fit::extend::nearest_name;
 use host_fit::steps::{base_terms, catalogue};
 
 use super::Console;
+use super::effect_names::EffectName;
 use super::words::{Words, effect_table};
 
 /// Base terms that are lags of the recursion and have no card.
@@ -15,7 +16,7 @@ const FLOW_TERMS: &str = "flow-lag         flow   a second lag in series: T2Â·qÌ
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Only this effect, with its equation and parameters.
-    #[arg(value_name = "NAME")]
+    #[arg(value_name = "NAME", value_parser = EffectName, hide_possible_values = true)]
     name: Option<String>,
 }
 

@@ -7,6 +7,7 @@ use host_fit::output::write_atomic;
 use host_fit::steps;
 
 use super::effect_files::EffectFiles;
+use super::effect_names::EffectName;
 use super::load::{ModelAndData, shell_word};
 use super::{Console, page};
 
@@ -16,7 +17,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     from: ModelAndData,
     /// Effect to add, by its name in `host-fit effects` or in an effect file; repeatable.
-    #[arg(long, value_name = "NAME", required = true)]
+    #[arg(long, value_name = "NAME", required = true, value_parser = EffectName, hide_possible_values = true)]
     effect: Vec<String>,
     /// File for the new model.
     #[arg(short, long, value_name = "new.toml")]
@@ -30,7 +31,7 @@ pub(crate) struct Args {
 
 impl Args {
     /// The effects to add.
-    pub(super) fn effects(&self) -> &[String] {
+    pub(crate) fn effects(&self) -> &[String] {
         &self.effect
     }
 

@@ -11,6 +11,7 @@ use host_fit::steps::{self, DelayKind, IdentifyRequest};
 use model_core::recursion::LagConvention;
 
 use super::effect_files::EffectFiles;
+use super::effect_names::EffectName;
 use super::load::shell_word;
 use super::time_span::{NotATime, TimeSpan};
 use super::{Console, page};
@@ -85,7 +86,7 @@ struct Request {
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Physical effect to add once the base model is there; repeatable.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = EffectName, hide_possible_values = true)]
     effect: Vec<String>,
     #[command(flatten)]
     effect_files: EffectFiles,

@@ -124,6 +124,20 @@ const STEPS: &[Step] = &[
         room: None,
         run: crate::supply::supply,
     },
+    // Every crate can be published.
+    Step {
+        name: "package",
+        after: &[BUILD],
+        room: Some(Room::Host),
+        run: || (crate::package::TASK.run)(&[]),
+    },
+    // What is handed to people without a compiler: archive and wheel, installed elsewhere.
+    Step {
+        name: "release",
+        after: &[SET_UP, BUILD],
+        room: None,
+        run: || crate::release::release(&[]),
+    },
     // An effect and a delay law are one file and one line each.
     Step {
         name: "new effect",

@@ -153,7 +153,8 @@ fn copy_tree(from: &Path, to: &Path) -> Result<()> {
     fs::create_dir_all(to)?;
     for entry in fs::read_dir(from)? {
         let entry = entry?;
-        let (name, kind) = (entry.file_name(), entry.file_type()?);
+        // What a link leads to: the program's data is linked into its package.
+        let (name, kind) = (entry.file_name(), fs::metadata(entry.path())?);
         let skipped = name.to_string_lossy().starts_with('.') && name != ".cargo";
         if skipped || entry.path() == target() || name == "target" {
             continue;

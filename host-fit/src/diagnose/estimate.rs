@@ -91,6 +91,17 @@ pub(super) fn is_identified(fit: &Fit, spec: &Spec) -> bool {
     })
 }
 
+/// Whether the amplitude of an effect in a fit is known from 0; `true` where its card has no amplitude that is linear.
+pub(super) fn is_there(fit: &Fit, spec: &Spec) -> bool {
+    let values = fit.model.values();
+    let amplitude = spec.amplitude.filter(|amplitude| amplitude.linear);
+    own(&fit.model, spec).into_iter().all(|(index, card)| {
+        let half = DEVIATES * fit.standard_error(index).unwrap_or(0.0);
+        amplitude.is_none_or(|amplitude| amplitude.parameter != card.name)
+            || values[index].abs() > half
+    })
+}
+
 /// An effect's parameters and where they stand among the coordinates of a model.
 fn own(model: &Model, spec: &Spec) -> Vec<(usize, &'static Parameter)> {
     let coordinates = model.coordinates();

@@ -1,6 +1,6 @@
 //! Whether anything is missing, and whether it has earned to be named.
 
-use super::estimate::is_identified;
+use super::estimate::{is_identified, is_there};
 use super::memory::memory;
 use super::outcome::Conclusion;
 use super::ranking::{Rival, not_tried, ranked, screened};
@@ -187,6 +187,7 @@ impl Session<'_> {
         let is_worthwhile = with < (1.0 - worthwhile) * without;
         if open
             && with < without
+            && self.all_are_there(best)
             && let Some(p) = self.more_than_chance(best, bare)
         {
             // Beside a base that fits, parameters that are not identified have to be certified.
@@ -210,6 +211,13 @@ impl Session<'_> {
         let end = self.judge().final_fit(&best.judged);
         let mut effects = best.terms.iter().filter_map(Term::effect);
         effects.all(|spec| is_identified(&end, spec))
+    }
+
+    /// Whether no effect's 95 % interval of its amplitude holds 0.
+    fn all_are_there(&self, best: &Hypothesis) -> bool {
+        let end = self.judge().final_fit(&best.judged);
+        let mut effects = best.terms.iter().filter_map(Term::effect);
+        effects.all(|spec| is_there(&end, spec))
     }
 
     /// Whether neither the noise is known nor anything shows that a base errs.

@@ -216,7 +216,6 @@ fn the_motors_two_time_constants_are_in_the_base_class() {
 
 /// A dead time and a lag, which the linear model has: the control set.
 #[test]
-#[ignore = "valve-lag (or flow-lag) is named at p 0.005 for its second order; open"]
 fn the_hair_dryer_lacks_nothing() {
     let Some((train, test)) = halves(
         "hair_dryer/hair_dryer_train.csv",

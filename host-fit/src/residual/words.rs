@@ -1,4 +1,4 @@
-//! The split of an error, read out in plain language.
+//! The split of an error in sentences.
 
 use super::coordinate::FailureCoordinate;
 use super::rules::RULES;
@@ -51,7 +51,7 @@ impl Failures {
     }
 }
 
-/// What one coordinate says.
+/// The sentence about one coordinate.
 fn sentence(found: &Where) -> String {
     let explained = percent(found.explained_fraction);
     let coordinate = &found.coordinate;
@@ -110,7 +110,7 @@ fn percent(fraction: f64) -> String {
     format!("{:.0} %", 100.0 * fraction.clamp(0.0, 1.0))
 }
 
-/// A share in words where it has a name.
+/// A share, as a common fraction in words where possible.
 fn quarters(share: f64) -> String {
     if (0.72..0.80).contains(&share) {
         "Three quarters".to_owned()

@@ -1,4 +1,4 @@
-//! Whether the delay depends on anything.
+//! The verdict: whether the delay depends on anything.
 
 /// What the measured delays depend on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

@@ -130,7 +130,7 @@ pub fn check_period(model: &Model) -> Result<(), DesignError> {
     }
 }
 
-/// Refuses models that no law can be designed from.
+/// Rejects models from which no law can be designed.
 pub(super) fn check(model: &Model) -> Result<(), DesignError> {
     check_period(model)?;
     if model.start == Start::Measured {

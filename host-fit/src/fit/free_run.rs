@@ -1,6 +1,5 @@
-//! Fits of a model's free run, ε of eq. (9): exact sensitivities of everything smooth
-//! by dual numbers, secants for what acts in steps, and standard errors that allow for
-//! correlated residuals.
+//! Fits to the free-run error ε of eq. (9): exact sensitivities by dual numbers for smooth parameters,
+//! secants for parameters that act in steps, and standard errors robust to correlated residuals.
 
 use super::covariance::{covariance, product};
 use super::level_scatter::LevelScatter;
@@ -15,12 +14,12 @@ use model_core::effect::Sign;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
-/// Derivatives carried by one run: eight …
+/// Derivatives per run.
 const FEW: usize = 8;
-/// … or all that are left, if that is no more than twelve.
+/// The last run carries all remaining derivatives, if they are at most this many.
 const MANY: usize = 12;
 
-/// How to fit.
+/// Options of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitOptions {
     /// Most iterations.
@@ -29,11 +28,11 @@ pub struct FitOptions {
     pub tolerance: f64,
     /// Whether the constant d may differ from 0.
     pub constant: bool,
-    /// Whether coefficients a, b, c and d move.
+    /// Whether the coefficients a, b, c and d are free.
     pub linear: bool,
-    /// Whether the delay law moves.
+    /// Whether the delay law is free.
     pub delay: bool,
-    /// How the level of a record scatters, where that is known: errors along y count for less then.
+    /// Scatter of a record's level, if known: errors along y then have less weight.
     pub level_scatter: Option<LevelScatter>,
 }
 
@@ -50,16 +49,16 @@ impl Default for FitOptions {
     }
 }
 
-/// What a fit gives.
+/// Result of a fit.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The model with its fitted parameters.
     pub model: Model,
-    /// Σ (y − y_sim)² over the records, errors along y weighed by how the level scatters.
+    /// Σ (y − y_sim)² over the records, errors along y weighted by the scatter of the level.
     pub sum_of_squares: f64,
-    /// Samples that were judged.
+    /// Number of scored samples.
     pub samples: usize,
-    /// Indices of the coordinates that moved.
+    /// Indices of the free coordinates.
     pub free: Vec<usize>,
     /// Covariance of the free coordinates, robust to correlated residuals and few records: ±1.96 standard
     /// errors is a 95 % interval. Row-major; NaN on the diagonal for coordinates that are not identifiable.

@@ -51,28 +51,30 @@ rules! {
     order_one_high: f64 = 3.0, "", "judgement: friction gains lie between";
     /// An input above this share of its maximum is strong: y/u is then near its steady value.
     strong_input: f64 = 0.5, "share of the largest |u|", "judgement";
-    /// The percentile of y/u under a strong input that is taken for that level.
+    /// The percentile of y/u under a strong input that is taken as the steady value.
     settled_percentile: usize = 95, "%", "judgement: what is above is noise";
 
-    /// Scatter of the level between repeats is looked for in so many records …
+    /// Scatter of the level between repeats is estimated from at least so many records.
     records_of_scatter: usize = 3, "records", "judgement: from fewer nobody can say whether it differs between them";
-    /// … it counts where it is this share of the noise …
+    /// Scatter of the level counts if it is at least this share of the noise.
     share_of_scatter: f64 = 0.05, "share of the variance", "judgement: below it, it matters nowhere";
-    /// … and differs so much from record to record: noise that is louder at a high level does not.
+    /// Scatter of the level must vary between records by this much; noise that is stronger at a high level
+    /// does not.
     scatter_differs: f64 = 0.12, "share of its mean", "20 repeats: 0.3; 10 000 samples of noise with 40 ms: 0.03";
-    /// Noise beside it is at least this share of the variance.
+    /// The remaining noise is at least this share of the variance.
     noise_beside_scatter: f64 = 0.1, "share of the variance", "judgement: a standard error of 20 repeats is off by a sixth";
-    /// That noise is correlated over so many samples.
+    /// Correlation length assumed for the remaining noise.
     correlated: f64 = 40.0, "samples", "a hot film's at 1 kHz; four times as many double what is left along y";
 
-    /// A lean model with effects is kept when its error is within this factor of the given structure's.
+    /// A lowest-order model with effects is kept if its error is within this factor of the given structure's.
     as_good: f64 = 1.02, "times the rms error", "judgement";
 
-    /// Runs that a record of a drifting rig is cut into.
+    /// Number of runs that a record of a drifting plant is divided into.
     pieces: usize = 20, "", "judgement; EMPS in docs/hidden-effects.md";
-    /// A piece is at least so many times the longest lag or delay, and follows the measurement for one part in so many
-    /// before it is scored.
+    /// A piece is at least this multiple of the longest lag or delay, and one part in so many precedes
+    /// scoring.
     memories: usize = 8, "", "judgement";
-    /// A rig drifts when more than this of what happened is left after a whole record.
+    /// A plant counts as drifting if more than this share of an initial disturbance remains after a whole
+    /// record.
     drifts: f64 = 0.37, "share", "judgement; held by `an_integrator_drifts_and_a_damped_rig_does_not`";
 }

@@ -119,7 +119,7 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
     if !nuisances.is_empty() {
         let names: Vec<&str> = nuisances.iter().map(|added| added.name.as_str()).collect();
         left_out.push(format!(
-            "stressed on plants without {}: their flow is of first order",
+            "stress trials use plants without {}: their flow is of first order",
             names.join(", ")
         ));
     }
@@ -127,7 +127,7 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
         match physical_effect(&added.name, &added.parameters) {
             Ok(effect) => effects.push(effect),
             Err(error) => left_out.push(format!(
-                "stressed on plants without {}, which the simulator does not have so: {error:#}",
+                "stress trials use plants without {}, which the simulator cannot represent: {error:#}",
                 added.name
             )),
         }

@@ -191,11 +191,11 @@ impl Detector<'_> {
         };
         let words = match amplitude {
             Some(_) => format!(
-                "{} above {} {unit} would have been seen",
+                "{} above {} {unit} would have been detected",
                 card.words,
                 significant(value, 2)
             ),
-            None => format!("{} of any size could have stayed unseen", card.words),
+            None => format!("{} is not detectable at any size", card.words),
         };
         Some(Detectable {
             effect: spec.name.to_owned(),

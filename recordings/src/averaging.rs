@@ -68,8 +68,8 @@ impl Defect {
             Self::UnreadableValue => "a value is missing or not a finite number",
             Self::UnevenTime => "the time step is off the sampling grid",
             Self::CommandNotOnOff => "the command is neither 0 nor 1",
-            Self::NoAnchorEdge => "no rising edge where the period puts it",
-            Self::OtherCommand => "another command sequence than most periods",
+            Self::NoAnchorEdge => "no rising edge at the expected time",
+            Self::OtherCommand => "command sequence differs from most periods",
             Self::Restart => "time goes back",
         }
     }

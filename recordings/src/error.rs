@@ -195,7 +195,7 @@ pub enum DataProblem {
         found: String,
     },
     /// The same name twice.
-    #[error("this column name stands twice in the header; rename or remove one of the two")]
+    #[error("this column name occurs twice in the header; rename or remove one of the two")]
     DoubledColumn,
     /// An empty name in the header.
     #[error("column {0} has no name in the header; name it or remove it")]
@@ -284,7 +284,7 @@ pub enum DataProblem {
     },
     /// A time that cannot be in seconds.
     #[error(
-        "t = {0} is no time in seconds; if it is a Unix time in ms, µs or ns, make a data set of the file with `host-fit import FILE -o DIR`"
+        "t = {0} is not a time in seconds; if it is a Unix time in ms, µs or ns, make a data set of the file with `host-fit import FILE -o DIR`"
     )]
     NotSeconds(f64),
     /// A file of another program where a data set is asked for.
@@ -304,7 +304,8 @@ pub enum DataProblem {
     BadPeriod(f64),
     /// Times so late that double precision cannot tell samples apart.
     #[error(
-        "at t = {time} s numbers cannot tell samples apart that are {period} s apart; write the times from the beginning of the record"
+        "at t = {time} s double precision cannot resolve samples {period} s apart; count time from the \
+        beginning of the record"
     )]
     LateTimes {
         /// The latest time, s.

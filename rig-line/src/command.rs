@@ -30,7 +30,7 @@ impl Command {
         if let Some(k) = file.u.iter().position(|u| *u != 0.0 && *u != 1.0) {
             return Err(LineError::Command {
                 command: file.place(Some(k)).in_column("u").to_string(),
-                reason: "the valve knows 0 and 1 only; play an on/off command".into(),
+                reason: "the valve accepts 0 and 1 only; play an on/off command".into(),
             });
         }
         let levels = file.u.iter().map(|u| *u == 1.0);

@@ -23,7 +23,7 @@ pub enum LineError {
     #[error("{0} is in use by another program; a board listens to one host at a time")]
     InUse(String),
     /// Nothing comes any more.
-    #[error("the line to the board has gone ({0})")]
+    #[error("the connection to the board is lost ({0})")]
     Gone(String),
     /// No answer.
     #[error(
@@ -32,7 +32,7 @@ pub enum LineError {
     Silent(&'static str),
     /// Host and board speak different versions.
     #[error(
-        "the board speaks version {board} of the dialogue and this program version {host}; build the firmware anew with \
+        "the board speaks version {board} of the protocol and this program version {host}; build the firmware anew with \
          `cargo xtask firmware`"
     )]
     Version {
@@ -43,12 +43,13 @@ pub enum LineError {
     },
     /// The board's constants are none.
     #[error(
-        "the board says that it has {0}, which cannot be; build the firmware anew with `cargo xtask firmware`"
+        "the board reports {0}, which is impossible; build the firmware anew with `cargo xtask firmware`"
     )]
     Constants(String),
     /// After a broken link somebody else answers.
     #[error(
-        "after the link was broken a board with other firmware or constants answered; what was whole until then is kept"
+        "after the link was broken a board with other firmware or constants answered; complete repeats until \
+        then are kept"
     )]
     AnotherBoard,
     /// Nothing of a recording came whole.

@@ -49,7 +49,7 @@ pub fn word(phase: Phase) -> &'static str {
         Phase::Faulted(number) => FAULTS
             .get(usize::from(number))
             .copied()
-            .unwrap_or("a fault that this program does not know"),
+            .unwrap_or("an unknown fault"),
     }
 }
 
@@ -420,7 +420,9 @@ fn reason(status: Status, detail: u32) -> String {
             "run {detail} (counted from 0, the first one shut) is shorter than the valve's hold time in the board's rig \
              constants; lengthen it"
         ),
-        Status::OtherCommand => "what it has is not what is to be played; start again".into(),
+        Status::OtherCommand => {
+            "the command on the board differs from the one to play; start again".into()
+        }
         Status::Nothing => "there is nothing to play, or more samples than 32 bits count".into(),
         Status::NotDisarmed => match Phase::from_byte(detail as u8) {
             Some(Phase::Faulted(number)) => format!(

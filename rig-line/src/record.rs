@@ -178,7 +178,7 @@ pub fn record(
         };
         let cut = cut.or_else(|| {
             (fruitless >= FRUITLESS).then(|| {
-                format!("{FRUITLESS} times no repeat came whole; see to the line, or play shorter commands")
+                format!("no complete repeat in {FRUITLESS} attempts; check the connection, or play shorter commands")
             })
         });
         if session.recording.whole < repeats {
@@ -205,7 +205,7 @@ fn fits(command: &Command, board: &Info) -> Result<(), LineError> {
     }
     if board.period_us < 400 {
         return Err(refused(format!(
-            "the board samples every {period} s, and the line takes every sample only from 0.0004 s on"
+            "the board samples every {period} s, and the line transmits every sample only from 0.0004 s on"
         )));
     }
     if command.samples() > MOST_SAMPLES {
@@ -269,7 +269,7 @@ impl Session<'_, '_> {
                     if taken.next != progressed.0 {
                         progressed = (taken.next, Instant::now());
                     } else if progressed.1.elapsed() > NO_PROGRESS {
-                        return Ok(End::Broken("the same samples come again and again".into()));
+                        return Ok(End::Broken("the board repeats the same samples".into()));
                     }
                     if u64::from(taken.next) > total {
                         return Ok(End::Broken(

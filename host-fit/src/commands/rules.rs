@@ -20,7 +20,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     if let Some(room) = &args.room {
         anyhow::ensure!(
             rooms.contains(&room.as_str()),
-            "there is no room `{}` with rules; the rooms are: {}",
+            "there is no group `{}` of rules; the groups are: {}",
             room.escape_debug(),
             rooms.join(", ")
         );

@@ -91,13 +91,11 @@ impl Words for Watched {
 fn judged(verdict: &Verdict) -> String {
     match verdict {
         Verdict::Learning { blocks_left } => {
-            format!(
-                "the model is not judged yet: {blocks_left} blocks are missing that say what is usual"
-            )
+            format!("the model is not checked yet: the baseline needs {blocks_left} more blocks")
         }
         Verdict::True { largest, threshold } => format!(
-            "the model is as true as it was: no block was further off than {largest:.1} standard deviations ({threshold:.1} \
-             would be an alarm)"
+            "the model still fits: the largest deviation of a block is {largest:.1} standard deviations \
+            (alarm at {threshold:.1})"
         ),
         Verdict::Stopped {
             at_s,
@@ -106,8 +104,8 @@ fn judged(verdict: &Verdict) -> String {
             distance,
             threshold,
         } => format!(
-            "THE MODEL HAS STOPPED BEING TRUE at {at_s:.1} s: the residual went from {usual:.4} to {residual:.4}, {:.1} \
-             standard deviations ({threshold:.1} are an alarm); `compare` and `diagnose` read the log",
+            "MODEL NO LONGER FITS at {at_s:.1} s: the residual went from {usual:.4} to {residual:.4}, {:.1} \
+             standard deviations (alarm at {threshold:.1}); check the log with `compare` and `diagnose`",
             distance.abs()
         ),
     }
@@ -148,7 +146,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
             let state = match now.verdict {
                 Verdict::Learning { .. } => "learning",
                 Verdict::True { .. } => "true",
-                Verdict::Stopped { .. } => "STOPPED BEING TRUE",
+                Verdict::Stopped { .. } => "NO LONGER FITS",
             };
             bar.set_message(format!(
                 "{:8.1} s  {}  y {:6.3}{}{}  valve {}  lost {}  model: {state}",
@@ -168,7 +166,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let written: Vec<_> = written.iter().map(PathBuf::as_path).collect();
     console.show(&watched, &[], &written)?;
     console.say(&format!(
-        "chance of a false alarm in {} h: {}",
+        "probability of a false alarm in {} h: {}",
         DAY_S / 3600.0,
         plan.test.false_alarms_per_day
     ))?;

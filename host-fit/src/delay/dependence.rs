@@ -215,7 +215,8 @@ pub(super) fn words(
     };
     match verdict {
         DelayVerdict::TooFewEdges => format!(
-            "{} edge(s) of the identify records could be measured; at least {} are needed to say whether the delay depends on the flow. Use a fixed delay, or record more switching.",
+            "{} edge(s) of the identify records could be measured; at least {} are needed to test whether \
+            the delay depends on y. Use a fixed delay, or record more switching.",
             all.count, RULES.tested_edges
         ),
         DelayVerdict::Fixed => format!(
@@ -224,7 +225,8 @@ pub(super) fn words(
                 Some(reason) if tests.law.is_some_and(|p| p < RULES.significant) =>
                     reason.to_owned(),
                 _ => format!(
-                    "over the range of the averaged output the delay changes by {:.1} samples (p {}), no more than chance or rounding",
+                    "over the range of the averaged output the delay changes by {:.1} samples (p {}), not \
+                    significant, or below one sample",
                     tests.change.abs(),
                     p(tests.law)
                 ),
@@ -234,7 +236,8 @@ pub(super) fn words(
             all.sd
         ),
         DelayVerdict::EdgeDependent => format!(
-            "The law is not supported by these data: what differs is the direction of the edge, {:.1} samples after rising against {:.1} after falling edges, and beyond that the averaged output explains nothing (p {}). Try the effect `edge-dependent-delay`.",
+            "The law is not supported by these data: the delay depends on the direction of the edge ({:.1} \
+            samples after rising, {:.1} after falling edges) and not on the averaged output (p {}). Try the effect `edge-dependent-delay`.",
             up.mean,
             down.mean,
             p(tests.law_within)

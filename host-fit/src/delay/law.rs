@@ -121,12 +121,13 @@ impl DelayLawFit {
         let range = format!("ỹ from {:.3} to {:.3}", self.range.0, self.range.1);
         if least.is_nan() || least < 0.0 {
             return Some(format!(
-                "it is {least:.1} samples at an ỹ of these data, and a delay cannot be below 0"
+                "it is {least:.1} samples at a ỹ within these data, and a delay cannot be negative"
             ));
         }
         if most > longest {
             return Some(format!(
-                "it is {most:.3e} samples at an ỹ of these data, and delays up to {longest:.0} were looked for"
+                "it is {most:.3e} samples at a ỹ within these data, and delays were searched up to \
+                {longest:.0}"
             ));
         }
         let error = self.quantile * standard_error;
@@ -135,17 +136,17 @@ impl DelayLawFit {
             return Some(if standard_error.is_finite() {
                 format!("it changes by {change:.1} ± {standard_error:.1} samples over {range}")
             } else {
-                format!("its change of {change:.1} samples over {range} is not determined")
+                format!("its change of {change:.1} samples over {range} is not identifiable")
             });
         }
         match verdict {
             DelayVerdict::StateDependent | DelayVerdict::EdgeAndStateDependent => None,
             DelayVerdict::Fixed => Some(format!(
-                "a constant describes the delays as well over {range} (permutation test)"
+                "a constant delay fits equally well over {range} (permutation test)"
             )),
-            DelayVerdict::EdgeDependent => Some(
-                "one delay for each direction of the edge describes the delays as well".to_owned(),
-            ),
+            DelayVerdict::EdgeDependent => {
+                Some("one delay per edge direction fits equally well".to_owned())
+            }
             DelayVerdict::TooFewEdges => Some(format!(
                 "{} edges are too few to test it against a constant",
                 self.edges

@@ -40,7 +40,7 @@ impl Unmeasured {
         match self {
             Self::CutOff => "cut off by the next edge or the end of the record",
             Self::BelowNoise => "no response above the noise",
-            Self::Blurred => "start of the response blurred by the noise",
+            Self::Blurred => "start of the response too uncertain because of the noise",
         }
     }
 }

@@ -98,48 +98,50 @@ rules! {
     sizes: usize = 9, "", "judgement: six doublings, three halvings";
     /// White sensor noise in trials on the model.
     white_noise: f64 = 0.03, "y, friction of order one", "a hot film";
-    /// … and with one …
+    /// Coloured sensor noise in trials on the model.
     coloured_noise: f64 = 0.035, "y, friction of order one", "a hot film";
-    /// … of this length.
+    /// Correlation time of that noise.
     noise_memory: f64 = 20.0, "samples", "a hot film at 1 kHz: 20 ms";
 
-    /// Targets that are tried where the wished one does not pass divide what can be reached into so many parts.
+    /// If the target does not pass, this many equal parts of the reachable interval are tried as
+    /// alternatives.
     targets: u32 = 10, "", "judgement: 10 to 90 % of the interval";
 
-    /// A law works on a flow if attachment is kept and the rms error is no more than this …
+    /// A law works on a plant if attachment is kept and the rms error is at most this.
     margin_rms: f64 = 2.0, "times that on the model", "convention";
-    /// … over so many runs with noise of their own …
+    /// Runs with different noise per plant of the margin.
     margin_runs: u32 = 2, "runs", "judgement: for the time it takes";
-    /// … of this length …
+    /// Length of a run for the margin.
     margin_run: usize = 6000, "samples", "judgement";
-    /// … counted from here on.
+    /// Start of the scored part of such a run.
     margin_from: usize = 2000, "samples", "judgement: the start is over";
-    /// Delay, gain and time constants are wrong by this factor at most.
+    /// Largest factor on delay, gain and time constants that is searched.
     margin_reach: f64 = 4.0, "", "judgement";
-    /// Rays in each plane of two errors, a multiple of four …
+    /// Rays in each plane of two errors, a multiple of four.
     margin_rays: u32 = 12, "", "judgement: for the time it takes";
-    /// … and halvings along each.
+    /// Bisections along each ray.
     margin_bisections: u32 = 5, "", "to 4 % of a factor of 4 either way";
 
-    /// Pulse trains are played for this while they are compared …
+    /// Transient of a pulse train that is not scored in the first comparison.
     train_from: usize = 3000, "samples", "judgement";
-    /// … and judged over this at least.
+    /// Least scored length in the first comparison.
     train_judged: usize = 5000, "samples", "judgement";
-    /// The best ones are judged from here on, for as long …
+    /// Start of the scored part of a long run, which lasts as long again.
     long_from: usize = 20_000, "samples", "20 s to 40 s at 1 kHz";
-    /// … and must do the same until here.
+    /// End of a long run, at which the motion must be unchanged.
     long_until: usize = 240_000, "samples", "four minutes at 1 kHz";
-    /// A mean further than this from the judged one is another motion …
+    /// A mean that differs from the scored one by more than this is another motion.
     same_mean: f64 = 0.05, "share of the mean", "judgement";
-    /// … and so is one whose range goes further than half of itself beyond the judged one, or than this.
+    /// A range that exceeds the scored one by more than half of itself, or by more than this, is another
+    /// motion.
     same_range: f64 = 0.25, "y", "judgement";
-    /// An optimum is worth what is left of it on a flow that is slower or faster by one in so many samples.
+    /// The value of an optimum is that on a flow slower or faster by one in so many samples.
     detuned: u32 = 50, "samples", "judgement: a resonance sharper than 2 % does not survive on a rig";
     /// Longest period of a pulse train.
     longest_period: usize = 3000, "samples", "six times the longest lag of an identification";
-    /// Periods of the first grid of pulse trains …
+    /// Periods of the first grid of pulse trains.
     periods: u32 = 72, "", "a grid in steps of 7 % over two decades";
-    /// … with so many steps of the duty.
+    /// Duty steps of that grid.
     duties: u32 = 20, "", "a grid in steps of 5 %";
     /// Grid points that are refined.
     refined: usize = 6, "", "judgement";

@@ -107,8 +107,8 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     for (modulus, valve) in [(natural.modulus, "closed"), (blown.modulus, "open")] {
         if modulus > 1.0 + RULES.grows {
             remarks.push(format!(
-                "with the valve {valve} the model grows slowly (largest pole modulus {modulus:.5}); \
-                 the loop holds it, but a long free run of it means nothing"
+                "with the valve {valve} the model is slightly unstable (largest pole modulus {modulus:.5}); \
+                the law stabilises it, but a long free run is not valid"
             ));
         }
     }
@@ -136,7 +136,8 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         let [on, off] =
             [hold.on, hold.off].map(|samples| (1e6 * f64::from(samples) * period_s).round() / 1e3);
         remarks.push(format!(
-            "shortest times are {on} ms on and {off} ms off: what is shorter need not arrive whole"
+            "shortest times are {on} ms on and {off} ms off: shorter pulses may not reach the flow \
+            completely"
         ));
     }
     let air = request

@@ -64,7 +64,7 @@ pub enum IdentifyError {
     },
     /// The command u never changes.
     #[error(
-        "the command u never changes in the identify records, so no input delay can be found. \
+        "the command u never changes in the identify records, so no input delay is identifiable. \
          Add a record with switching, or use --n3 0."
     )]
     ConstantInput,

@@ -140,7 +140,7 @@ fn single(key: &str, value: f64) -> Result<(), Fault> {
     if (value as f32).is_finite() {
         return Ok(());
     }
-    let problem = format!("{value:?} is no number that a board (single precision) can hold");
+    let problem = format!("{value:?} is outside single precision, in which the board calculates");
     Err((key.to_owned(), problem))
 }
 

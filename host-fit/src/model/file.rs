@@ -382,7 +382,7 @@ impl File {
             let added = table.into_added(&model)?;
             if model.has_effect(&added.name) {
                 let key = format!("effect.{}", added.name);
-                return wrong(&key, "it is there twice; an effect acts once".into());
+                return wrong(&key, "the effect is listed twice; list it once".into());
             }
             model.effects.push(added);
         }

@@ -59,7 +59,7 @@ pub enum StepError {
     Design(#[from] DesignError),
     /// A time of a law that nothing can be searched over.
     #[error(
-        "a {what} of {time_s:?} s is none for a law of this model: give 0 to {longest_s} s (100000 samples)"
+        "a {what} of {time_s:?} s is outside the range for a law of this model: give 0 to {longest_s} s (100000 samples)"
     )]
     DesignTime {
         /// What the time is of.
@@ -74,8 +74,8 @@ pub enum StepError {
     Codegen(#[from] CodegenError),
     /// A model and recordings of different sampling periods.
     #[error(
-        "{place}: `sample_period_s` is {data}, but the model was made for {model} s; its lags would mean other times. \
-         Identify a model on this data, or resample it"
+        "{place}: `sample_period_s` is {data}, but the model was made for {model} s, and its lags are \
+        counted in samples. Identify a model on this data, or resample it"
     )]
     SamplePeriod {
         /// The recordings.
@@ -93,7 +93,7 @@ pub enum StepError {
     FactorsWithoutLaw,
     /// No delay law could be measured.
     #[error(
-        "no delay law could be found on these records; prescribe one with --delay-law P0,P1,P2, or use --delay fixed"
+        "no delay law is identifiable on these records; prescribe one with --delay-law P0,P1,P2, or use --delay fixed"
     )]
     NoDelayLaw,
     /// A command sampled otherwise than the model.
@@ -110,14 +110,14 @@ pub enum StepError {
     },
     /// The model that was found does not stay finite on its own records.
     #[error(
-        "no model was written: the best that was found does not stay finite on these records ({0}). Use fewer lags \
+        "no model was written: the free run of the best model diverges on these records ({0}). Use fewer lags \
          (`--n1 1 --n2 1`), or a longer record with more switchings"
     )]
     Unstable(crate::simulate::SimulateError),
     /// An effect does not help.
     #[error(
-        "nothing was written: with {effects} the error of the free run does not fall ({before} → {after} on the {on} \
-         records). Use the model as it was, or another effect (`host-fit diagnose` ranks them)"
+        "nothing was written: with {effects} the error of the free run does not decrease ({before} → {after} \
+        on the {on} records). Use the model as it was, or another effect (`host-fit diagnose` ranks them)"
     )]
     NoGain {
         /// The effects.
@@ -131,8 +131,8 @@ pub enum StepError {
     },
     /// Too few samples are left to judge a model on.
     #[error(
-        "{scored} of {samples} samples would be scored, which is less than half: the other records or samples only lead up to \
-         them (`lead_samples` in dataset.toml) or begin in mid-run. Record longer, or state what the command was before \
+        "{scored} of {samples} samples can be scored, less than half: the others are lead-in (`lead_samples` \
+        in dataset.toml) or belong to records that start in mid-run. Record longer, or state what the command was before \
          the first sample (`u_before` in dataset.toml)"
     )]
     TooFewScored {

@@ -109,7 +109,7 @@ const CHECKS: [(&str, &str); 21] = [
     ),
     (
         "free-stream-variation",
-        "hold the free stream constant and repeat one record: the misfit disappears",
+        "hold the free stream constant and repeat one record: the model error disappears",
     ),
     (
         "input-nonlinearity",

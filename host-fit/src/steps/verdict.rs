@@ -150,7 +150,7 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
                 .next(add(&diagnosis.missing))
         }
         Verdict::PartlyExplained => {
-            Answer::new(Tone::Warning, "something is missing; its cause stays open")
+            Answer::new(Tone::Warning, "something is missing; its cause is not identified")
                 .evidence(format!(
                     "With {} as surrogates the {error} falls {}.",
                     joined(&diagnosis.stand_ins),
@@ -258,7 +258,7 @@ fn surrogates(answer: &mut Answer, diagnosis: &Diagnosis) {
     }
     let several = diagnosis.stand_ins.len() > 1;
     answer.note(format!(
-        "{} {} in the model as {}: not significant beside what is named, or not identifiable on these records.",
+        "{} {} in the model as {}: not significant beside the named effects, or not identifiable on these records.",
         joined(&diagnosis.stand_ins),
         if several { "are" } else { "is" },
         if several { "surrogates" } else { "a surrogate" },
@@ -294,11 +294,11 @@ fn records(answer: &mut Answer, diagnosis: &Diagnosis, judged_rmse: Option<f64>)
         ),
         (HeldOutBy::Records, None) => {}
         (HeldOutBy::Turns, _) => answer.note(
-            "No record is marked `validate`: errors are of the estimation records, and cross-validation over them decided. \
+            "No record is marked `validate`: errors come from cross-validation over the estimation records. \
              A validation record would give an independent estimate.",
         ),
         (HeldOutBy::End, _) => answer.note(
-            "There is one record only: its end decided, with models of its beginning. A validation record would give an \
+            "There is one record only: models are fitted to its beginning and validated on its end. A validation record would give an \
              independent estimate.",
         ),
     }

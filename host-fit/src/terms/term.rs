@@ -360,7 +360,7 @@ impl Term {
         model
     }
 
-    /// The model with this term's lag moved to `lag`; `None` if it is there already or another term is.
+    /// The model with this term's lag moved to `lag`; `None` if it exists already or another term is.
     #[must_use]
     pub fn moved_in(&self, model: &Model, lag: u16) -> Option<Model> {
         let old = self.lag().filter(|old| *old != lag)?;

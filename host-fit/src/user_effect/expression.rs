@@ -131,7 +131,7 @@ impl Compiler {
         let local = match statement {
             Stmt::Local(local) => local,
             Stmt::Expr(value, _) => {
-                let problem = "this value goes nowhere; write `let name = …;`, and put an \
+                let problem = "this value is not used; write `let name = …;`, and put an \
                      `if … else …` that is part of a sum or product in parentheses";
                 return Err(Fault::at(value.span(), problem));
             }
@@ -149,7 +149,7 @@ impl Compiler {
         }
         let name = pattern.ident.to_string();
         if self.names.iter().any(|(known, _)| *known == name) {
-            let problem = format!("`{name}` has a meaning already; take another name");
+            let problem = format!("`{name}` is already defined; choose another name");
             return Err(Fault::at(pattern.ident.span(), problem));
         }
         let value = self.value(&init.expr)?;

@@ -93,14 +93,14 @@ impl Source {
         let key = |key: &str, problem: String| Err(Refusal::Key(key.to_owned(), problem));
         if !is_effect_name(&self.name) {
             let problem = format!(
-                "`{}` is no name for an effect: use at most 40 small letters and digits, words joined by `-`",
+                "`{}` is not a valid effect name: use at most 40 small letters and digits, words joined by `-`",
                 self.name
             );
             return key("name", problem);
         }
         if model_core::effects::spec(&self.name).is_some() {
             let problem = format!(
-                "`{}` is in the catalogue already; take another name",
+                "`{}` is already in the catalogue; choose another name",
                 self.name
             );
             return key("name", problem);
@@ -134,12 +134,12 @@ impl Source {
         let mut name = |label: String, name: &str, op: Op| {
             if !is_identifier(name) {
                 let problem = format!(
-                    "`{name}` is no name: use at most 40 small letters, digits and `_`, no word of Rust"
+                    "`{name}` is not a valid name: use at most 40 small letters, digits and `_`, no word of Rust"
                 );
                 return Err(Refusal::Key(label, problem));
             }
             if compiler.names.iter().any(|(known, _)| known == name) {
-                let problem = format!("`{name}` has a meaning already; take another name");
+                let problem = format!("`{name}` is already defined; choose another name");
                 return Err(Refusal::Key(label, problem));
             }
             compiler.names.push((name.to_owned(), Meaning::Read(op)));

@@ -156,7 +156,9 @@ impl Mapping {
         }
         let largest = values.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
         if largest <= 1.0 {
-            remarks.push("u is said to be in % and stays below 1: it is kept as it is".to_owned());
+            remarks.push(
+                "the header gives u in %, but all values are below 1: u is not scaled".to_owned(),
+            );
             return None;
         }
         remarks.push("u is in %: 100 % is u = 1 (--u-scale 1 keeps the percentages)".to_owned());
@@ -283,7 +285,7 @@ impl Mapping {
             same_length(variable, n, &place)?;
             if variable.stamped.is_some() {
                 remarks.push(format!(
-                    "`{}` is left out: a time beside the time",
+                    "`{}` is left out: a second time column",
                     variable.name
                 ));
                 continue;

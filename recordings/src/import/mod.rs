@@ -277,7 +277,7 @@ fn nothing_held_out(records: &[Record]) -> Option<String> {
         [] => return None,
     };
     Some(format!(
-        "Nothing is held out: models will be judged on the data they are fitted to. Hold out {how}."
+        "There is no validation record: models would be validated on the data they are fitted to. Hold out {how}."
     ))
 }
 

@@ -36,7 +36,7 @@ pub enum ImportProblem {
     /// More columns than any table has.
     #[error(
         "the rows have {0} cells, and 16384 are the most (a spreadsheet's); a table has a row for each sample and a column for \
-         each signal: turn it over, or save fewer columns"
+         each signal: transpose it, or save fewer columns"
     )]
     TooWide(usize),
     /// Nothing that could be a table of numbers.
@@ -54,7 +54,7 @@ pub enum ImportProblem {
     Unread(String),
     /// A command that is written on change only and has no first value.
     #[error(
-        "the first value of u is missing, and what is written on change only needs one; write it into this cell"
+        "the first value of u is missing, which a command that is written on change only needs; write it into this cell"
     )]
     NoFirstCommand,
     /// A variable that was asked for is not there.

@@ -171,9 +171,9 @@ pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, Dat
             true => "commas are taken for thousands marks",
             false => "commas are taken for decimal commas",
         };
-        source.remarks.push(format!(
-            "{as_what}; no number of the file says which they are"
-        ));
+        source
+            .remarks
+            .push(format!("{as_what}; the file does not show which"));
     }
     let mut described: Vec<_> = names.into_iter().zip(units).zip(columns).collect();
     if stamps.is_some() && described.iter().all(|((name, _), _)| name != MONITOR) {

@@ -166,7 +166,7 @@ pub(crate) fn write(root: &Path, name: &str, place: &str) -> Result<[String; 2]>
     };
     if !name.split('-').all(word) {
         bail!(
-            "`{name}` is no name for an effect: use small letters and digits, words joined by `-`"
+            "`{name}` is not a valid effect name: use small letters and digits, words joined by `-`"
         );
     }
     let delay = place == "delay";

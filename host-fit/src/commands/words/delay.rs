@@ -131,11 +131,11 @@ fn dead_time_words(study: &DelayStudy, period: f64) -> String {
             )
         }
         (_, DelayMethod::Window) => format!(
-            "from {}; one plant with one dead time does not describe the records",
+            "from {}; one plant with one dead time does not fit the records",
             study.method.words()
         ),
         _ => format!(
-            "from {}; one plant does not describe the records. The interval covers other choices of --reach ({} samples, {} s, here)",
+            "from {}; one plant does not fit the records. The interval covers other choices of --reach ({} samples, {} s, here)",
             study.method.words(),
             study.reach,
             brief(study.reach as f64 * period)
@@ -179,7 +179,7 @@ fn law_words(text: &mut String, study: &DelayStudy) {
             DelayVerdict::EdgeDependent | DelayVerdict::EdgeAndStateDependent => "",
             _ => " The delay is constant.",
         };
-        let _ = writeln!(text, "law (2) is not kept: {reason}.{otherwise}");
+        let _ = writeln!(text, "delay law (2) is rejected: {reason}.{otherwise}");
     }
 }
 

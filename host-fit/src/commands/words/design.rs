@@ -124,9 +124,10 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
             100.0 * planned.duty,
             planned.steady_value,
             match planned.cycle_s {
-                None => "replanned, the valve comes to rest or the model diverges".to_owned(),
+                None => "with a receding horizon the valve stops switching or the model diverges".to_owned(),
                 Some(cycle_s) => format!(
-                    "replanned, it ends in a cycle of {:.0} ms ({:.0} % of it irregular), which was tried with the others",
+                    "a receding-horizon law ends in a limit cycle of {:.0} ms ({:.0} % of it irregular), \
+                    which was evaluated with the other pulse trains",
                     1000.0 * cycle_s,
                     100.0 * planned.irregular
                 ),
@@ -184,7 +185,7 @@ fn case_table(proof: &Proof) -> String {
         .map(|n| 1e-3 * milliseconds(span(n, period_s) as f64, period_s));
     let mut text = format!(
         "{:<44} {:>7} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>7} {:>6}  attachment",
-        format!("in the loop, from {from} s to {until} s"),
+        format!("closed loop, from {from} s to {until} s"),
         "likely",
         "mean",
         "rms",

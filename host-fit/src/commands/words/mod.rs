@@ -103,7 +103,7 @@ impl Words for AverageSummary {
         }
         if self.left_over_samples > 0 {
             text.push_str(&format!(
-                "\n  {} samples at the end are no whole period",
+                "\n  {} samples at the end are not a whole period",
                 self.left_over_samples
             ));
         }

@@ -76,7 +76,7 @@ impl ModelBench {
         })
     }
 
-    /// Takes a model that the user has into the project, unless it is there already.
+    /// Takes a model that the user has into the project, unless it exists already.
     pub(super) fn bring(&self, path: &Path) -> anyhow::Result<()> {
         let model = Model::load(path)?;
         let known = {

@@ -1,4 +1,4 @@
-//! Recordings to a model.
+//! Identification of a model from records.
 
 use serde::{Serialize, Serializer};
 
@@ -26,12 +26,12 @@ use model_core::recursion::LagConvention;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// What to identify and how.
+/// Options of an identification.
 #[derive(Debug, Clone)]
 pub struct IdentifyRequest {
-    /// Where the input delays come from; none for what does better on validation records.
+    /// Kind of the input delays; none for the kind with the lower validation error.
     pub delay: Option<DelayKind>,
-    /// Keep delays between samples even where they do not pay.
+    /// Keep unrounded delays even if the validation error hardly differs.
     pub interpolated: bool,
     /// Factors f of the delay law, one per input, in place of searching them; empty to search.
     pub factors: Vec<f64>,
@@ -46,7 +46,7 @@ pub struct IdentifyRequest {
     pub n3: Option<u16>,
     /// Longest lag and input delay, samples; by default 500, at most a quarter of the shortest record.
     pub max_lag: Option<u16>,
-    /// What a lag means.
+    /// Meaning of a lag.
     pub lags: LagConvention,
     /// What the search minimises.
     pub objective: Objective,
@@ -62,7 +62,7 @@ pub struct IdentifyRequest {
     pub definitions: Vec<&'static Definition>,
 }
 
-/// Where the input delays of a model come from.
+/// Kind of the input delays of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DelayKind {
     /// Constant, eq. (3).
@@ -123,7 +123,7 @@ pub struct Identification {
     pub beside: Beside,
     /// Lags and delays of the model.
     pub delays: IdentifiedDelays,
-    /// Candidates that the search judged in closed form.
+    /// Number of candidates that the search evaluated in closed form.
     pub screened: usize,
     /// Why the search ended.
     #[serde(serialize_with = "stop_name")]

@@ -3,7 +3,7 @@
 use crate::rules;
 
 rules! {
-    /// How a mesh search of delays goes.
+    /// Parameters of the mesh search for delays.
     pub struct Rules in "search";
 
     /// Most evaluations of the objective; points remembered from before cost nothing.

@@ -1,4 +1,4 @@
-//! An error beside the noise level, worded once for every step.
+//! Wording of an error relative to the noise level, shared by all steps.
 
 use super::{Answer, Tone, verdict::times};
 use crate::analysis::{Correlation, Residuals, correlations};

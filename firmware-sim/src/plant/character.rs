@@ -1,24 +1,24 @@
-//! What the flow is beyond following the jet with one time constant each way.
+//! Flow dynamics beyond one time constant per direction.
 
 use super::base::BasePlantError;
 
-/// How a flow feels what it was a while ago.
+/// Dependence of a flow on its own past.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PastTerm {
-    /// How long ago (s, 0.005–1).
+    /// The lag (s, 0.005–1).
     pub delay_s: f64,
-    /// What the past friction adds to the level that the flow goes to (-).
+    /// Gain from the past friction to the level of the flow (-).
     pub gain: f64,
-    /// What is taken off again where the jet arrives (-).
+    /// Reduction of that gain under the jet (-).
     pub lost: f64,
-    /// The past is felt through a lag of this time constant (s); 0 for a sharp memory.
+    /// Smearing time constant of the past (s); 0 for a sharp memory.
     pub smear_s: f64,
-    /// The past is felt as limit·tanh(past/limit) (y); infinite for a memory in proportion.
+    /// Saturation of the past, limit·tanh(past/limit) (y); infinite for none.
     pub limit: f64,
 }
 
 impl PastTerm {
-    /// A sharp memory in proportion: inside the bilinear class for on/off jets.
+    /// A sharp linear memory: inside the bilinear class for on/off jets.
     pub fn new(delay_s: f64, gain: f64, lost: f64) -> Self {
         Self {
             delay_s,
@@ -29,7 +29,7 @@ impl PastTerm {
         }
     }
 
-    /// The past as it is felt (y).
+    /// The past after smearing and saturation (y).
     pub(crate) fn felt(&self, past: f64) -> f64 {
         if self.limit.is_finite() {
             self.limit * (past / self.limit).tanh()
@@ -39,7 +39,7 @@ impl PastTerm {
     }
 }
 
-/// The kind of flow. `level(j)` is what the arriving jet j drives the flow to, `rate(j)` how fast it follows.
+/// The dynamics of the flow. `level(j)` is the steady level under the jet j, `rate(j)` the relaxation rate.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Character {
     /// ṡ = rate·(level − s).
@@ -47,7 +47,7 @@ pub enum Character {
     FirstOrder,
     /// The level also has Σ (gain − lost·j)·s(t − delay).
     Memory(Vec<PastTerm>),
-    /// The flow is heavy: time·s̈ + ṡ = rate·(level − s).
+    /// Inertia: time·s̈ + ṡ = rate·(level − s).
     Inertia {
         /// Time constant of the motion itself (s).
         time_s: f64,

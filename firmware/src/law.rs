@@ -1,4 +1,4 @@
-//! What decides the valve's position from the reading, with the model beside it.
+//! Interface of a control law with its model.
 
 use core::fmt;
 use model_core::average::MovingAverage;
@@ -7,22 +7,20 @@ use model_core::history::Memory;
 use model_core::model::StateOf;
 use model_core::{Input, Parts, step};
 
-/// What a law says at a sample.
+/// The action of a law at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Action {
-    /// Where it wants the valve.
+    /// Requested valve position.
     pub open: bool,
-    /// What the model said the sensor would show at this sample.
+    /// Predicted reading of the model at this sample.
     pub predicted: f32,
     /// Reading minus `predicted`.
     pub residual: f32,
 }
 
-/// A law with its model. Called once a sample, armed or not, so that the model
-/// knows what has been issued.
+/// A law with its model. Called once per sample, armed or not, so that the model knows all issued commands.
 pub trait Law {
-    /// Decides with the reading y and the measured channels; the valve will do
-    /// what is returned.
+    /// Decides from the reading y and the measured channels; the valve follows the returned position.
     fn act(&mut self, y: f32, channels: &[f32]) -> Action;
     /// Takes note of a sample at which the valve is at `open`, whatever the law
     /// would have.

@@ -17,7 +17,7 @@ use super::case::{Case, Given, Group};
 use super::program::{Program, Spent};
 use super::row::{Found, PutIn, Row};
 
-/// Runs a case. What goes wrong is a row too.
+/// Runs a case. A failure gives a result too.
 #[must_use]
 pub fn run(case: &Case, program: &Program) -> Row {
     let nuisances = case.nuisances.iter().map(|n| n.name());
@@ -56,7 +56,7 @@ pub fn run(case: &Case, program: &Program) -> Row {
         && row.parameters_hit() != Some(false)
         && let Some(folder) = &kept
     {
-        // What stays is looked at by people; a folder too many does no harm.
+        // Failures to remove a folder are harmless.
         let _ = fs::remove_dir_all(folder);
     }
     row
@@ -110,10 +110,10 @@ fn fill(row: &mut Row, case: &Case, program: &Program, folder: &Path) -> Result<
     Ok(())
 }
 
-/// The model that a diagnosis writes.
+/// File name of the model that a diagnosis writes.
 const FOUND: &str = "found.toml";
 
-/// What `diagnose` says of a rig, after `identify` where the case has no model to hand in; and how long both took.
+/// The diagnosis of a rig, after `identify` unless the case has a model of its own; with both durations.
 fn asked(
     case: &Case,
     plan: &RigPlan,
@@ -122,7 +122,7 @@ fn asked(
 ) -> Result<(Value, Spent, Spent), String> {
     let inside = |name: &str| folder.join(name).to_string_lossy().into_owned();
     let (data, given, found) = (inside("set"), inside("given.toml"), inside(FOUND));
-    // Of an earlier run.
+    // Left over from an earlier run.
     let _ = fs::remove_dir_all(folder.join("set"));
     let _ = fs::remove_file(&found);
     fs::create_dir_all(folder).map_err(|e| e.to_string())?;

@@ -1,5 +1,5 @@
-//! Makes the two files of a new effect or delay law, with physics that changes
-//! nothing yet, and enters them in the two catalogues.
+//! Creates the two files of a new effect or delay law, initially without influence, and adds them to both
+//! catalogues.
 
 mod proof;
 
@@ -20,7 +20,7 @@ pub(crate) const TASK: Task = Task {
 const MODEL: &str = "model-core/src/effects";
 const PLANT: &str = "firmware-sim/src/plant/effects";
 
-/// What differs between the places; empty for delay laws, whose templates are whole.
+/// Text that differs between the places; empty for delay laws, which have complete templates.
 struct Holes {
     place: &'static str,
     /// In the model: place of the card, name of the test bench's run, the hook.

@@ -29,7 +29,7 @@ rules! {
     /// Power: an effect counts as detectable if it is found in this share of cases.
     power: f64 = 0.8, "share of cases", "convention; `cargo xtask calibrate` counts";
     /// Most unnamed terms that may imitate the effect.
-    terms: usize = 6, "", "what `identify` takes of a flow with two memories";
+    terms: usize = 6, "", "number of terms that `identify` adds for a flow with two memories";
     /// Penalty of each of those terms, in parameters.
     term_cost: f64 = 2.0, "parameters", "a lag and its weight";
     /// Factor on the first-order detectable amplitude, because a search that moves all lags imitates more.

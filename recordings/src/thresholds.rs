@@ -9,7 +9,7 @@ crate::rules! {
     /// … and whatever the rounding by no more than this.
     most_uneven: f64 = 0.6, "share of the period", "a missing sample is 1 off";
     /// The mean step may differ from a stated period by this.
-    clock: f64 = 1e-3, "share of the period", "judgement: the clocks of a rig differ by less";
+    clock: f64 = 1e-3, "share of the period", "judgement: clock differences of a rig are smaller";
     /// Times that are printed in this or a coarser unit are taken as rounded where that explains every step …
     coarse_s: f64 = 1.0, "s", "judgement: loggers with stamps of whole seconds";
     /// … finer ones only when so many steps differ from the usual one.

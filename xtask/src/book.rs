@@ -21,9 +21,8 @@ pub(crate) const TASK: Task = Task {
 /// Longest page of the reader's part, lines. Generated reference pages and the notebooks may be longer.
 const LONGEST: usize = 250;
 /// Longer pages: written by other tasks, cited as one page by the code, or notebooks.
-const LONG: [&str; 5] = [
+const LONG: [&str; 4] = [
     "rules.md",
-    "rig-day.md",
     "theory.md",
     "history/diagnosis.md",
     "history/discover.md",

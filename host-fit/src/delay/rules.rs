@@ -17,7 +17,7 @@ rules! {
     smallest_edge: f64 = 0.05, "share of the range of u", "judgement: a twentieth of the largest response";
     /// One plant describes the records if its residual is at most this share of the spread of y, beyond the
     /// noise.
-    plant_fits: f64 = 0.06, "share of the spread of y", "calibrated on data/ (5 to 10 % are left where delays vary from edge to edge) and on the strangers' sets (at most 5 %)";
+    plant_fits: f64 = 0.06, "share of the spread of y", "calibrated on data/ (residual 5 to 10 % where delays vary from edge to edge) and on tests/data/strangers (at most 5 %)";
     /// The noise of a plant's residual may be this factor above the noise estimated from second differences
     /// of y.
     noise_allowed: f64 = 1.5, "times the standard deviation", "judgement: noise need not be white";
@@ -39,14 +39,14 @@ rules! {
     coarse_shapes: usize = 9, "", "every other response";
     /// Largest autocorrelation of neighbouring residuals that is allowed for; a higher one means an
     /// unmodelled course.
-    most_correlation: f64 = 0.82, "", "widens a variance by 10 at most; held by the tests of `onset.rs`";
+    most_correlation: f64 = 0.82, "", "widens a variance by 10 at most; tested in `onset.rs`";
 
     /// The earliest peak of at least this height relative to the highest is the front.
-    front_height: f64 = 0.8, "share of the highest", "judgement; held by the tests of `front.rs`";
+    front_height: f64 = 0.8, "share of the highest", "judgement; tested in `front.rs`";
     /// Factor by which the first edges must prefer a later peak.
-    front_clearly: f64 = 2.0, "times", "judgement; held by the tests of `front.rs`";
+    front_clearly: f64 = 2.0, "times", "judgement; tested in `front.rs`";
     /// A level change counts at most this many times the median one.
-    front_largest: f64 = 2.0, "times the median", "judgement: one large response must not outvote all others";
+    front_largest: f64 = 2.0, "times the median", "judgement: limits the weight of one large response";
 
     /// Fewest measured edges for a law.
     law_edges: usize = 5, "edges", "two more than the law has parameters";
@@ -59,12 +59,12 @@ rules! {
     /// Edges further from the robust fit than this get a proportionally lower weight.
     robust: f64 = 1.345, "robust standard deviations", "convention: 95 % efficiency on normal errors (Huber 1964)";
     /// Least scale of the robust fit: delays are not known better than this.
-    known_to: f64 = 0.2, "samples", "judgement: closer agreement is chance";
+    known_to: f64 = 0.2, "samples", "judgement: smaller scatter is coincidence";
     /// Edges further from the robust fit than this are excluded as outliers.
-    outlier: f64 = 5.0, "robust standard deviations", "convention; held by the tests of `law.rs`";
+    outlier: f64 = 5.0, "robust standard deviations", "convention; tested in `law.rs`";
 
     /// Coverage of the intervals of a dead time and of the law's parameters.
-    confidence: f64 = 0.95, "", "convention; held by the tests of `law.rs`";
+    confidence: f64 = 0.95, "", "convention; tested in `law.rs`";
     /// A response is taken as settled after this time.
     response: usize = 5, "times the reach", "judgement: 99 % of a response of first order";
 
@@ -75,7 +75,7 @@ rules! {
     /// Permutations per test.
     shuffles: usize = 1999, "", "convention: p is known to 0.002 at 0.01";
     /// Significance level of the tests.
-    significant: f64 = 0.01, "p-value", "convention; the false-alarm rate is held by the tests of `dependence.rs`";
+    significant: f64 = 0.01, "p-value", "convention; the false-alarm rate is tested in `dependence.rs`";
     /// A change of the delay by less than this is irrelevant for a model.
     relevant: f64 = 1.0, "samples", "a model rounds delays to whole samples";
     /// A difference between directions below this share of the mean delay is not significant: the measured
@@ -88,7 +88,7 @@ rules! {
     slowest_disturbance: f64 = 0.98, "", "widens a variance by 99 at most: a disturbance over 50 samples";
     /// Least standard error of a delay: loggers and simulations differ by up to a sample in the definition of
     /// simultaneous u and y.
-    clock: f64 = 0.5, "samples", "judgement: an interval of ± 1 sample at least; held by the test of `dead_time.rs` on strangers";
+    clock: f64 = 0.5, "samples", "judgement: an interval of at least ± 1 sample; tested in `dead_time.rs` on tests/data/strangers";
     /// Edges per record on which the sensitivity to `reach` is measured.
     settings_edges: usize = 12, "edges", "judgement: long records would take three times as long";
     /// Ratios of the time constants on either side of the best over which the dead time is averaged.

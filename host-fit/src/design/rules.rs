@@ -30,16 +30,16 @@ rules! {
     sure_pulse: u32 = 3, "samples", "theory 3.2: k − h advances by 0 to 2 a sample";
     /// Standard deviation of the model error assumed in the observer. Smaller: the estimate follows the
     /// model; larger: it follows the noise.
-    model_error: f64 = 0.005, "share of what can be reached", "chosen on plants other than those of docs/law.md";
+    model_error: f64 = 0.005, "share of what can be reached", "tuned on plants other than those of docs/law.md";
     /// Sensor noise averaged over 64 samples, if the rig's was not measured.
     usual_slow_noise: f64 = 0.025, "y", "a hot film: white 0.03, coloured 0.035 with 20 ms";
     /// Largest observer correction per sample.
     observer_most: f64 = 0.1, "share of the residual", "judgement";
     /// Rate of the bias estimate: share of a residual per delay time. It is slow, so that neither noise nor a
     /// wrong delay causes oscillation.
-    bias_in_a_delay: f64 = 0.03, "share of the residual", "chosen on the plants of docs/law.md";
+    bias_in_a_delay: f64 = 0.03, "share of the residual", "tuned on the plants of docs/law.md";
     /// The bias correction changes only if the estimate moves by this many standard deviations of its noise.
-    play: f64 = 3.0, "standard deviations", "chosen on plants other than those of docs/law.md";
+    play: f64 = 3.0, "standard deviations", "tuned on plants other than those of docs/law.md";
     /// Shortest delay time assumed for the rate of the bias estimate.
     bias_delay: u16 = 10, "samples", "judgement";
     /// Rate of the integral correction: share of an offset per delay time.
@@ -48,7 +48,7 @@ rules! {
     integral_delay: u16 = 20, "samples", "judgement";
     /// While the bias is constant, the integral slows down until its noise is this share of the unavoidable
     /// ripple.
-    noise_beside_ripple: f64 = 0.2, "share of the ripple", "chosen on plants other than those of docs/law.md";
+    noise_beside_ripple: f64 = 0.2, "share of the ripple", "tuned on plants other than those of docs/law.md";
     /// The integral keeps at least this share of its rate, to follow drift.
     least_settled: f64 = 0.1, "share of its rate", "judgement";
     /// Largest correction of bias and integral.
@@ -87,7 +87,7 @@ rules! {
     /// Steps, of a fifth each, in which the end of an interval is searched inwards from 1.96 standard errors.
     interval_steps: u32 = 20, "", "judgement: to a seventieth";
     /// Share of the error energy that noise alone gives the best effect, assumed for the detectable size.
-    usual_by_chance: f64 = 0.01, "share of the energy", "as large as it is in searches on 8 records";
+    usual_by_chance: f64 = 0.01, "share of the energy", "typical value of searches on 8 records";
     /// Gauss–Newton steps of the refit for a possible plant.
     refitting_steps: usize = 5, "", "judgement";
     /// Iterations of a fit with another delay law.

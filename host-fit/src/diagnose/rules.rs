@@ -8,39 +8,39 @@ rules! {
     pub struct Rules in "diagnose";
 
     /// A model error below this factor is within the uncertainty of `y_sd`.
-    floor_margin: f64 = 1.10, "times the noise level", "a standard deviation from 20 repeats is known to 16 % a sample; nulls of six families stay below 1.03";
+    floor_margin: f64 = 1.10, "times the noise level", "a standard deviation from 20 repeats has an error of 16 % per sample; null cases of six families stay below 1.03";
     /// A given model within this factor of the noise level is searched no further unless an effect promises a
     /// significant gain above the practical margin.
-    at_once: f64 = 1.03, "times the noise level", "what `identify` leaves of nulls is 0.99 to 1.02; lags that imitate an effect leave 1.03 and more";
+    at_once: f64 = 1.03, "times the noise level", "null cases after `identify` have 0.99 to 1.02; models whose lags imitate an effect have 1.03 and more";
     /// Level of the tests.
     level: f64 = 0.05, "p-value", "convention";
     /// Family-wise level: the probability that noise alone gives any effect, at any grid point, as large a
     /// gain.
-    level_of_search: f64 = 0.02, "p-value", "three false names in a hundred are too many";
+    level_of_search: f64 = 0.02, "p-value", "target: at most 3 % false names";
     /// On a given model at the noise level, an effect is followed up if its predicted p-value is below this.
-    worth_a_search: f64 = 0.1, "p-value", "judgement: one null in ten costs a search";
+    worth_a_search: f64 = 0.1, "p-value", "judgement: a search for one null case in ten";
     /// On a given model at the noise level, number of effects that are refitted in full in place of a term of
     /// the base.
     settled: usize = 2, "", "judgement: for the time it takes";
     /// An effect must lower the validation error of the best base model by this fraction, unless it fits
     /// equally well with fewer parameters.
-    worthwhile: f64 = 0.015, "share of the rms error", "nulls of six families: chance manages 0.01";
+    worthwhile: f64 = 0.015, "share of the rms error", "null cases of six families: noise alone reaches 0.01";
     /// Validation errors that differ by less than this are equal in practice.
-    alike: f64 = 0.005, "share of the rms error", "judgement: a tenth of what two seeds of noise differ by";
+    alike: f64 = 0.005, "share of the rms error", "judgement: a tenth of the difference between two noise seeds";
     /// If the final model is above the noise level, effects are named only if they explain at least this
     /// share of the unexplained variance and leave an error below `much` of the search; otherwise they are
     /// surrogates.
-    explained: f64 = 0.95, "share of the model error above the noise", "altered laws leave 1 to 4 % of an excess";
+    explained: f64 = 0.95, "share of the model error above the noise", "effects with another law leave 1 to 4 % unexplained";
     /// The same share where the noise level is unknown.
     explained_in_unknown_noise: f64 = 0.75, "share of the model error above the noise", "the public sets";
     /// Effects that explain less than this share of the unexplained variance are not named.
     most: f64 = 0.5, "share of the model error above the noise", "judgement: half";
     /// If the final model is above the noise level, effects that explain at least this share are reported as
     /// surrogates.
-    stands_in: f64 = 0.25, "share of the model error above the noise", "judgement: nothing is claimed, and the model that is handed over errs less";
+    stands_in: f64 = 0.25, "share of the model error above the noise", "judgement: nothing is claimed, but the written model has a smaller error";
     /// An effect beside others is a surrogate if the interval of a positive parameter spans more than this
     /// factor, or if its amplitude may be 0. A single effect on a base that fits is then not named.
-    identified: f64 = 100.0, "times", "judgement; a hysteresis beside the delays of the edges, on a memory that saturates, spanned 180";
+    identified: f64 = 100.0, "times", "judgement; a wrong hysteresis beside an edge-dependent delay spanned 180";
     /// Where the level of slow noise is unknown, a model error counts if this share of it is a function of a
     /// coordinate.
     depends: f64 = 0.1, "share of the model error above the noise", "the public sets";
@@ -51,14 +51,14 @@ rules! {
     /// error by this.
     worthwhile_in_the_dark: f64 = 0.1, "share of the rms error", "the hair dryer and the gas furnace, where nothing is missing";
     /// Number of candidates refitted for the ranking, beside the named ones.
-    ranked_in_full: usize = 4, "", "judgement: further ones never matched the leader";
+    ranked_in_full: usize = 4, "", "judgement: lower-ranked candidates never became the best";
     /// From this number of `validate` records on, every third is set aside for an independent error estimate.
-    enough_to_quote: usize = 4, "records", "judgement: fewer than three to choose by are too few";
+    enough_to_quote: usize = 4, "records", "judgement: at least three records are needed for the choice";
     /// If a measured channel explains at least this cross-validated share of the error, something is missing
     /// that depends on that channel.
-    follows_a_channel: f64 = 0.25, "share of the model error above the noise", "judgement: what an effect must take to stand in";
+    follows_a_channel: f64 = 0.25, "share of the model error above the noise", "judgement: smallest share of a surrogate";
     /// A lag below this belongs to the model order; it is not reported as a memory.
-    shortest_memory: usize = SHORTEST_MEMORY, "samples", "judgement: as long as a fast flow takes; the model's own";
+    shortest_memory: usize = SHORTEST_MEMORY, "samples", "judgement: time scale of a fast flow";
     /// A net rate below this share of the dominant pole's is the difference of cancelling lags; the pole is
     /// used instead.
     cancelled: f64 = 0.01, "share of the rate", "judgement";

@@ -8,15 +8,15 @@ rules! {
 
     /// A fit without a better step has converged if the cosines between the residual and all derivatives are
     /// below this.
-    stationary: f64 = 1e-6, "cosine", "judgement; held by the tests of `levenberg.rs`";
+    stationary: f64 = 1e-6, "cosine", "judgement; tested in `levenberg.rs`";
     /// Most iterations of a fit.
     iterations: usize = 30, "", "judgement";
     /// A fit ends when an iteration lowers the sum of squares by less than this.
-    tolerance: f64 = 1e-5, "share of the sum of squares", "judgement: far below what a diagnosis can tell";
+    tolerance: f64 = 1e-5, "share of the sum of squares", "judgement: far below the resolution of a diagnosis";
     /// If a fit finds no descent, it continues with delays held, at most so many times.
     held_delays: usize = 3, "", "judgement: each has to lower the error";
     /// Iterations from every starting point before the best are chosen.
-    brief: usize = 4, "", "campaign, seed 33000: after one iteration a hysteresis lost its thresholds, after four it is found";
+    brief: usize = 4, "", "campaign, seed 33000: a hysteresis is found with four iterations and not with one";
     /// Iterations after moving a fixed delay by one step.
     settling: usize = 3, "", "judgement";
     /// Steps by which a fixed delay is moved.
@@ -27,10 +27,10 @@ rules! {
     leap: f64 = 2.0, "ln", "judgement: a factor of 7";
     /// Standard errors are summed over so many blocks of a record. The block length with the larger error
     /// counts, because noise may vary slowly.
-    batches: [usize; 2] = [40, 10], "", "blocks of a fortieth alone: 94 of 126 intervals of 95 % held the truth";
+    batches: [usize; 2] = [40, 10], "", "with 40 blocks alone, 94 of 126 intervals of 95 % contained the truth";
     /// Standard errors are at least those of the jackknife over records, or over pieces of them if there are
     /// fewer records than this, because unmodelled disturbances may last as long as a record.
-    left_out: usize = 5, "records", "on 13 rigs of seed 313131 blocks up to whole records held 18 of 24 truths, this 22";
+    left_out: usize = 5, "records", "13 rigs of seed 313131: 22 of 24 intervals contain the truth, 18 without the jackknife";
 
     /// Starting points that are fitted in full, beside the best with each response to jets of part strength.
     followed: usize = 2, "", "judgement, on the campaign's rigs";
@@ -55,16 +55,16 @@ rules! {
     settled_percentile: usize = 95, "%", "judgement: what is above is noise";
 
     /// Scatter of the level between repeats is estimated from at least so many records.
-    records_of_scatter: usize = 3, "records", "judgement: from fewer nobody can say whether it differs between them";
+    records_of_scatter: usize = 3, "records", "judgement: its variation between records is not measurable with fewer";
     /// Scatter of the level counts if it is at least this share of the noise.
-    share_of_scatter: f64 = 0.05, "share of the variance", "judgement: below it, it matters nowhere";
+    share_of_scatter: f64 = 0.05, "share of the variance", "judgement: negligible below";
     /// Scatter of the level must vary between records by this much; noise that is stronger at a high level
     /// does not.
     scatter_differs: f64 = 0.12, "share of its mean", "20 repeats: 0.3; 10 000 samples of noise with 40 ms: 0.03";
     /// The remaining noise is at least this share of the variance.
-    noise_beside_scatter: f64 = 0.1, "share of the variance", "judgement: a standard error of 20 repeats is off by a sixth";
+    noise_beside_scatter: f64 = 0.1, "share of the variance", "judgement: a standard error of 20 repeats has an error of 16 %";
     /// Correlation length assumed for the remaining noise.
-    correlated: f64 = 40.0, "samples", "a hot film's at 1 kHz; four times as many double what is left along y";
+    correlated: f64 = 40.0, "samples", "a hot film at 1 kHz; a value four times as large doubles the weight of errors along y";
 
     /// A lowest-order model with effects is kept if its error is within this factor of the given structure's.
     as_good: f64 = 1.02, "times the rms error", "judgement";
@@ -76,5 +76,5 @@ rules! {
     memories: usize = 8, "", "judgement";
     /// A plant counts as drifting if more than this share of an initial disturbance remains after a whole
     /// record.
-    drifts: f64 = 0.37, "share", "judgement; held by `an_integrator_drifts_and_a_damped_rig_does_not`";
+    drifts: f64 = 0.37, "share", "judgement; tested in `an_integrator_drifts_and_a_damped_rig_does_not`";
 }

@@ -8,7 +8,7 @@ rules! {
 
     /// The simulation of a candidate stops when its free run exceeds this, long before it would count as
     /// diverged.
-    hopeless: f64 = 10.0, "times the largest |y|", "judgement: candidates that swing so far are never the best";
+    hopeless: f64 = 10.0, "times the largest |y|", "judgement: such candidates are never the best";
     /// A model whose validation FIT is this much below its estimation FIT is reported as over-fitted.
     overfitted_points: f64 = 12.0, "points of FIT", "judgement: on the flow simulation sixteen lags lose 28 to 34, two lags 7 to 11";
 
@@ -17,21 +17,21 @@ rules! {
     /// Records shorter than this multiple of the longest lag get shorter lags.
     longest_lag_fits: usize = 4, "times", "judgement";
     /// Patience of a search, the unit of the numbers of kicks.
-    patience: usize = 3, "", "chosen on sets 1 to 3 of docs/search.md";
+    patience: usize = 3, "", "tuned on sets 1 to 3 of docs/search.md";
     /// Kicks without improvement per unit of patience that end a one-step search.
-    kicks: usize = 6, "kicks", "chosen on sets 1 to 3 of docs/search.md";
+    kicks: usize = 6, "kicks", "tuned on sets 1 to 3 of docs/search.md";
     /// Kicks without improvement per unit of patience that end a free-run search.
-    free_kicks: usize = 8, "kicks", "chosen on sets 1 to 3 of docs/search.md";
+    free_kicks: usize = 8, "kicks", "tuned on sets 1 to 3 of docs/search.md";
     /// Most kicks of a free-run search per unit of patience.
-    most_free_kicks: usize = 12, "kicks", "chosen on sets 1 to 3 of docs/search.md";
+    most_free_kicks: usize = 12, "kicks", "tuned on sets 1 to 3 of docs/search.md";
     /// Probability that a kick also moves the input delays.
-    kicked_inputs: f64 = 0.3, "", "chosen on sets 1 to 3 of docs/search.md";
+    kicked_inputs: f64 = 0.3, "", "tuned on sets 1 to 3 of docs/search.md";
     /// After such a kick a one-step search scans the input delays within this distance.
-    kick_reach: f64 = 12.0, "samples", "chosen on sets 1 to 3 of docs/search.md";
+    kick_reach: f64 = 12.0, "samples", "tuned on sets 1 to 3 of docs/search.md";
     /// Largest move of input delays in a kick of the free-run search.
-    free_kick_reach: f64 = 5.0, "samples", "chosen on sets 1 to 3 of docs/search.md";
+    free_kick_reach: f64 = 5.0, "samples", "tuned on sets 1 to 3 of docs/search.md";
     /// Lags that a kick of the free-run search replaces.
-    kicked_lags: usize = 2, "lags", "chosen on sets 1 to 3 of docs/search.md";
+    kicked_lags: usize = 2, "lags", "tuned on sets 1 to 3 of docs/search.md";
     /// Least distance of a lag that replaces another in such a kick.
     kick_distance: u16 = 4, "samples", "a descent reaches as far";
     /// Number of predicted minima per slot that are simulated.

@@ -8,13 +8,13 @@ rules! {
     pub struct Rules in "residual";
 
     /// The error is above the noise if the unexplained variance is this many standard errors above 0.
-    excess_standard_errors: f64 = 3.0, "standard errors", "convention; held by the tests `a_perfect_model_has_nothing_to_explain` and `pure_noise_explains_nothing`";
+    excess_standard_errors: f64 = 3.0, "standard errors", "convention; tested in the tests `a_perfect_model_has_nothing_to_explain` and `pure_noise_explains_nothing`";
     /// The error is above the noise only if the unexplained variance is at least this share of the noise
     /// variance, the uncertainty of `y_sd`.
-    least_excess: f64 = 0.05, "share of the noise energy", "a standard deviation from 20 repeats is known to 16 %, from 800 samples to 2.5 %: 5 % of its square";
+    least_excess: f64 = 0.05, "share of the noise energy", "a standard deviation from 20 repeats has an error of 16 %, from 800 samples 2.5 %, i.e. 5 % of the variance";
     /// A single large event has no reproducible mean: the error is also above the noise if the unexplained
     /// variance exceeds this many standard deviations of the energy of as many independent samples as blocks.
-    event_deviations: f64 = 4.0, "standard deviations", "convention; held by the same tests";
+    event_deviations: f64 = 4.0, "standard deviations", "convention; tested in the same tests";
 
     /// Block length of folds and standard errors, longer than the memory of the flow.
     block_s: f64 = 0.25, "s", "judgement: the window of ỹ in eq. (1) of the paper";
@@ -24,7 +24,7 @@ rules! {
     turns: usize = 5, "", "convention of cross-validation";
     /// A coordinate's share must be this many standard errors above 0: about ten coordinates are tested in
     /// three ways each.
-    share_standard_errors: f64 = 2.5, "standard errors", "chosen for ten coordinates in three ways; held by `pure_noise_explains_nothing`";
+    share_standard_errors: f64 = 2.5, "standard errors", "chosen for ten coordinates in three ways; tested in `pure_noise_explains_nothing`";
     /// The same for folds over whole records, lower because a single event per record has no reproducible
     /// mean.
     record_standard_errors: f64 = 1.0, "standard errors", "judgement";
@@ -46,7 +46,7 @@ rules! {
     most_changes: f64 = 0.2, "share of the samples", "judgement: on/off commands change at far fewer samples, continuous ones at nearly all";
 
     /// Share of the unexplained variance that the reported smallest interval contains.
-    concentration: f64 = 0.75, "share of the model error above the noise", "judgement: three quarters reads well";
+    concentration: f64 = 0.75, "share of the model error above the noise", "judgement";
     /// A bin must contain this share of the samples to be reported as the worst.
     worst_holds: f64 = 0.004, "share of the samples", "judgement: 40 samples in a record of 10 s";
     /// Neighbours of the worst bin are merged with it if their unexplained variance per sample is at least
@@ -61,9 +61,9 @@ rules! {
     /// Segment length of spectra.
     piece_s: f64 = 1.024, "s", "a power of two at 1 kHz";
     /// Fewest segments of a spectrum.
-    fewest_pieces: usize = 6, "", "three to learn from and three to test on";
+    fewest_pieces: usize = 6, "", "three for training and three for testing";
     /// A band's excess over the noise must be this many standard errors above 0.
-    band_standard_errors: f64 = 3.0, "standard errors", "convention; held by `pure_noise_explains_nothing`";
+    band_standard_errors: f64 = 3.0, "standard errors", "convention; tested in `pure_noise_explains_nothing`";
 
     /// Level of the test for a trend from edge to edge.
     trend_level: f64 = 0.002, "p-value", "1 % over a handful of tests";
@@ -77,7 +77,7 @@ rules! {
     /// Periods back that are compared, because a fault of every n-th pulse repeats only after n periods.
     periods_back: usize = 8, "periods", "the longest cycle of pulses";
     /// Fewest pairs of repeats for an estimate of the noise.
-    fewest_histories: f64 = 2.0, "histories", "judgement; held by `repeats_give_the_noise_even_when_every_third_pulse_is_missing`";
+    fewest_histories: f64 = 2.0, "histories", "judgement; tested in `repeats_give_the_noise_even_when_every_third_pulse_is_missing`";
     /// A command is periodic if it has at least so many periods.
     fewest_periods: usize = 4, "periods", "judgement";
     /// A command is periodic if at least this share of its periods are equal, within a sample.

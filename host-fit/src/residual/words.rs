@@ -11,10 +11,10 @@ impl Failures {
         let floor = match self.noise_source {
             NoiseSource::Measured => "the noise level (`y_sd`)",
             NoiseSource::Repeats => {
-                "a noise level estimated from repeats of the command (no `y_sd`)"
+                "a noise level (estimated from repeats of the command, because there is no `y_sd`)"
             }
             NoiseSource::Scatter => {
-                "a noise level estimated from sample-to-sample scatter (no `y_sd`), without slow noise"
+                "a noise level (estimated from sample-to-sample scatter, because there is no `y_sd`; slow noise is not included)"
             }
         };
         let (rmse, noise) = (number(self.rmse), number(self.noise_rmse));

@@ -7,19 +7,19 @@ rules! {
     pub struct Rules in "terms";
 
     /// Penalty per parameter of a term, as a share of the validation rms error.
-    price: f64 = 0.004, "share of the rms error", "nulls of six families of flows: coloured noise of 20 repeats makes 0.001 to 0.003 of a needless parameter";
+    price: f64 = 0.004, "share of the rms error", "null cases of six families: a superfluous parameter gains 0.001 to 0.003 on coloured noise of 20 repeats";
     /// A model within this factor of the noise level is searched no further.
-    at_the_floor: f64 = 1.005, "times the noise level", "two standard deviations of what three records of 10 s say";
+    at_the_floor: f64 = 1.005, "times the noise level", "two standard deviations of the error of three records of 10 s";
     /// If the best model is above this factor of the noise level, the second-best is followed as well.
-    near_the_floor: f64 = 1.05, "times the noise level", "judgement: half of the margin to which `y_sd` is known";
+    near_the_floor: f64 = 1.05, "times the noise level", "judgement: half of the uncertainty of `y_sd`";
     /// The second-best model is followed if its error is within this factor of the best.
-    rival: f64 = 2.0, "times the best error", "rigs with memory: the right first step was never further behind";
+    rival: f64 = 2.0, "times the best error", "rigs with memory: the correct first step was always within this factor";
     /// Delays between samples are rounded to whole samples if the error rises by no more than this.
-    rounding: f64 = 0.015, "share of the rms error", "what an effect must take to be named";
+    rounding: f64 = 0.015, "share of the rms error", "the practical margin of effects";
     /// An effect with a parameter this close to the end of its range is a surrogate.
-    bound: f64 = 0.01, "share of the range", "a ring of 0.95 of critical damping was named where the flow has a second lag";
+    bound: f64 = 0.01, "share of the range", "otherwise vortex shedding with damping ratio 0.95 was named on a flow with a second lag";
     /// Number of rounds of screening and refitting.
-    rounds: usize = 6, "", "two effects and two memories take three";
+    rounds: usize = 6, "", "two effects and two memories need three";
     /// The search ends after this many rounds without a gain.
     patience: usize = 2, "rounds", "judgement: for the time it takes";
     /// If the error is at least this factor of the noise level when the search ends, the search is extended
@@ -28,31 +28,31 @@ rules! {
     /// Rounds of that extension.
     rounds_after: usize = 3, "rounds", "judgement: for the time it takes";
     /// Factor on the number of refits in the first round of the extension.
-    wider: usize = 4, "", "the flow over a ramp: separate delays of the edges promise little before there are vortices, and the other way round";
+    wider: usize = 4, "", "flow over a ramp: edge-dependent delays and vortices gain only together";
     /// Proposals with effects that are refitted per model and round.
     with_effects: usize = 5, "", "the truth was within the first three on 80 rigs of six families";
     /// Proposals without effects that are refitted per model and round.
-    without_effects: usize = 4, "", "a rate that depends on y was the fourth beside lags of all kinds";
+    without_effects: usize = 4, "", "a level-dependent rate was the fourth best beside lags";
     /// At most so many refitted proposals without effects are of one kind.
-    of_one_kind: usize = 2, "", "judgement: lags are moved to where they belong";
+    of_one_kind: usize = 2, "", "judgement: lags are moved by the fit";
     /// Of the proposals fitted for a few iterations, number that are refitted in full.
     finished: usize = 4, "", "the same rigs";
     /// A given structure with more terms than this is not used as a starting point.
-    most_given: usize = 6, "terms", "judgement: each has to be tried without at the end";
+    most_given: usize = 6, "terms", "judgement: each of them is tested for removal at the end";
     /// Effects that are tried in place of another term.
-    in_its_place: usize = 3, "", "judgement: the truth leads the screening or is next to the leader";
+    in_its_place: usize = 3, "", "judgement: the true effect is first or second in the screening";
     /// Such a replacement is tried if its predicted error is below this factor.
-    promising: f64 = 2.0, "times the error", "eight rigs: after a few steps no less than 0.7 of what the screening promised was left";
+    promising: f64 = 2.0, "times the error", "eight rigs: the error after a brief fit was at least 0.7 × the predicted one";
     /// A replacement within this factor after a few iterations is refitted in full.
     in_reach: f64 = 1.2, "times the error", "judgement: the lag of a valve in the place of a film's is 1.15 after the first steps";
     /// A base model with a penalised error larger by no more than this replaces a second named effect.
-    as_well: f64 = 0.01, "share of the rms error", "a lag of the film and a second lag of the flow are one model where the delay is fixed, and the second costs a parameter more";
+    as_well: f64 = 0.01, "share of the rms error", "with a fixed delay a film lag and a second lag of the flow are the same model, and the second has one parameter more";
     /// Iterations of the brief fit of each proposal.
-    brief: usize = 6, "iterations", "fewer leave thresholds where they were";
+    brief: usize = 6, "iterations", "thresholds do not move in fewer iterations";
     /// If there are more starts than this, only the best so many are continued after half of the iterations.
     followed: usize = 3, "starts", "judgement: for the time it takes";
     /// A term is needed if removing it costs more than this factor of its penalty after a brief fit.
-    far_from_needless: f64 = 5.0, "times the price", "judgement: the steps that follow take half of the loss at most";
+    far_from_needless: f64 = 5.0, "times the price", "judgement: further iterations recover at most half of the loss";
     /// Level of the tests.
     level: f64 = 0.05, "p-value", "convention";
     /// The base model that effects must beat has been offered so many more parameters than the effects have.
@@ -62,17 +62,17 @@ rules! {
     /// Longest lag as a share of the shortest record.
     longest_lag_share: f64 = 0.25, "share of a record", "judgement";
     /// Steps between the lags that are screened.
-    lag_step: usize = 8, "samples", "a wrong lag of half a step leaves a tenth of what the right one takes";
+    lag_step: usize = 8, "samples", "half a step off, a lag explains 90 % of what the right one does";
 
     /// A linear model whose inputs cancel each other is used as a starting point if its error is smaller than
     /// the best structure's by this.
-    linear_better: f64 = 0.03, "share of the rms error", "judgement: a first response in the wrong direction errs by more";
+    linear_better: f64 = 0.03, "share of the rms error", "judgement: an inverse response has a larger error";
     /// Most evaluations of the mesh adaptive direct search for the delays of a chosen structure.
     settling: usize = 300, "", "judgement: each is a brief fit; a structure of five delays needs 60 to 150";
     /// Iterations of the parameter fit at each evaluation of that search.
     settling_iterations: usize = 2, "iterations", "judgement: the start is the best fit so far";
     /// How far a lag may move in that search.
-    settling_reach: f64 = 0.25, "share of the lag", "judgement: what is further off the search over terms has tried";
+    settling_reach: f64 = 0.25, "share of the lag", "judgement: larger moves are made by the search over terms";
     /// Smallest allowed move of a lag in that search.
     settling_least: usize = 8, "samples", "the step of the grid that lags are screened on";
     /// Initial frame size of that search.
@@ -80,7 +80,7 @@ rules! {
     /// A delay law whose delay varies by less than this over the levels of the records is a constant delay.
     least_rise: f64 = 1.0, "samples", "what rounding to samples hides";
     /// A delay law is also a constant delay if the test at this level does not distinguish them.
-    law_level: f64 = 0.01, "p-value", "convention: one of a hundred constant delays gets a law";
+    law_level: f64 = 0.01, "p-value", "convention: 1 % of constant delays get a law";
 
     /// Grid points along the range of a parameter if one, two, or more parameters of the effect are free.
     grid: [usize; 3] = [12, 4, 3], "", "judgement";
@@ -132,18 +132,18 @@ rules! {
     /// Rounds of moving all lags of a model.
     lag_rounds: usize = 6, "", "judgement";
     /// Fit iterations after each move of the lags.
-    lag_iterations: usize = 1, "iterations", "without one, far from the floor, lags stay where they are: a converter, a ball screw and the flow over a ramp";
+    lag_iterations: usize = 1, "iterations", "needed far from the noise level, where lags do not move otherwise: buck converter, ball screw, flow over a ramp";
     /// Least gain of a move of the lags.
     lag_gain: f64 = 1e-4, "share of the mean square error", "judgement";
     /// Level of y at which delay laws are compared if no level is given.
     middle: f64 = 0.5, "size of y", "the middle of the range";
 
     /// The bootstrap draws signs per record, or per piece of a record if there are fewer records than this.
-    fewest_pieces: usize = 8, "", "2⁸ patterns of signs: a p-value of 0.01 can be told";
+    fewest_pieces: usize = 8, "", "2⁸ sign patterns resolve a p-value of 0.01";
     /// Bootstrap draws of the error under noise alone.
-    draws: usize = 199, "", "a p-value of 0.005 is the least that can be said";
+    draws: usize = 199, "", "the smallest p-value is then 0.005";
     /// Block length in correlation times; blocks count as independent.
-    correlation_times: f64 = 8.0, "correlation times", "held by `the_p_value_is_calibrated_for_coloured_errors`";
+    correlation_times: f64 = 8.0, "correlation times", "tested in `the_p_value_is_calibrated_for_coloured_errors`";
     /// Shortest block.
     shortest_block: usize = 20, "samples", "judgement";
     /// Fewest blocks; limits the block length.
@@ -159,5 +159,5 @@ rules! {
     /// Share of the only record that is used for estimation.
     learned_share: f64 = 0.6, "share of the record", "judgement";
     /// Error assigned to a diverging run.
-    diverged: f64 = 10.0, "times the largest |y|", "judgement: worse than any that stays";
+    diverged: f64 = 10.0, "times the largest |y|", "judgement: worse than any bounded run";
 }

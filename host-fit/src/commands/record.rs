@@ -87,15 +87,15 @@ impl Words for Recorded {
     fn words(&self) -> String {
         let each = self.recordings.iter().map(|r| {
             let mut text = format!(
-                "{}: {} whole repeats of {} s, in {}",
+                "{}: {} complete repeats of {} s, {}",
                 r.file.display(),
                 r.repeats,
                 r.period_s,
-                if r.parts == 1 { "one go".into() } else { format!("{} goes", r.parts) },
+                if r.parts == 1 { "without interruption".into() } else { format!("in {} parts", r.parts) },
             );
             if r.lost_samples > 0 {
                 text.push_str(&format!(
-                    "; {} samples were lost ({} of them found no room on the board) and their repeats played again",
+                    "; {} samples were lost ({} of them for lack of memory on the board); their repeats were played again",
                     r.lost_samples, r.left_out_samples
                 ));
             }

@@ -433,7 +433,7 @@ impl Day {
 
 /// Long output for the page: its first and last lines, with the number of lines left out.
 fn shortened(said: &str) -> String {
-    const FIRST: usize = 14;
+    const FIRST: usize = 12;
     const LAST: usize = 3;
     let lines: Vec<&str> = said.lines().map(str::trim_end).collect();
     if lines.len() <= FIRST + LAST + 1 {

@@ -1,4 +1,4 @@
-//! One recording: its columns, and what they have to keep to.
+//! A record: its columns and their constraints.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crate::thresholds::RULES;
 /// Names of columns with a meaning of their own; every other column is a measured channel.
 pub(crate) const RESERVED: [&str; 6] = ["t", "u", "y", "y_sd", "y_min", "y_max"];
 
-/// Values beyond this are refused: their squares would not be finite.
+/// Larger values are rejected: their squares would overflow.
 const LARGEST: f64 = 1e100;
 
 /// Shortest and longest sampling period, s: times are written to 12 decimals, a thousandth of the shortest.
@@ -18,13 +18,13 @@ pub const PERIODS_S: [f64; 2] = [1e-9, 1e9];
 /// shorter than the longest line that is read.
 const CHANNELS: (usize, usize) = (4096, 200);
 
-/// What a record is used for.
+/// Use of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Use {
-    /// Parameters are fitted on it.
+    /// Estimation: parameters are fitted to it.
     Identify,
-    /// Held out: models are judged on it.
+    /// Validation: models are compared on it.
     Validate,
 }
 
@@ -33,7 +33,7 @@ pub enum Use {
 pub struct Record {
     /// Unique within the data set.
     pub name: String,
-    /// Fitted on, or held out.
+    /// Estimation or validation.
     pub role: Use,
     /// Sampling period, s, above 0.
     pub sample_period_s: f64,

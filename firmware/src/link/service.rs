@@ -15,10 +15,10 @@ use wire::reply::{Answer, Info, PROTOCOL, Phase, Reply, Scale, Status, lost_afte
 use wire::request::{Ask, Request};
 use wire::samples::{self, Batch, FULL, Sample};
 
-/// No sample of the stream waits longer for its frame, ms.
+/// Longest waiting time of a sample before its frame is sent, ms.
 const STREAMED_MS: u32 = 100;
 
-/// What the board is, for [`Info`].
+/// Properties of the board, for [`Info`].
 #[derive(Clone, Copy, Debug)]
 pub struct Board {
     /// Sample period, µs.
@@ -27,13 +27,13 @@ pub struct Board {
     pub model: u32,
 }
 
-/// The host that has the board.
+/// The connected host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Session {
     name: u32,
-    /// Samples since it was heard.
+    /// Samples since its last message.
     silent: u32,
-    /// The last request that was carried out, and what came of it.
+    /// The last executed request, with its result.
     answered: Option<(u16, Done)>,
     streams: bool,
 }
@@ -45,13 +45,13 @@ struct Done {
     samples: u64,
 }
 
-/// The board's side of the dialogue.
+/// The board's side of the protocol.
 #[derive(Clone, Debug)]
 pub struct Service {
     board: Board,
-    /// Samples after which a silent host is lost.
+    /// Samples after which a silent host counts as lost.
     lost_after: u32,
-    /// Samples of a frame of the stream: as many as it takes, or fewer that are a tenth of a second.
+    /// Samples per frame of the stream: the largest number, limited to a tenth of a second.
     streamed: usize,
     session: Option<Session>,
     player: Player,

@@ -1,4 +1,4 @@
-//! Candidate effects ranked by the validation error they leave.
+//! Candidate effects ranked by validation error.
 
 use super::axis::{Axis, extent};
 use super::canvas::{Anchor, Ink, MARGIN, WIDTH, Words, draw, fit, text_width};
@@ -10,7 +10,7 @@ use super::panel::{FOOT, Panel};
 /// One candidate.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Candidate<'a> {
-    /// Name of the effect, or of the group that cannot be told apart.
+    /// Name of the effect, or of the equivalence set.
     pub name: &'a str,
     /// Validation RMSE, free run with the candidate added and everything refitted, unit of y.
     pub rmse: f64,

@@ -151,8 +151,8 @@ fn verdict(document: &Value) -> Result<String, String> {
         .to_owned())
 }
 
-/// The effect of a case as large as the diagnosis of the rig without it says that it would be seen; none where it
-/// says that any size could stay unseen.
+/// The effect of a case at its detectable size according to the diagnosis of the rig without it; none if any
+/// size could stay undetected.
 fn just_seen(
     case: &Case,
     plan: &RigPlan,
@@ -198,7 +198,7 @@ fn names(list: &Value) -> Vec<String> {
         .collect()
 }
 
-/// Parameters of the hidden effects that the model has too.
+/// Estimated and true parameters of the hidden effects that the model contains.
 fn compare(plan: &RigPlan, model: &Model, document: &Value) -> Vec<Found> {
     let ranking = document["ranking"].as_array();
     let mut found = Vec::new();
@@ -226,7 +226,7 @@ fn compare(plan: &RigPlan, model: &Model, document: &Value) -> Vec<Found> {
     found
 }
 
-/// Options of `identify` for the model that is handed in.
+/// Options of `identify` for the given model.
 pub(super) fn structure(given: Given, plan: &RigPlan) -> Vec<String> {
     let hidden = plan.hidden();
     let lags = match (given, &plan.plant.character) {
@@ -235,7 +235,7 @@ pub(super) fn structure(given: Given, plan: &RigPlan) -> Vec<String> {
         (Given::Truth, Character::Wake { .. }) => 2,
         (Given::Truth, Character::FirstOrder | Character::RateOfFriction { .. })
         | (Given::Lean, _) => 1,
-        // A law that `identify` has found is not missing: what hides one is asked with fixed delays.
+        // A law found by `identify` is not missing: if one is hidden, fixed delays are used.
         (Given::Default, _) if hidden.contains(&"state-dependent-delay") => {
             return ["--delay", "fixed"].map(str::to_owned).to_vec();
         }
@@ -255,8 +255,8 @@ pub(super) fn structure(given: Given, plan: &RigPlan) -> Vec<String> {
         .to_vec()
 }
 
-/// A model as an engineer would hand it in without fitting: a rough guess, without delay law where the law is
-/// hidden; with the wrong lags and delays where the case says so.
+/// A rough model without a fit: without a delay law if the law is hidden, and with wrong lags and delays if
+/// the case requires it.
 fn guess(case: &Case, plan: &RigPlan) -> Option<Model> {
     let bad = match case.given {
         Given::Guess => false,

@@ -304,7 +304,7 @@ fn what_a_fit_cannot_use_is_refused_with_its_file() {
         (
             of(40, &square, &wave),
             &["--max-lag", "30", "--n1", "30", "--n2", "30"],
-            ["poor.csv: ", "39 equations for 61"],
+            ["poor.csv: ", "39 equations for 62"],
         ),
         (
             of(900, &|_| 1.0, &wave),

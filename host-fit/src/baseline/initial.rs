@@ -7,10 +7,12 @@ use std::ops::Range;
 const FEWEST: usize = 20;
 /// The share of a record that its initial state is estimated from.
 const SHARE: f64 = 0.05;
+/// The longest such share.
+const LONGEST: f64 = 0.25;
 
 /// Free responses of a process over a record: what different initial states differ by. The state itself is estimated
-/// from the beginning alone: the first twentieth of the record, at least 20 samples, and longer where the process has
-/// no time constant as short as half of that. Of a record that begins in mid-run the beginning is what free runs follow,
+/// from the beginning alone: the first twentieth of the record, at least 20 samples, and longer, up to a quarter, where
+/// the process has no time constant as short as half of that. Of a record that begins in mid-run the beginning is what free runs follow,
 /// from where commands before the record are answered.
 #[derive(Clone, Debug)]
 pub(super) struct InitialState {
@@ -43,9 +45,10 @@ impl InitialState {
     ) -> Self {
         let mut beginning = FEWEST.max((SHARE * samples as f64) as usize);
         // Doubled, so that it does not vary with small changes of the time constant.
-        while beginning < samples && (beginning as f64) < 2.0 * fastest {
+        while (beginning as f64) < (LONGEST * samples as f64).min(2.0 * fastest) {
             beginning *= 2;
         }
+        beginning = beginning.min(FEWEST.max((LONGEST * samples as f64) as usize));
         let mut new = Self {
             columns: Vec::new(),
             beginning: known.start..(known.start + beginning).max(known.end).min(samples),
@@ -117,7 +120,7 @@ mod tests {
         let beginning = |fastest| InitialState::new(Vec::new(), 1000, fastest).beginning.end;
         assert_eq!(
             (beginning(3.0), beginning(90.0), beginning(1e6)),
-            (50, 200, 1000)
+            (50, 200, 250)
         );
     }
 }

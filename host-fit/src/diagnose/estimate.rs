@@ -92,6 +92,17 @@ pub(super) fn is_identified(fit: &Fit, spec: &Spec) -> bool {
     })
 }
 
+/// Whether the amplitude of an effect differs significantly from 0; `true` if its card has no linear amplitude.
+pub(super) fn is_there(fit: &Fit, spec: &Spec) -> bool {
+    let values = fit.model.values();
+    let amplitude = spec.amplitude.filter(|amplitude| amplitude.linear);
+    own(&fit.model, spec).into_iter().all(|(index, card)| {
+        let half = DEVIATES * fit.standard_error(index).unwrap_or(0.0);
+        amplitude.is_none_or(|amplitude| amplitude.parameter != card.name)
+            || values[index].abs() > half
+    })
+}
+
 /// An effect's parameters with their indices among the coordinates of a model.
 fn own(model: &Model, spec: &Spec) -> Vec<(usize, &'static Parameter)> {
     let coordinates = model.coordinates();

@@ -1,6 +1,6 @@
 //! The verdict: whether anything is missing, and which effects are significant.
 
-use super::estimate::is_identified;
+use super::estimate::{is_identified, is_there};
 use super::memory::memory;
 use super::outcome::Conclusion;
 use super::ranking::{Rival, not_tried, ranked, screened};
@@ -186,6 +186,7 @@ impl Session<'_> {
         let is_worthwhile = with < (1.0 - worthwhile) * without;
         if open
             && with < without
+            && self.all_are_there(best)
             && let Some(p) = self.more_than_chance(best, bare)
         {
             // On a base that fits, effects with unidentifiable parameters need a certificate.
@@ -210,6 +211,13 @@ impl Session<'_> {
         let end = self.judge().final_fit(&best.judged);
         let mut effects = best.terms.iter().filter_map(Term::effect);
         effects.all(|spec| is_identified(&end, spec))
+    }
+
+    /// Whether the 95 % interval of every effect's amplitude excludes 0.
+    fn all_are_there(&self, best: &Hypothesis) -> bool {
+        let end = self.judge().final_fit(&best.judged);
+        let mut effects = best.terms.iter().filter_map(Term::effect);
+        effects.all(|spec| is_there(&end, spec))
     }
 
     /// Whether the noise level is unknown and the error of the base depends on no coordinate.

@@ -17,6 +17,30 @@ pub(super) struct Beginning {
     pub(super) follow: usize,
 }
 
+/// The level at which a record rests, and its standard error for white noise.
+#[derive(Clone, Copy, Debug)]
+struct Rest {
+    level: f64,
+    error: f64,
+}
+
+impl Rest {
+    fn of(y: &[f64]) -> Self {
+        let n = y.len().max(1) as f64;
+        let level = y.iter().sum::<f64>() / n;
+        let square = y.iter().map(|y| (y - level).powi(2)).sum::<f64>();
+        Self {
+            level,
+            error: (square / (n - 1.0).max(1.0) / n).sqrt(),
+        }
+    }
+
+    /// Whether both are the same but for noise: within three standard errors.
+    fn is_at_level_of(&self, other: &Self) -> bool {
+        (self.level - other.level).abs() <= 3.0 * self.error.hypot(other.error)
+    }
+}
+
 /// A straight-line fit of y to a constant and one shape.
 struct Shape {
     /// Sum of squares that it leaves.
@@ -162,30 +186,34 @@ impl Beginning {
     }
 
     /// Takes rests that are too short to be sure of for what they are: where records rest at different levels under the
-    /// same command, something is still on its way, and those that show less than a motion takes and do not rest where
-    /// most do begin in mid-run.
+    /// same command, something is still on its way. Those that show less than a motion takes begin in mid-run then,
+    /// unless three of them, and more than half of all, rest at their level as far as noise lets it be known: two may
+    /// agree by chance.
     pub(super) fn reconcile(beginnings: &mut [Self], records: &[Record], reference: &FirstOrder) {
-        let level = |record: &Record, own: &Self| {
-            let rest = &record.y[..own.rest.min(record.y.len())];
-            rest.iter().sum::<f64>() / rest.len().max(1) as f64
-        };
-        let levels: Vec<Option<(f64, f64)>> = records
+        let rests: Vec<Option<(f64, Rest)>> = records
             .iter()
             .zip(&*beginnings)
-            .map(|(record, own)| (own.rest > 0).then(|| (own.command, level(record, own))))
+            .map(|(record, own)| {
+                let y = &record.y[..own.rest.min(record.y.len())];
+                (own.rest > 0).then(|| (own.command, Rest::of(y)))
+            })
             .collect();
         let apart = RULES.rests_apart * range_of_y(records);
         let enough = RULES.times_of_rest * reference.time_constant;
-        for (own, record) in beginnings.iter_mut().zip(records) {
-            let same = levels
-                .iter()
-                .flatten()
-                .filter(|(command, _)| *command == own.command);
-            let same: Vec<f64> = same.map(|(_, level)| *level).collect();
-            if own.rest > 0
-                && (own.rest as f64) < enough
-                && !rests_with_most(level(record, own), &same, apart)
-            {
+        for ((own, record), rest) in beginnings.iter_mut().zip(records).zip(&rests) {
+            let Some((command, rest)) = rest else {
+                continue;
+            };
+            let same = rests.iter().flatten();
+            let same = same.filter(|(other, _)| other == command);
+            let same: Vec<&Rest> = same.map(|(_, rest)| rest).collect();
+            let levels = || same.iter().map(|rest| rest.level);
+            let highest = levels().fold(f64::NEG_INFINITY, f64::max);
+            let lowest = levels().fold(f64::INFINITY, f64::min);
+            let alike = same.iter().filter(|other| rest.is_at_level_of(other));
+            let alike = alike.count();
+            let with_most = alike >= 3 && 2 * alike > same.len();
+            if (own.rest as f64) < enough && highest - lowest > apart && !with_most {
                 let (dead_time, time) = (reference.dead_time, reference.time_constant);
                 *own = Self::in_mid_run(record, own.command, dead_time, time);
             }
@@ -246,16 +274,6 @@ impl Beginning {
         }
         record
     }
-}
-
-/// Whether a level is one of the `apart`-wide group in which more than half of all levels are.
-fn rests_with_most(level: f64, all: &[f64], apart: f64) -> bool {
-    let mut sorted = all.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.iter().any(|low| {
-        let group = |y: &f64| (*low..=low + apart).contains(y);
-        2 * sorted.iter().filter(|y| group(y)).count() > sorted.len() && group(&level)
-    })
 }
 
 /// The distance from the least y of all records to the largest.

@@ -88,7 +88,8 @@ pub fn base_model(
         interrupt,
         progress,
     };
-    if bears_little(records) {
+    let may_be_constant = laws.iter().any(|law| matches!(law, Delay::Fixed { .. }));
+    if bears_little(records) && may_be_constant {
         progress("first and second order with dead time");
         if let Some(model) = linear::alone(&judge, &given) {
             return Some(Ok(Automatic {
@@ -114,8 +115,7 @@ pub fn base_model(
     }
     let by_score = |a: &&Hypothesis, b: &&Hypothesis| a.judged.size().total_cmp(&b.judged.size());
     progress("first and second order with dead time");
-    let constant = |law: &Delay| matches!(law, Delay::Fixed { .. });
-    let linear = match laws.iter().any(constant) {
+    let linear = match may_be_constant {
         true => linear::baselines(&given, &judge.learning(0)),
         false => Vec::new(),
     };
@@ -134,7 +134,7 @@ pub fn base_model(
     // A law that says no more than a constant delay is no place to set out from.
     let root = Hypothesis::new(without_needless_law(&judge, root.judged.clone(), laws));
     progress("the same of second order");
-    let second = second_order(&judge, &root);
+    let second = second_order(&judge, &root, may_be_constant);
     let mut found = search.run(root, || second);
     // Inputs of which one takes back what another does are no first or second order: where they do better than the best
     // structure so far is where to set out from.

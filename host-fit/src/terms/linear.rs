@@ -49,9 +49,9 @@ fn linear(frame: &Model, a: Vec<f64>, b: Vec<f64>, constant: f64, delay: f64) ->
     }
 }
 
-/// The better one of first and second order, one delay and no products: what records can bear whose
-/// command changes too seldom to say how anything depends on y. All of them are fitted and judged: what could be held
-/// out is not moved by the command.
+/// The better one of first and second order, with one delay and without products: the model for records whose command
+/// changes too seldom to identify how anything depends on y. Fit and choice use all samples, since none that could be
+/// held out follow a change of the command.
 pub(super) fn alone(judge: &Judge, frame: &Model) -> Option<Model> {
     let found = Baselines::fit(&judge.everything());
     let period = frame.sample_period_s;
@@ -71,14 +71,18 @@ pub(super) fn alone(judge: &Judge, frame: &Model) -> Option<Model> {
     best.map(|fit| fit.model)
 }
 
-/// The second order of `judge`'s records with the delay law and the products of `root`, a first order: what a search
-/// over single terms finds late, for the delay of the first order holds the second lag as well.
-pub(super) fn second_order(judge: &Judge, root: &Hypothesis) -> Option<Hypothesis> {
+/// A second order with the delay law and the products of `root`, which is of first order. A search that adds one term at
+/// a time finds it late, because the delay of the first order contains the second lag as well.
+pub(super) fn second_order(
+    judge: &Judge,
+    root: &Hypothesis,
+    may_be_constant: bool,
+) -> Option<Hypothesis> {
     let first = root.judged.model();
     let period = first.sample_period_s;
     let found = Baselines::fit(&judge.learning(0)).sopdt?;
     let linear = one_input(first, found.recursion(period));
-    // The lags in series, with the products of the first order; and the linear one, which may swing.
+    // Two lags in series, with the products of the first order; and the linear one, which may be underdamped.
     let in_series = found.time_constants_s.map(|[_, lag]| {
         let lag = lag / period;
         let mut model = first.clone();
@@ -86,7 +90,7 @@ pub(super) fn second_order(judge: &Judge, root: &Hypothesis) -> Option<Hypothesi
         model.delay_later(later);
         Term::Inertia(lag).added_to(&model, &[])
     });
-    let swings = Model {
+    let underdamped = Model {
         start: first.start,
         constant: first.constant,
         product_lags: vec![1, 2],
@@ -94,7 +98,9 @@ pub(super) fn second_order(judge: &Judge, root: &Hypothesis) -> Option<Hypothesi
         effects: first.effects.clone(),
         ..linear
     };
-    let all = [in_series, Some(swings)].into_iter().flatten();
+    let all = in_series
+        .into_iter()
+        .chain(may_be_constant.then_some(underdamped));
     let judged = all.filter_map(|model| judge.refitted(&model).ok());
     let judged = judged.min_by(|a, b| a.rmse().total_cmp(&b.rmse()))?;
     Some(Hypothesis {

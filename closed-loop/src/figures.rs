@@ -1,4 +1,4 @@
-//! What a closed-loop run amounts to.
+//! Figures of a closed-loop run.
 
 use crate::run::{Trace, span};
 use serde::Serialize;
@@ -18,14 +18,14 @@ pub struct Figures {
     pub switches_per_s: f64,
     /// Share of time with the valve open: the air used, relative to steady blowing.
     pub air: f64,
-    /// From the start until the mean of 250 samples of the friction is within 5 % of the last reference for 1000 samples
-    /// (each at least as many milliseconds, [`span`]); `None` if it never is.
+    /// Time until the mean of 250 samples of the friction stays within 5 % of the last reference for 1000
+    /// samples (each at least as many milliseconds, [`span`]); `None` if it never does.
     pub settling_s: Option<f64>,
 }
 
-/// Samples over which the friction is averaged before it is called settled.
+/// Averaging length for the settling time, samples.
 const SETTLED_MEAN: usize = 250;
-/// Samples for which it must stay.
+/// Required duration within the band, samples.
 const SETTLED_FOR: usize = 1000;
 
 impl Figures {
@@ -126,7 +126,7 @@ mod tests {
         assert_eq!(Figures::of(&trace, 0).settling_s, None);
     }
 
-    /// The same samples a hundred times as far apart: times are a hundred times as long, rates a hundredth.
+    /// At a hundred times the sample period, times are multiplied by a hundred and rates divided.
     #[test]
     fn times_and_rates_go_with_the_period() {
         let sample = |k: usize| Sample {

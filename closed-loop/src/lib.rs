@@ -1,7 +1,7 @@
-//! The loop at any sample period: controllers, what they control, and what came of it.
+//! Closed-loop simulation at any sample period: controllers, plants and figures.
 //!
-//! The law of `model-core` runs here beside what people use instead, on anything that is [`Controlled`]: a model, a
-//! simulated plant, a flow of the caller's own.
+//! The law of `model-core` and standard controllers run here on anything that is [`Controlled`]: a model, a
+//! simulated plant, a plant of the caller's own.
 
 mod figures;
 mod model_flow;

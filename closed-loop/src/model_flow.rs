@@ -1,11 +1,11 @@
-//! A model as the flow: what a law does when everything is as identified.
+//! A model as the plant: the behaviour of a law without model errors.
 
 use crate::run::Controlled;
 use model_core::history::Memory;
 use model_core::model::StateOf;
 use model_core::{Input, Parts, Real, step};
 
-/// A model of `model-core` in the place of the flow.
+/// A model of `model-core` as the plant.
 pub struct ModelFlow<'a, T: Real, M: Parts<T>, Y, J> {
     model: &'a M,
     state: StateOf<T, M, Y, J>,
@@ -48,8 +48,8 @@ impl<T: Real, M: Parts<T>, Y: Memory<T>, J: Memory<T>> Controlled for ModelFlow<
     fn sample_period_s(&self) -> f64 {
         self.sample_period_s
     }
-    /// The reading belongs to the sample in which the command acts: sensor
-    /// effects of the model are one sample old.
+    /// The reading belongs to the sample in which the command acts: sensor effects of the model are one
+    /// sample old.
     fn step(&mut self, command: bool) -> Option<f64> {
         let input = Input {
             command: if command { T::ONE } else { T::ZERO },

@@ -1,9 +1,9 @@
-//! Blowing without looking: steadily or in pulses.
+//! Open-loop blowing: steady or pulsed.
 
 use crate::run::Controller;
 use model_core::control::{Hold, HoldTimes, PulseTrain};
 
-/// A pulse train played whatever the sensor says.
+/// A pulse train independent of the sensor.
 #[derive(Clone, Debug)]
 pub struct OpenLoop {
     train: PulseTrain<Vec<(u32, u32)>>,

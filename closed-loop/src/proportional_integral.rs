@@ -1,5 +1,4 @@
-//! PI control of the duty with pulse-width modulation, alone or with a Smith
-//! predictor: what most rigs run.
+//! PI control of the duty with pulse-width modulation, with or without a Smith predictor.
 
 use crate::run::Controller;
 use model_core::control::{Hold, HoldTimes};
@@ -14,8 +13,8 @@ pub struct Gains {
     pub integral: f64,
 }
 
-/// First order with dead time, what a Smith predictor knows of the flow:
-/// gain (y per duty), time constant and delay (s).
+/// First order with dead time, the model of the Smith predictor: gain (y per duty), time constant and delay
+/// (s).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstOrder {
     /// y per duty.
@@ -26,14 +25,14 @@ pub struct FirstOrder {
     pub delay_s: f64,
 }
 
-/// A PI controller whose duty a pulse-width modulator plays.
+/// A PI controller with a pulse-width modulator.
 #[derive(Clone, Debug)]
 pub struct PulseWidth {
     gains: Gains,
     smith: Option<Smith>,
     /// Time between two commands, s.
     period_s: f64,
-    /// Samples in a modulation period.
+    /// Length of a modulation period, samples.
     carrier: u32,
     at: u32,
     width: u32,
@@ -85,7 +84,7 @@ impl PulseWidth {
         self
     }
 
-    /// The duty asked for, 0–1, held back where the integral saturates.
+    /// The requested duty, 0–1, with anti-windup.
     fn duty(&mut self, interval_s: f64) -> f64 {
         let seen = match &self.smith {
             None => self.reading,
@@ -94,14 +93,14 @@ impl PulseWidth {
         let error = self.reference - seen;
         let integral = self.integral + self.gains.integral * error * interval_s;
         let duty = self.gains.proportional * error + integral;
-        // Conditional integration: no winding up while the duty is at its end.
+        // Conditional integration: the integral stops while the duty is saturated.
         if (0.0..=1.0).contains(&duty) || (duty > 1.0) != (error > 0.0) {
             self.integral = integral.clamp(0.0, 1.0);
         }
         duty.clamp(0.0, 1.0)
     }
 
-    /// The duty's pulse, rounded to what the hold times allow.
+    /// The pulse for a duty, rounded to the hold times.
     fn pulse(&self, duty: f64) -> u32 {
         let width = (duty * f64::from(self.carrier)).round() as u32;
         let (on, off) = (self.times.of(true), self.times.of(false));
@@ -125,7 +124,7 @@ impl Controller for PulseWidth {
     }
     fn command(&mut self, reading: Option<f64>) -> bool {
         if let Some(y) = reading {
-            // Averaged over the carrier, or its ripple would alias into the duty.
+            // Averaged over the carrier period, to avoid aliasing of its ripple.
             self.reading += (y - self.reading) * 2.0 / f64::from(self.carrier + 1);
         }
         if self.at == 0 {

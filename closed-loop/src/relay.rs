@@ -1,14 +1,13 @@
-//! The plain relay: what one builds first.
+//! A two-position relay with hysteresis.
 
 use crate::run::Controller;
 use model_core::control::{Hold, HoldTimes};
 
-/// On below the reference, off above it, with a dead zone and hold times; no
-/// thought for what is already on its way.
+/// On below the reference, off above it, with a dead band and hold times; without prediction.
 #[derive(Clone, Copy, Debug)]
 pub struct Relay {
     times: HoldTimes,
-    /// Half the dead zone, y.
+    /// Half of the dead band, y.
     half_band: f64,
     reference: f64,
     hold: Hold,

@@ -1,5 +1,4 @@
-//! A controller that sees readings and gives commands, a flow that sees commands
-//! and gives readings, and the record of the two.
+//! Closed-loop run of a controller and a plant, and its record.
 
 use std::fmt::Write as _;
 
@@ -15,24 +14,24 @@ use std::fmt::Write as _;
 /// ```
 #[must_use]
 pub fn span(samples: usize, period_s: f64) -> usize {
-    // A period that is no number leaves the samples.
+    // For a NaN period the samples are kept.
     samples.max((samples as f64 * 1e-3 / period_s).round() as usize)
 }
 
-/// What can be controlled: a flow whose true friction is known besides the reading.
+/// A plant whose true friction is known besides the reading.
 pub trait Controlled {
-    /// Time that a command is held for, s.
+    /// Hold time of a command, s.
     fn sample_period_s(&self) -> f64;
     /// Holds the command for one sample, then reads the sensor (y); `None` when
     /// the reading is lost.
     fn step(&mut self, command: bool) -> Option<f64>;
-    /// The friction now, before film and noise (y).
+    /// The present friction, before sensor dynamics and noise (y).
     fn friction(&self) -> f64;
 }
 
-/// What can be in charge of the valve.
+/// A controller of the valve.
 pub trait Controller {
-    /// Where the loop is told to go, from now on (y).
+    /// Sets the reference (y).
     fn set_reference(&mut self, reference: f64);
     /// The valve from this sample to the next, given the reading of this sample
     /// (`None` where there is none).
@@ -42,13 +41,13 @@ pub trait Controller {
 /// A sample of a closed-loop run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// What was asked for (y).
+    /// The reference (y).
     pub reference: f64,
     /// The friction of the flow (y).
     pub friction: f64,
-    /// What the controller was shown (y).
+    /// The reading of the controller (y).
     pub reading: Option<f64>,
-    /// What it commanded.
+    /// The command.
     pub on: bool,
 }
 

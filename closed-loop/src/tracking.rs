@@ -1,4 +1,4 @@
-//! The law of `model-core` as a controller, in the numbers of the board.
+//! The law of `model-core` as a controller, in the board's number type.
 
 use crate::run::Controller;
 use model_core::control::{Decision, Tracking, TrackingState};
@@ -7,10 +7,10 @@ use model_core::history::Memory;
 use model_core::model::StateOf;
 use model_core::{Parts, Real};
 
-/// Samples the law of a simulated loop can look ahead.
+/// Look-ahead memory of a simulated law, samples.
 pub const AHEAD: usize = 640;
 
-/// A tracking law at work.
+/// A tracking law with its state.
 pub struct TrackingController<'a, T: Real, M: Parts<T>, Y, J> {
     model: &'a M,
     tracking: Tracking<T>,
@@ -43,7 +43,7 @@ where
         }
     }
 
-    /// What was decided last, and why.
+    /// The last decision.
     pub fn decision(&self) -> Option<&Decision<T>> {
         self.decision.as_ref()
     }
@@ -57,7 +57,7 @@ where
     J: Memory<T>,
     <M::Effects as Effect<T>>::State: Clone,
 {
-    /// An unreachable reference is refused and the last one kept.
+    /// An unreachable reference is rejected and the last one kept.
     fn set_reference(&mut self, reference: f64) {
         let _ = self.tracking.set_reference(T::from_f64(reference));
     }

@@ -1,4 +1,4 @@
-//! A plant in the loop: seen through noise and a converter, over a line that loses readings.
+//! A simulated plant in closed loop, with sensor noise, converter and lost readings.
 
 use crate::instrument::{Converter, Noise, NoiseSignal};
 use crate::plant::{Plant, Rig, SAMPLE_PERIOD_S};
@@ -18,16 +18,16 @@ impl Controlled for Rig {
     }
 }
 
-/// How readings are lost.
+/// Loss of readings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Lost {
     /// Share of single readings that are lost at random, 0–1.
     pub share: f64,
-    /// A stretch without any reading: first sample and length.
+    /// An interval without any reading: first sample and length.
     pub stretch: Option<(usize, usize)>,
 }
 
-/// A flow seen through noise, a converter and a line that drops readings.
+/// A flow measured with noise, converter and lost readings.
 #[derive(Clone, Debug)]
 pub struct Disturbed<F> {
     flow: F,

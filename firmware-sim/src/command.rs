@@ -3,13 +3,13 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Length of a standard run (samples).
+/// Length of a standard run, samples.
 pub const RUN_SAMPLES: usize = 10_000;
 
-/// Zeros at the end of a standard run (samples), so that runs can follow one another.
+/// Rest at the end of a standard run, samples, so that runs can follow one another.
 pub const TAIL_SAMPLES: usize = 1_500;
 
-/// Zeros before the first edge (samples), in which the rig shows its rest.
+/// Rest before the first edge, samples, in which the sensor's offset is visible.
 pub const LEAD_SAMPLES: usize = 300;
 
 /// A named sequence of valve levels.

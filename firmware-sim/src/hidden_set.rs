@@ -1,4 +1,4 @@
-//! Data sets with something hidden in them, and the truth kept apart.
+//! Data sets with a hidden effect; the truth is stored separately.
 
 use rand::RngExt;
 use recordings::Use;
@@ -10,14 +10,14 @@ use crate::plant::{BasePlant, Effect, Fault, PlantSpec};
 use crate::recording::{Recorded, RigError, Session, with_levels};
 use crate::stream::{Stream, stream};
 
-/// Everything that determines a data set, bit for bit.
+/// Specification of a data set; determines it bit for bit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HiddenSetPlan {
-    /// The rig with what it hides.
+    /// The rig with its hidden effects.
     pub plant: PlantSpec,
     /// How it is measured.
     pub instrument: Instrument,
-    /// Whether the free stream wanders and is recorded as the channel `u_inf`.
+    /// Whether the free stream varies and is recorded as the channel `u_inf`.
     pub free_stream: bool,
     /// Seed of commands, free stream and noise.
     pub seed: u64,
@@ -64,7 +64,7 @@ impl HiddenSetPlan {
         })
     }
 
-    /// The commands of the set: on/off, or many levels when a hidden effect only shows with those.
+    /// The commands of the set: on/off, or many levels if a hidden effect requires them.
     pub fn commands(&self) -> Vec<(Command, Use)> {
         let mut rng = stream(self.seed, Stream::Commands);
         let mut random = |name: &str| Command::random(name, &mut rng);
@@ -99,7 +99,7 @@ impl HiddenSetPlan {
         session.record(self.commands())
     }
 
-    /// The answer as TOML text for people and scoring scripts; never given to the diagnosis.
+    /// The true effects as TOML text for users and scoring scripts; never an input of the diagnosis.
     pub fn answer(&self) -> String {
         format!("seed = {}\n\n{}", self.seed, self.plant.to_toml())
     }

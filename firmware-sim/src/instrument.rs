@@ -1,4 +1,4 @@
-//! What happens between the film's voltage and a phase-averaged data column: noise, converter, repeats.
+//! Instruments between the film's voltage and a phase-averaged column: noise, converter, repeats.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::plant::SAMPLE_PERIOD_S;
 
-/// Why an instrument is refused.
+/// Why an instrument is rejected.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum InstrumentError {
     /// Fewer than two repeats have no scatter.
@@ -38,7 +38,7 @@ impl Converter {
     pub fn code(&self, y: f64) -> u32 {
         let top = f64::from((1_u32 << self.bits.clamp(1, 24)) - 1);
         let scaled = (y - self.low) / (self.high - self.low) * top;
-        // A saturating cast: beyond the range the code stays at its end.
+        // A saturating cast: the code stays at the end of its range.
         scaled.round().clamp(0.0, top) as u32
     }
 
@@ -106,7 +106,7 @@ impl NoiseSignal {
     }
 }
 
-/// What else disturbs a repeat: slow, with tails, now and then. 0 for none.
+/// Further disturbances of a repeat: slow drift, heavy tails, outliers. 0 for none.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Unrest {
     /// Standard deviation of a slow component (y).
@@ -115,9 +115,9 @@ pub struct Unrest {
     pub wander_s: f64,
     /// Standard deviation of a white part with heavy tails: Student's t with 3 degrees of freedom (y).
     pub tails: f64,
-    /// Share of readings that are far off.
+    /// Share of outliers.
     pub outliers: f64,
-    /// How far off they are (y).
+    /// Size of an outlier (y).
     pub outlier_size: f64,
 }
 
@@ -130,7 +130,7 @@ impl Unrest {
     }
 }
 
-/// Running unrest at 1 kHz, stationary from its first sample.
+/// Generator of these disturbances at 1 kHz, stationary from its first sample.
 #[derive(Debug, Clone)]
 struct UnrestSource {
     size: Unrest,
@@ -140,7 +140,7 @@ struct UnrestSource {
 }
 
 impl UnrestSource {
-    /// `None` when nothing disturbs.
+    /// `None` without disturbances.
     fn new(size: Unrest, mut rng: ChaCha8Rng) -> Option<Self> {
         if size.standard_deviation() == 0.0 {
             return None;
@@ -172,7 +172,7 @@ impl UnrestSource {
     }
 }
 
-/// How a record is measured.
+/// Instruments of a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instrument {
     /// Noise of each repeat.
@@ -181,10 +181,10 @@ pub struct Instrument {
     pub converter: Option<Converter>,
     /// Repeats that are averaged (at least 2).
     pub repeats: usize,
-    /// Relative scatter of the level from repeat to repeat, as the tunnel's speed never comes back
-    /// exactly (0 for none).
+    /// Relative scatter of the level between repeats (0 for none): a tunnel's speed is never exactly
+    /// repeatable.
     pub level_scatter: f64,
-    /// What else disturbs a repeat.
+    /// Further disturbances of a repeat.
     pub unrest: Unrest,
 }
 
@@ -214,7 +214,7 @@ pub struct PhaseAverage {
     pub max: Vec<f64>,
 }
 
-/// Numbers of the streams of unrest; those of the noise are the repeats' own.
+/// Random streams of the disturbances; those of the noise are numbered by repeat.
 const UNREST_STREAMS: u64 = 1 << 32;
 
 impl Instrument {
@@ -225,7 +225,7 @@ impl Instrument {
         once.hypot(self.level_scatter) / (self.repeats as f64).sqrt()
     }
 
-    /// Measures the noise-free readings `truth` as often as there are repeats and averages.
+    /// Measures the noise-free readings `truth` once per repeat and averages.
     ///
     /// # Errors
     /// [`InstrumentError::TooFewRepeats`] below two repeats.
@@ -255,7 +255,7 @@ impl Instrument {
                 let reading = self
                     .converter
                     .map_or(analogue, |c| c.reading(c.code(analogue)));
-                // Scatter is summed about the truth, where the squares lose no digits.
+                // The scatter is summed about the truth to keep precision.
                 let off = reading - y;
                 sum[k] += off;
                 square[k] += off * off;
@@ -327,7 +327,7 @@ mod tests {
         assert!((square / total as f64 / expected - 1.0).abs() < 0.03);
     }
 
-    /// Whatever disturbs the repeats, the scatter says how far the mean may be off.
+    /// For all disturbances the scatter gives the standard error of the mean.
     #[test]
     fn unrest_has_its_size_and_the_standard_error_knows_it() {
         let truth = vec![0.5; 20_000];
@@ -364,7 +364,7 @@ mod tests {
             }
             let expected = instrument.standard_error().powi(2);
             assert!((stated / expected - 1.0).abs() < 0.15, "{unrest:?}");
-            // A slow component has few independent samples in a record.
+            // A slow component has few independent samples per record.
             assert!((error / expected - 1.0).abs() < 0.25, "{unrest:?}");
         }
     }

@@ -1,4 +1,4 @@
-//! Command line of the simulator: writes data sets with something hidden in them.
+//! Command line of the simulator: writes data sets with hidden effects.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -24,7 +24,7 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Writes a data set of a random rig that hides effects or faults (none: the null case).
+    /// Writes a data set of a random rig with hidden effects or faults (none: the null case).
     HiddenSet {
         /// Effect to hide, by its catalogue name; may be given several times.
         #[arg(long)]
@@ -35,7 +35,7 @@ enum Command {
         /// Changes a parameter of a hidden effect: EFFECT.PARAMETER=VALUE; may be given several times.
         #[arg(long, value_name = "EFFECT.PARAMETER=VALUE")]
         set: Vec<String>,
-        /// What jets between off and on do to the rate of the flow.
+        /// Dependence of the flow's rate on jets between off and on.
         #[arg(long, value_enum, default_value_t = Rate::Switched)]
         rate_law: Rate,
         /// Repeats that are averaged.
@@ -47,22 +47,23 @@ enum Command {
         /// Folder for dataset.toml and the records.
         #[arg(long)]
         out: PathBuf,
-        /// File for what is hidden; kept out of the data set.
+        /// File for the true effects; not part of the data set.
         #[arg(long)]
         truth: Option<PathBuf>,
     },
-    /// Writes a data set of a random rig of a family, with its answer beside it.
+    /// Writes a data set of a random rig of a family, with its true effects in a separate file.
     Rig {
         /// Kind of flow: first-order, memory1, memory2, inertia, wake, rate-of-y.
         #[arg(long, value_parser = named(Family::ALL.map(Family::name)))]
         family: String,
-        /// Effect to hide, of the catalogue or in another law (two-reservoirs …), or a fault; may be given several times.
+        /// Effect to hide, from the catalogue or with another law (two-reservoirs …), or a fault; may be
+        /// given several times.
         #[arg(long)]
         effect: Vec<String>,
-        /// What the repeats are disturbed by.
+        /// Kind of noise in the repeats.
         #[arg(long, default_value = "coloured", value_parser = named(NoiseKind::ALL.map(NoiseKind::name)))]
         noise: String,
-        /// What is no effect and must not be taken for one; may be given several times.
+        /// Nuisance that is not an effect and must not be diagnosed as one; may be given several times.
         #[arg(long, value_parser = named(Nuisance::ALL.map(Nuisance::name)))]
         nuisance: Vec<String>,
         /// Recorded times are the rig's times this factor.
@@ -78,7 +79,7 @@ enum Command {
         #[arg(long)]
         out: PathBuf,
     },
-    /// Writes a data set of a flow that others published, with its answer beside it.
+    /// Writes a data set of a published flow, with its true effects in a separate file.
     Literature {
         /// The published model: goman-khrabrov, wrong-way …
         #[arg(long, value_parser = named(PUBLISHED.map(|model| model.name)))]
@@ -86,7 +87,7 @@ enum Command {
         /// Effect to hide; may be given several times.
         #[arg(long, value_parser = named(Hidden::names()))]
         effect: Vec<String>,
-        /// White noise alone: no converter, no dead time of the valve, the same zero every day.
+        /// White noise only: no converter, no valve dead time, constant offset.
         #[arg(long)]
         ideal_instruments: bool,
         /// Seed of the coefficients, the commands and the noise.
@@ -98,7 +99,7 @@ enum Command {
     },
     /// Writes a data set like the paper's, from its published model.
     PaperSet {
-        /// What a printed lag means.
+        /// Meaning of a printed lag.
         #[arg(long, value_enum, default_value_t = Lags::Literal)]
         lags: Lags,
         /// Seed of the disturbances.
@@ -147,7 +148,7 @@ fn change(plan: &mut HiddenSetPlan, setting: &str) -> Result<()> {
     Ok(())
 }
 
-/// Exit 0 done, 1 with a message, 2 wrong usage; never a stack trace, whatever the environment asks for.
+/// Exit codes: 0 done, 1 error with a message, 2 wrong usage; never a stack trace.
 fn main() -> ExitCode {
     match run(Arguments::parse().command) {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,4 +1,4 @@
-//! What is neither flow nor effect nor noise, and must not be taken for an effect.
+//! Nuisances: deviations that are neither flow nor effect nor noise, and must not be diagnosed as an effect.
 
 use std::fmt::Write as _;
 
@@ -10,13 +10,13 @@ use crate::plant::effects::{Physics, ThermalDrift};
 /// A kind of nuisance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Nuisance {
-    /// The sensor's zero is off by a few per cent.
+    /// The sensor has an offset of a few per cent.
     Offset,
-    /// The records begin while the rig is running.
+    /// The records start in mid-run.
     MidRun,
-    /// The zero drifts over the whole session, through all records.
+    /// The offset drifts over the whole session.
     Drift,
-    /// The valve is told levels between off and on.
+    /// Commands have levels between off and on.
     Graded,
 }
 
@@ -45,11 +45,11 @@ impl Nuisance {
 /// The nuisances of a rig, with their sizes.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Nuisances {
-    /// Where the sensor's zero is (y).
+    /// Sensor offset (y).
     pub offset: f64,
-    /// Samples that ran before each record and were not written down.
+    /// Unrecorded samples before each record.
     pub lead_samples: usize,
-    /// By how much the zero drifts from the first sample of the session to the last (y).
+    /// Drift of the offset over the session (y).
     pub drift: f64,
     /// Whether commands have levels between off and on.
     pub graded: bool,
@@ -73,12 +73,12 @@ impl Nuisances {
         all
     }
 
-    /// The effect that would be no wrong name for one of them, though nobody hid it.
+    /// The effect that is a correct name for one of them.
     pub(super) fn effect(&self) -> Option<&'static str> {
         (self.drift != 0.0).then_some(ThermalDrift::NAME)
     }
 
-    /// The sensor's zero at sample `k` of a session of `samples` (y).
+    /// The sensor's offset at sample `k` of a session of `samples` (y).
     pub(crate) fn zero(&self, k: usize, samples: usize) -> f64 {
         self.offset + self.drift * k as f64 / samples as f64
     }

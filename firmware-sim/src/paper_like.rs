@@ -1,7 +1,6 @@
-//! A data set like the paper's, made by its published state-dependent model with disturbances.
+//! A data set like the paper's, from its published state-dependent model with disturbances.
 //!
-//! The recursion is written out here once more on purpose: a set that judges the tool must not come out
-//! of the tool's own code.
+//! The recursion is implemented independently, so that the tool is not tested with data from its own code.
 
 use std::f64::consts::TAU;
 
@@ -13,7 +12,7 @@ use recordings::{DataError, DataSet, Record, Use};
 use crate::command::{Command, RUN_SAMPLES, TAIL_SAMPLES};
 use crate::plant::SAMPLE_PERIOD_S;
 
-/// Which sample a printed lag τ means when y_{k+1} is computed.
+/// Meaning of a printed lag τ when y_{k+1} is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LagReading {
     /// y_{k−τ}, as printed in (3).
@@ -56,12 +55,12 @@ impl TableTwo {
             .filter_map(|s| k.checked_sub(s).and_then(|i| y.get(i)))
             .sum();
         let mean = sum / Self::WINDOW as f64;
-        // The paper's mean friction is never far below 0; further down the law means nothing.
+        // In the paper the mean friction is never far below 0, where the law is undefined.
         (47.35 + 12.69 * (-20.18 * mean.max(0.0)).exp()).round() as usize
     }
 }
 
-/// Size of what disturbs the set.
+/// Sizes of the disturbances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disturbances {
     /// Standard deviation of the noise that enters the recursion each sample (y).
@@ -127,11 +126,11 @@ fn play(command: &[f64], lags: LagReading, size: Disturbances, mut rng: ChaCha8R
         .collect()
 }
 
-/// The paper's runs: step, 4 Hz 50 %, 4 Hz 80 %, 8 Hz 50 % to identify (40 000 samples), a second
-/// constant run and 8 Hz 80 % held out. Blowing starts with the record and ends 1.5 s before its end.
+/// The paper's runs: step, 4 Hz 50 %, 4 Hz 80 %, 8 Hz 50 % for estimation (40 000 samples), a second constant
+/// run and 8 Hz 80 % for validation. Blowing starts with the record and ends 1.5 s before its end.
 ///
 /// # Errors
-/// [`DataError`] when the disturbances are so large that the model grows without bound.
+/// [`DataError`] when the disturbances make the model diverge.
 pub fn paper_like_set(
     lags: LagReading,
     size: Disturbances,
@@ -186,7 +185,7 @@ mod tests {
 
     #[test]
     fn the_quiet_step_has_the_published_steps_response() {
-        // Values of y at 0.1, 0.2, 0.5, 1, 2 s, worked out independently for both readings.
+        // Values of y at 0.1, 0.2, 0.5, 1, 2 s, computed independently for both conventions.
         for (lags, expected) in [
             (LagReading::Literal, [0.11, 0.23, 0.54, 0.79, 0.99]),
             (LagReading::OneStep, [0.15, 0.27, 0.62, 0.84, 1.02]),
@@ -203,7 +202,7 @@ mod tests {
     fn the_first_edge_arrives_after_the_delay_of_separated_flow() {
         let set = paper_like_set(LagReading::Literal, QUIET, 1).unwrap();
         let first = set.records[1].y.iter().position(|y| *y != 0.0);
-        // round(47.35 + 12.69) = 60 samples; y_{k+1} shows what arrived at k.
+        // round(47.35 + 12.69) = 60 samples; y_{k+1} responds to the arrival at k.
         assert_eq!(first, Some(61));
     }
 
@@ -218,7 +217,7 @@ mod tests {
         for (a, b) in loud.records.iter().zip(&quiet.records) {
             assert!(a.u[RUN_SAMPLES - TAIL_SAMPLES..].iter().all(|u| *u == 0.0));
             let off: Vec<f64> = a.y.iter().zip(&b.y).map(|(p, q)| p - q).collect();
-            // The sine alone has 0.021; process noise through the nearly integrating model adds to it.
+            // The sine alone has 0.021; process noise is amplified by the nearly integrating model.
             assert!(
                 (0.021..0.08).contains(&rms(&off)),
                 "{}: {}",

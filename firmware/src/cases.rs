@@ -1,5 +1,4 @@
-//! The rigs that a board runs in lockstep with the host, one for each model that
-//! `identified` has.
+//! The loops that a board runs in lockstep with the host, one for each model in `identified`.
 
 use crate::controller::{Controller, Reading, Settings};
 use crate::law::{Driven, Law, driven};
@@ -12,14 +11,14 @@ use model_core::control::{HoldTimes, Pulses, Tracking};
 /// The lockstep rig at 1 kHz, without a measured channel.
 pub const SETTINGS: Settings = settings(&[], 0.001);
 
-/// The law of models without one.
+/// The law of models without one of their own.
 pub const RELAY: Relay = Relay {
     opens_below: 0.45,
     shuts_above: 0.55,
     hold: HoldTimes { on: 20, off: 20 },
 };
 
-/// The lockstep rig for a model whose channels are usually at `references`, with a sample every `period_s`.
+/// The lockstep rig for a model whose channels have these `references`, at this sample period.
 #[must_use]
 pub const fn settings(references: &[f32], period_s: f32) -> Settings {
     let channel = match references {
@@ -28,17 +27,17 @@ pub const fn settings(references: &[f32], period_s: f32) -> Settings {
     };
     Settings {
         channel,
-        // The plant is not what the models are of.
+        // The plant differs from the models: no residual limit.
         residual_envelope: f32::INFINITY,
         ..Settings::of_rig(period_s)
     }
 }
 
-/// What a generated file says of a law: its constants, or nothing.
+/// The law of a generated file: its constants, or none.
 pub trait OrRelay {
-    /// The law that runs.
+    /// Type of the law.
     type Law;
-    /// The law itself, or `relay` where there is none.
+    /// The law, or `relay` if there is none.
     fn or(self, relay: Relay) -> Self::Law;
 }
 
@@ -85,10 +84,10 @@ const _: () = assert!(BATCH <= 32, "decisions of a batch fit in 32 bits");
 
 macro_rules! rigs {
     ($($model:ident)+) => {
-        /// The models, in the order of their numbers.
+        /// The models, in the order of their case numbers.
         pub const CASES: &[&str] = &[$(stringify!($model)),+];
 
-        /// A rig, from rest.
+        /// A loop, from rest.
         #[allow(non_camel_case_types, reason = "named as the models are")]
         #[allow(clippy::large_enum_variant, reason = "there is one")]
         enum Rig {
@@ -100,7 +99,7 @@ macro_rules! rigs {
         }
 
         impl Rig {
-            /// The case of that number; the numbers are those of `CASES`.
+            /// The case with this number, an index of `CASES`.
             fn new(case: u8) -> Option<Self> {
                 let mut next = 0;
                 $(
@@ -137,19 +136,19 @@ macro_rules! rigs {
 }
 identified::each_model!(rigs);
 
-/// The present case, from rest when it is started.
+/// The present case.
 pub struct Rigs {
     rig: Option<Rig>,
 }
 
 impl Rigs {
-    /// None started yet.
+    /// No case yet.
     #[must_use]
     pub const fn new() -> Self {
         Self { rig: None }
     }
 
-    /// Begins a case from rest; `false` if there is none of that number.
+    /// Starts a case from rest; `false` if the number is invalid.
     pub fn start(&mut self, case: u8) -> bool {
         self.rig = Rig::new(case);
         self.rig.is_some()

@@ -1,17 +1,17 @@
-//! What the operator types and reads over the serial line.
+//! Commands and status lines of the operator on the serial line.
 
 use crate::controller::{Controller, Mode};
 use crate::law::Law;
 use heapless::Vec;
 
-/// Time between two lines of telemetry, µs.
+/// Interval of telemetry, µs.
 const TELEMETRY_US: u32 = 100_000;
 
-/// The operator's end of the loop: commands in, answers and telemetry out.
+/// The operator's interface: commands in, answers and telemetry out.
 #[derive(Clone, Debug)]
 pub struct Operator {
     console: Console,
-    /// Samples between two lines of telemetry.
+    /// Samples per telemetry line.
     every: u32,
     /// Samples since the last telemetry.
     since: u32,
@@ -19,7 +19,7 @@ pub struct Operator {
 }
 
 impl Operator {
-    /// Nothing typed, nothing told; a sample every `period_us`.
+    /// Initial state, with a sample every `period_us`.
     #[must_use]
     pub const fn new(period_us: u32) -> Self {
         let period_us = if period_us == 0 { 1 } else { period_us };
@@ -31,9 +31,8 @@ impl Operator {
         }
     }
 
-    /// Takes a byte that was typed and carries out the command that it ends;
-    /// the answer is the status after it, with `?` before it if the command was
-    /// not understood.
+    /// Takes a typed byte and executes the command that it completes; the answer is the status, preceded by
+    /// `?` for an unknown command.
     pub fn receive<L: Law>(&mut self, byte: u8, controller: &mut Controller<L>) -> Option<Line> {
         let command = self.console.receive(byte)?;
         match command {
@@ -49,8 +48,8 @@ impl Operator {
         Some(Line::status(prefix, controller))
     }
 
-    /// Telemetry after a sample: a status line that begins with `t`, ten times a
-    /// second and at once when the mode has changed.
+    /// Telemetry after a sample: a status line starting with `t`, ten times a second and immediately after a
+    /// change of mode.
     pub fn report<L: Law>(&mut self, controller: &Controller<L>) -> Option<Line> {
         self.since += 1;
         let mode = controller.mode();
@@ -67,11 +66,11 @@ impl Operator {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Command {
-    /// Let the law drive the valves.
+    /// Arm the law.
     Arm,
-    /// Shut the valves; also takes note of a latched fault.
+    /// Close the valves; also acknowledges a latched fault.
     Disarm,
-    /// Say how things are.
+    /// Report the status.
     Status,
     /// Not understood.
     Unknown,
@@ -80,7 +79,7 @@ pub enum Command {
 /// Collects a line.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Console {
-    /// One longer than the longest command: what does not fit is none.
+    /// One byte longer than the longest command; longer input is no command.
     line: Vec<u8, 7>,
 }
 
@@ -109,14 +108,14 @@ impl Console {
     }
 }
 
-/// A line of text; what does not fit is cut off.
+/// A line of text; text beyond its capacity is cut off.
 #[derive(Clone, Debug)]
 pub struct Line {
     bytes: Vec<u8, 96>,
 }
 
 impl Line {
-    /// How things are: `armed y=0.512 valve=1 samples=61234`, after `prefix`.
+    /// The status: `armed y=0.512 valve=1 samples=61234`, after `prefix`.
     #[must_use]
     pub fn status<L: Law>(prefix: &str, controller: &Controller<L>) -> Self {
         Self::new(
@@ -278,7 +277,7 @@ mod tests {
             }
             lines
         };
-        // One for the change of mode, the others for the time: ten a second at any period.
+        // One for the change of mode, the others periodic: ten a second at any sample period.
         assert_eq!(
             [200, 1000, 10_000, 100_000].map(&mut lines),
             [1, 3, 25, 250]

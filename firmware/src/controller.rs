@@ -7,7 +7,7 @@ use identified::rig;
 use model_core::control::HoldTimes;
 use model_core::control::period::samples_at_least;
 
-/// What the operator set.
+/// Mode of the loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Mode {
@@ -15,34 +15,34 @@ pub enum Mode {
     Disarmed,
     /// The law drives the valves.
     Armed,
-    /// A command drives the valves; the law and its model take note.
+    /// A command drives the valves; the law and its model only observe.
     Playing,
     /// Valves shut until the operator disarms.
     Faulted(Fault),
 }
 
-/// The rig's constants.
+/// Constants of the rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// From counts to y.
     pub calibration: Calibration,
-    /// What a healthy sensor does not do.
+    /// Limits of a healthy sensor.
     pub range: Range,
     /// The measured channel, where the model needs one.
     pub channel: Option<Channel>,
-    /// The valve's shortest times, samples: a command that is shorter is not played.
+    /// The valve's shortest times, samples: a shorter command is not played.
     pub hold: HoldTimes,
-    /// Largest residual, averaged over about 64 samples, that the model's
-    /// envelope allows, y. Samples and not a time: so many readings average the noise out.
+    /// Limit of the residual averaged over about 64 samples, y. The average is over samples, not time,
+    /// because its purpose is to reduce the noise.
     pub residual_envelope: f32,
 }
 
-/// Fewest equal readings that mean a stuck sensor: at long periods some are equal by chance.
+/// Fewest equal readings that count as a stuck sensor: at long periods some are equal by chance.
 const FEWEST_EQUAL: u32 = 20;
 
 impl Settings {
-    /// Those of the rig file, without a channel, for a sample every `period_s`. What the file has in seconds becomes
-    /// samples here, rounded up.
+    /// The constants of the rig file, without a channel, at this sample period. Times in seconds are rounded
+    /// up to samples.
     #[must_use]
     pub const fn of_rig(period_s: f32) -> Self {
         let period_s = period_s as f64;
@@ -71,27 +71,27 @@ impl Settings {
     }
 }
 
-/// What the sensor gave at a sample.
+/// The input of a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
     /// Counts of the sensor.
     pub counts: f32,
-    /// Counts of the measured channel; not looked at where the model needs none.
+    /// Counts of the measured channel; ignored if the model needs none.
     pub channel: f32,
-    /// Sample periods since the reading before: 1 unless one was missed.
+    /// Sample periods since the previous reading: more than 1 if one was missed.
     pub periods: u32,
 }
 
-/// What came of a sample.
+/// The result of a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tick {
-    /// Where the valve is to be.
+    /// Valve position.
     pub open: bool,
-    /// What the model said the sensor would show.
+    /// Predicted reading of the model.
     pub predicted: f32,
-    /// Reading, averaged where the model is, minus that.
+    /// Reading (averaged if the model is) minus prediction.
     pub residual: f32,
-    /// What the sensor gave.
+    /// The reading.
     pub reading: Reading,
     /// The mode after this sample.
     pub mode: Mode,
@@ -103,24 +103,24 @@ pub struct Controller<L> {
     settings: Settings,
     law: L,
     watch: Watch,
-    /// Of the measured channel.
+    /// Monitor of the measured channel.
     channel: Watch,
     mode: Mode,
     /// Samples since the start; 2⁶⁴ of them do not come.
     samples: u64,
-    /// Residual, low-pass filtered.
+    /// Low-pass-filtered residual.
     strayed: f32,
     last: f32,
     open: bool,
-    /// Where a command wants the valve.
+    /// Valve position requested by a command.
     demand: bool,
 }
 
 impl<L: Law> Controller<L> {
-    /// Share of a residual that enters its average.
+    /// Weight of a residual in its average.
     const SHARE: f32 = 1.0 / 64.0;
 
-    /// Disarmed.
+    /// The initial state, disarmed.
     pub fn new(settings: Settings, law: L) -> Self {
         Self {
             settings,
@@ -136,7 +136,7 @@ impl<L: Law> Controller<L> {
         }
     }
 
-    /// Lets the law drive the valve; a latched fault must be disarmed first.
+    /// Arms the law; a latched fault must be disarmed first.
     pub fn arm(&mut self) {
         if self.mode == Mode::Disarmed {
             self.mode = Mode::Armed;
@@ -146,7 +146,7 @@ impl<L: Law> Controller<L> {
         }
     }
 
-    /// Lets a command drive the valve ([`Self::demand`]), from shut; whether it does.
+    /// Starts playing a command ([`Self::demand`]) with the valve closed; returns whether it is permitted.
     pub fn play(&mut self) -> bool {
         if self.mode != Mode::Disarmed {
             return false;
@@ -158,14 +158,13 @@ impl<L: Law> Controller<L> {
         true
     }
 
-    /// Where the command wants the valve at the next samples; without effect
-    /// unless one is played.
+    /// Sets the commanded valve position; without effect unless a command is played.
     pub fn demand(&mut self, open: bool) {
         self.demand = open;
     }
 
-    /// Shuts the valve and takes note of a latched fault. A failed self-test is
-    /// not cleared: damaged constants drive nothing.
+    /// Closes the valve and acknowledges a latched fault. A failed self-test is not cleared: damaged
+    /// constants must not drive a valve.
     pub fn disarm(&mut self) {
         self.open = false;
         if matches!(self.mode, Mode::Disarmed | Mode::Faulted(Fault::SelfTest)) {
@@ -176,7 +175,7 @@ impl<L: Law> Controller<L> {
         defmt::info!("disarmed at sample {}", self.samples);
     }
 
-    /// Shuts the valve and latches `fault`; the first fault stays.
+    /// Closes the valve and latches `fault`; the first fault is kept.
     pub fn latch(&mut self, fault: Fault) {
         self.open = false;
         if !matches!(self.mode, Mode::Faulted(_)) {
@@ -192,7 +191,7 @@ impl<L: Law> Controller<L> {
         &self.settings
     }
 
-    /// y* in force; NaN for a law without one.
+    /// y* at this sample; NaN for a law without one.
     #[must_use]
     pub fn reference(&self) -> f32 {
         self.law.reference()
@@ -242,7 +241,7 @@ impl<L: Law> Controller<L> {
             }
         }
         let channels = [value];
-        // A sensor that is ill before the start is seen at arming, not before.
+        // A sensor fault before the start is detected at arming.
         if reading.periods > 1 {
             fault = Some(Fault::Overrun);
         }
@@ -251,10 +250,10 @@ impl<L: Law> Controller<L> {
         }
         let y = self.settings.calibration.value(reading.counts);
         self.last = y;
-        // A reading that is no number must not enter the averages.
+        // A non-finite reading must not enter the averages.
         let y = if y.is_finite() { y } else { 0.0 };
-        // What is played is there to find out what the model does not know yet, so
-        // the residual shuts nothing then.
+        // A command may explore behaviour unknown to the model, so that the residual does not close the valve
+        // then.
         let action = match self.mode {
             Mode::Armed => self.law.act(y, &channels),
             Mode::Playing => self.law.follow(self.demand, y, &channels),
@@ -262,7 +261,7 @@ impl<L: Law> Controller<L> {
         };
         self.strayed += (action.residual - self.strayed) * Self::SHARE;
         let strayed = self.strayed.abs();
-        // Also true for NaN: a model that has left all bounds is caught here.
+        // Written so that NaN counts as outside: a diverged model is detected.
         let within = strayed <= self.settings.residual_envelope;
         self.open = action.open;
         if self.mode == Mode::Armed && !within {
@@ -331,7 +330,7 @@ mod tests {
         )
     }
 
-    /// A sensor that shows what the model says, with the last count flickering.
+    /// A sensor that shows the model's prediction with one flickering count.
     fn healthy(controller: &mut Controller<Law>, samples: u32) -> Tick {
         let mut tick = controller.tick(reading(500.5));
         for k in 1..samples {
@@ -378,7 +377,7 @@ mod tests {
                 assert!(k < 400, "{fault:?} was not seen");
             }
             assert_eq!(controller.mode(), Mode::Faulted(fault));
-            // The sensor is well again: the fault stays, and arming does not help.
+            // The sensor has recovered: the fault stays latched, and arming is refused.
             controller.arm();
             let tick = healthy(&mut controller, 10);
             assert_eq!((tick.open, tick.mode), (false, Mode::Faulted(fault)));
@@ -411,8 +410,7 @@ mod tests {
         }
     }
 
-    /// The model hears the channel, and an ill channel shuts the valve but does
-    /// not poison the model.
+    /// The channel reaches the model, and a faulty channel closes the valve without corrupting the model.
     #[test]
     fn the_measured_channel_reaches_the_model_and_is_watched() {
         let settings = Settings {
@@ -449,7 +447,7 @@ mod tests {
             let ticks = (0..900).map(|k| tick(controller, k, channel));
             ticks.map(|tick| tick.predicted).fold(0.0, f32::max)
         };
-        // 20 and 25 degrees: the warm film shows less.
+        // 20 and 25 °C: the warm film reads less.
         let (at_20, at_25) = (run(&mut cold, 2000.0), run(&mut warm, 2500.0));
         assert!(at_20 > 0.1 && at_25 < 0.95 * at_20, "{at_20} {at_25}");
         let ill = tick(&mut cold, 0, f32::NAN);

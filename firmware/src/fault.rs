@@ -1,26 +1,26 @@
-//! Why the valves were shut.
+//! Faults that close the valves.
 
-/// A reason to shut the valves. It stays until the operator disarms.
+/// A reason to close the valves, latched until the operator disarms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Fault {
-    /// A sample was not done when the next one was due.
+    /// A sample was not finished when the next one was due.
     Overrun,
-    /// The sensor gave no number.
+    /// The reading is not finite.
     NotFinite,
     /// The sensor is at the lower or upper end of its range.
     AtRail,
     /// The sensor has not changed for too long.
     Stuck,
-    /// A measured channel gave no number or is at an end of its range.
+    /// A measured channel is not finite or at an end of its range.
     Channel,
-    /// The sensor and the model have parted.
+    /// The residual exceeds its limit.
     Residual,
-    /// The host that had a command played has not been heard for too long.
+    /// The host that plays a command has been silent for too long.
     Link,
     /// The watchdog restarted the board.
     Watchdog,
-    /// The constants or the model's answers are not what was generated.
+    /// The constants or the model's golden run differ from the generated ones.
     SelfTest,
 }
 
@@ -38,7 +38,7 @@ impl Fault {
         Self::SelfTest,
     ];
 
-    /// The word for it in the status line.
+    /// Its name in the status line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

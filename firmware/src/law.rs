@@ -1,4 +1,4 @@
-//! What decides the valve's position from the reading, with the model beside it.
+//! Interface of a control law with its model.
 
 use core::fmt;
 use model_core::average::MovingAverage;
@@ -7,45 +7,42 @@ use model_core::history::Memory;
 use model_core::model::StateOf;
 use model_core::{Input, Parts, step};
 
-/// What a law says at a sample.
+/// The action of a law at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Action {
-    /// Where it wants the valve.
+    /// Requested valve position.
     pub open: bool,
-    /// What the model said the sensor would show at this sample.
+    /// Predicted reading of the model at this sample.
     pub predicted: f32,
     /// Reading minus `predicted`.
     pub residual: f32,
 }
 
-/// A law with its model. Called once a sample, armed or not, so that the model
-/// knows what has been issued.
+/// A law with its model. Called once per sample, armed or not, so that the model knows all issued commands.
 pub trait Law {
-    /// Decides with the reading y and the measured channels; the valve will do
-    /// what is returned.
+    /// Decides from the reading y and the measured channels; the valve follows the returned position.
     fn act(&mut self, y: f32, channels: &[f32]) -> Action;
-    /// Takes note of a sample at which the valve is at `open`, whatever the law
-    /// would have.
+    /// Records a sample at which the valve is at `open`, whatever the law would have decided.
     fn follow(&mut self, open: bool, y: f32, channels: &[f32]) -> Action;
-    /// y*, what the law holds the flow at; NaN where it holds nothing.
+    /// y*, the law's reference; NaN without one.
     fn reference(&self) -> f32;
 }
 
-/// The constants of a law that runs with model `M`, memories `Y` and `J`, and
-/// room to look `A` samples ahead. A generated file's `LAW` is one.
+/// The parameters of a law for model `M`, memories `Y` and `J`, and a look-ahead of `A` samples, such as
+/// `LAW` in a generated file.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is no law that a board can run",
     note = "a model gets a law from `host-fit design`"
 )]
 pub trait Designed<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize> {
-    /// What the law remembers.
+    /// State of the law.
     type State;
 
-    /// From rest, the model at `model`.
+    /// The initial state, with the model at `model`.
     fn start(&self, model: &StateOf<f32, M, Y, J>) -> Self::State;
 
-    /// Where the valve is to be. `alone` is the model left to itself: it knows
-    /// what was issued while the law was idle.
+    /// The valve position. `alone` is the free-running model, which knows the commands issued while the law
+    /// was idle.
     fn act(
         &self,
         state: &mut Self::State,
@@ -55,13 +52,13 @@ pub trait Designed<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize
         channels: &[f32],
     ) -> bool;
 
-    /// Takes note of a sample at which the law does not have the valve.
+    /// Records a sample at which the law does not control the valve.
     fn idle(&self, state: &mut Self::State);
 
-    /// y* in force; NaN for a law without a reference.
+    /// y* at this sample; NaN for a law without a reference.
     fn reference(&self, state: &Self::State) -> f32;
 
-    /// Whether the law decides what it decided where it was generated.
+    /// Whether the law reproduces its golden run.
     fn holds(
         &self,
         golden: &GoldenLaw,
@@ -71,9 +68,9 @@ pub trait Designed<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize
     ) -> bool;
 }
 
-/// What of the reading is compared with the model's output.
+/// Filter of the reading for the comparison with the model's output.
 pub trait Smoothing {
-    /// Takes a reading and gives what to compare.
+    /// Takes a reading and returns the value to compare.
     fn smooth(&mut self, y: f32) -> f32;
 }
 
@@ -86,7 +83,7 @@ impl<const W: usize> Smoothing for MovingAverage<f32, W> {
     }
 }
 
-/// A law with its model, and the model by itself beside it.
+/// A law with its model, and a second, free-running model.
 #[derive(Clone)]
 pub struct Driven<D, M, Y, J, S, const A: usize>
 where
@@ -98,8 +95,7 @@ where
     design: D,
     state: D::State,
     model: M,
-    /// The model left to itself. The law's own may follow the sensor, also one
-    /// that is ill.
+    /// The free-running model. The law's own model may follow a faulty sensor.
     alone: StateOf<f32, M, Y, J>,
     smoothing: S,
 }
@@ -127,7 +123,7 @@ where
     J: Memory<f32>,
     S: Smoothing,
 {
-    /// Shut, with the model in the state `at_rest`.
+    /// With the valve closed and the model in the state `at_rest`.
     pub fn new(design: D, model: M, at_rest: StateOf<f32, M, Y, J>, smoothing: S) -> Self {
         Self {
             state: design.start(&at_rest),
@@ -138,7 +134,7 @@ where
         }
     }
 
-    /// What the model by itself says of a sample, and how far `y` is from it.
+    /// Prediction of the free-running model for a sample, and the deviation of `y` from it.
     #[inline]
     fn issue(&mut self, open: bool, y: f32, channels: &[f32]) -> Action {
         let input = Input {

@@ -1,5 +1,5 @@
-//! The serial line: what operator and host say to the loop and see of it, and
-//! the dialogue of the processor-in-the-loop run.
+//! The serial line: interfaces of operator and host to the loop, and the protocol of the
+//! processor-in-the-loop run.
 
 pub mod desk;
 pub mod lockstep;

@@ -1,4 +1,4 @@
-//! What the boards run: the model that `identified` calls `on_board`, and its law.
+//! The model and law that the boards run: `on_board` of `identified`.
 
 use crate::controller::{Controller, Settings};
 use crate::law::{Designed, Driven, driven};
@@ -9,7 +9,7 @@ use identified::on_board as model;
 use model_core::average::MovingAverage;
 use model_core::control::period::loop_period_us;
 
-/// The rig's constants, of the rig file that this was built with.
+/// Constants of the rig file used in this build.
 pub const SETTINGS: Settings = Settings {
     channel: match model::REFERENCES.as_slice() {
         [] => None,
@@ -18,7 +18,7 @@ pub const SETTINGS: Settings = Settings {
     ..Settings::of_rig(model::SAMPLE_PERIOD_S)
 };
 
-/// What the board says of itself.
+/// Properties of the board, as reported to the host.
 pub const BOARD: Board = Board {
     period_us: PERIOD_US,
     model: model::CHECKSUM,
@@ -27,14 +27,14 @@ pub const BOARD: Board = Board {
 /// The law with its model.
 pub type OnBoard = driven!(model::Law, model);
 
-/// The model's sample period in whole µs: what the boards' timers are set to, and what the host is told.
+/// The model's sample period in whole µs, for the boards' timers and the host.
 pub const PERIOD_US: u32 = match loop_period_us(model::SAMPLE_PERIOD_S as f64) {
     Some(period) => period,
-    // `host-fit design` and `codegen --board` say the same with the key of the model file.
+    // `host-fit design` and `codegen --board` report the same with the key of the model file.
     None => panic!("the boards' timers and watchdogs are good for 0.2 to 100 ms"),
 };
 
-/// How long a watchdog waits for a sample, µs: 20 ms, or four periods where that is longer.
+/// Watchdog timeout for a sample, µs: 20 ms, or four periods if that is longer.
 pub const PATIENCE_US: u32 = if PERIOD_US > 5000 {
     4 * PERIOD_US
 } else {
@@ -46,7 +46,7 @@ pub const PATIENCE_US: u32 = if PERIOD_US > 5000 {
 /// serial line and calls.
 pub const MOST: usize = (128 - 8) * 1024 / 4;
 
-// `host-fit codegen --board` says the same with the key of the model file.
+// `host-fit codegen --board` reports the same with the key of the model file.
 const _: () = {
     assert!(
         model::CHANNELS.len() <= 1,
@@ -72,7 +72,7 @@ pub fn controller() -> Controller<OnBoard> {
 /// The start-up self-test of constants, model and law.
 ///
 /// # Errors
-/// What is wrong.
+/// The failed test.
 #[inline(never)]
 pub fn self_test() -> Result<(), Failure> {
     let model = model::model();
@@ -99,7 +99,7 @@ mod tests {
     use crate::controller::{Mode, Reading};
     use crate::fault::Fault;
 
-    /// The law follows a sensor only so far; the fault must not follow with it.
+    /// The law's observer follows a faulty sensor within its limit; the fault must still be detected.
     #[test]
     fn a_sensor_that_leaves_the_model_is_found_out() {
         for away in [0.9_f32, 1.5, -0.35] {

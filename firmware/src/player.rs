@@ -1,21 +1,20 @@
-//! A command that the host sent: run lengths, checked before a valve moves.
+//! A command sent by the host: run lengths, checked before a valve moves.
 //!
-//! Runs take turns, the first one shut. A command is played whole or cut short
-//! by shutting the valve; nothing else in it changes.
+//! Runs alternate, closed first. A command is played completely or ended by closing the valve; it is never
+//! altered otherwise.
 
 use heapless::Vec;
 use model_core::control::HoldTimes;
 use wire::reply::Status;
 use wire::request::checksum;
 
-/// Runs that a command may have: 4 kB, some minutes of switching at a valve's
-/// shortest times.
+/// Largest number of runs in a command: 4 kB, several minutes of switching at a valve's shortest times.
 pub const RUNS: usize = 1024;
 
-/// Why a command is not played, with what the status says more.
+/// Why a command is not played, with a detail of the status.
 pub type Refusal = (Status, u32);
 
-/// The command, and where in it the player is.
+/// The command and the player's position.
 #[derive(Clone, Debug)]
 pub struct Player {
     runs: Vec<u32, RUNS>,
@@ -30,7 +29,7 @@ pub struct Player {
 }
 
 impl Player {
-    /// No command.
+    /// Without a command.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -42,11 +41,10 @@ impl Player {
         }
     }
 
-    /// Keeps runs from index `at` on; what was there from then on is forgotten.
+    /// Stores runs from index `at` on; later ones are discarded.
     ///
     /// # Errors
-    /// [`Status::Missing`] if there are fewer before them, [`Status::TooLong`] if
-    /// they do not fit.
+    /// [`Status::Missing`] if earlier runs are missing, [`Status::TooLong`] if they do not fit.
     pub fn load(&mut self, at: u16, runs: impl Iterator<Item = u32>) -> Result<(), Refusal> {
         let at = usize::from(at);
         if at > self.runs.len() {
@@ -61,11 +59,11 @@ impl Player {
         Ok(())
     }
 
-    /// Checks the command against the valve's `hold` times and goes to its
-    /// beginning. The valve has been shut for `shut` samples.
+    /// Checks the command against the valve's `hold` times and moves to its start. The valve has been closed
+    /// for `shut` samples.
     ///
     /// # Errors
-    /// Why it is not played.
+    /// The reason of the refusal.
     pub fn start(
         &mut self,
         repeats: u32,
@@ -96,14 +94,14 @@ impl Player {
         Ok(())
     }
 
-    /// The first run that is shorter than the valve can follow.
+    /// The first run that is shorter than a hold time.
     fn too_short(&self, repeats: u32, hold: &HoldTimes) -> Option<u32> {
         let last = self.runs.len().checked_sub(1)?;
         let lead = self.runs.first().copied().unwrap_or(0);
         for (index, run) in self.runs.iter().enumerate() {
             let open = index % 2 == 1;
             let length = if index == 0 || (index == last && !open) {
-                // Shut before the command, after it, or between two repeats.
+                // Closed before the command, after it, or between two repeats.
                 if repeats == 1 || last == 0 {
                     continue;
                 }
@@ -114,7 +112,7 @@ impl Player {
                 };
                 let between = lead.saturating_add(tail);
                 if between == 0 {
-                    // Open to open: two runs in one.
+                    // Open to open: both runs form one.
                     continue;
                 }
                 between
@@ -128,20 +126,19 @@ impl Player {
         None
     }
 
-    /// Whether the samples that count have begun.
+    /// Whether the initial rest is over.
     #[must_use]
     pub fn waits(&self) -> bool {
         self.wait > 0
     }
 
-    /// The valve at the next sample; `None` when the command is over.
+    /// The valve position at the next sample; `None` at the end of the command.
     pub fn level(&mut self) -> Option<bool> {
         if self.wait > 0 {
             self.wait -= 1;
             return Some(false);
         }
-        // A run of length 0 can only be the first or the last of a repeat: every
-        // other is at least one sample, so this ends.
+        // Only the first or last run of a repeat can have length 0, so the loop ends.
         while self.left == 0 {
             self.at += 1;
             if self.at >= self.runs.len() {
@@ -193,7 +190,7 @@ mod tests {
         }
     }
 
-    /// Whatever is accepted keeps the hold times, whenever the valve was shut.
+    /// Every accepted command respects the hold times, for any initial rest.
     #[test]
     fn what_is_accepted_keeps_the_hold_times() {
         let mut seed = 5_u32;

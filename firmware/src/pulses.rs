@@ -1,5 +1,5 @@
-//! The pulses of the maximising law as the loop's law: they come whatever the
-//! sensor says, the model watches beside them.
+//! The pulses of the maximising law as a law of the loop: independent of the sensor, with the model as
+//! observer.
 
 use crate::law::Designed;
 use model_core::Parts;

@@ -1,4 +1,4 @@
-//! A relay: the plain law, for bringing up a rig and for models without a law.
+//! A relay, for commissioning a rig and for models without a law.
 
 use crate::law::Designed;
 use model_core::Parts;
@@ -10,9 +10,9 @@ use model_core::model::StateOf;
 /// A relay with hysteresis and hold times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relay {
-    /// Opens below, y.
+    /// Opens below this, y.
     pub opens_below: f32,
-    /// Shuts above, y.
+    /// Closes above this, y.
     pub shuts_above: f32,
     /// Shortest times, samples.
     pub hold: HoldTimes,
@@ -47,12 +47,12 @@ impl<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize> Designed<M, 
         hold.shut();
     }
 
-    /// The middle of what it switches at.
+    /// The middle of its two thresholds.
     fn reference(&self, _hold: &Hold) -> f32 {
         0.5 * (self.opens_below + self.shuts_above)
     }
 
-    /// Nothing of it was generated.
+    /// Nothing to check: it is not generated.
     fn holds(
         &self,
         _golden: &GoldenLaw,

@@ -6,9 +6,9 @@ use embedded_hal::digital::OutputPin;
 
 /// A sensor with its sample clock.
 pub trait Sensor {
-    /// The newest reading in counts; not finite where there is none.
+    /// The newest reading in counts; not finite if there is none.
     fn counts(&mut self) -> f32;
-    /// The newest reading of the measured channel, likewise.
+    /// The newest reading of the measured channel, in the same form.
     fn channel(&mut self) -> f32;
 }
 
@@ -25,7 +25,7 @@ pub struct Rig<L, S, C, V, A> {
     clock: C,
     /// Opens the valves when high.
     valve: V,
-    /// Lit while law or command has the valve.
+    /// On while law or command controls the valve.
     lamp: A,
     last: u32,
 }
@@ -38,9 +38,9 @@ where
     V: OutputPin,
     A: OutputPin,
 {
-    /// Shuts the valves and waits for the operator.
+    /// Closes the valves and waits for the operator.
     pub fn new(controller: Controller<L>, sensor: S, clock: C, mut valve: V, mut lamp: A) -> Self {
-        // Pins of a microcontroller do not fail; others are tried again each sample.
+        // Pins of a microcontroller do not fail; others are retried each sample.
         let _ = valve.set_low();
         let _ = lamp.set_low();
         let last = clock.periods();
@@ -64,11 +64,11 @@ where
         &mut self.sensor
     }
 
-    /// One sample; call it when the sample clock ticked.
+    /// Processes one sample; called at every tick of the sample clock.
     #[inline]
     pub fn sample(&mut self) -> Tick {
         let now = self.clock.periods();
-        // The difference is right also where the count wraps.
+        // Correct also when the count wraps.
         let periods = now.wrapping_sub(self.last).max(1);
         self.last = now;
         let counts = self.sensor.counts();

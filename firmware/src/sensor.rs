@@ -1,25 +1,25 @@
-//! The sensor's reading, and whether it can be believed.
+//! The sensor's reading, and its plausibility check.
 
 use crate::fault::Fault;
 
-/// From the converter's counts to what is measured.
+/// Conversion from converter counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
-    /// Counts of 0: for the sensor those of the natural flow, y = 0.
+    /// Counts at 0: for the sensor those of the natural flow, y = 0.
     pub zero: f32,
     /// y, or the channel's unit, per count.
     pub per_count: f32,
 }
 
 impl Calibration {
-    /// What a reading in counts stands for.
+    /// The value of a reading in counts.
     #[inline]
     #[must_use]
     pub fn value(&self, counts: f32) -> f32 {
         (counts - self.zero) * self.per_count
     }
 
-    /// The counts that stand for `value`.
+    /// The counts of a `value`.
     #[inline]
     #[must_use]
     pub fn counts(&self, value: f32) -> f32 {
@@ -27,32 +27,31 @@ impl Calibration {
     }
 }
 
-/// What a healthy sensor does not do.
+/// Limits of a healthy sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     /// Readings at or below it are at the lower rail, counts.
     pub lower_rail: f32,
     /// Readings at or above it are at the upper rail, counts.
     pub upper_rail: f32,
-    /// Equal readings in a row that mean a stuck sensor: noise moves a healthy
-    /// one by a count now and then.
+    /// Equal readings in a row that count as a stuck sensor: noise changes a healthy reading by a count now
+    /// and then.
     pub stuck_after: u32,
 }
 
 /// A measured channel that the model's effects need.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Channel {
-    /// From counts to its unit.
+    /// Conversion from counts to its unit.
     pub calibration: Calibration,
-    /// What a healthy one does not do.
+    /// Limits of a healthy channel.
     pub range: Range,
-    /// What counts where there is no reading, in its unit.
+    /// Value used without a reading, in its unit.
     pub reference: f32,
 }
 
 impl Channel {
-    /// The rig's channel, usually at `reference`; one [around](Self::around) it
-    /// where the rig file has none.
+    /// The rig's channel, usually at `reference`; [`around`](Self::around) it if the rig file has none.
     #[must_use]
     pub const fn of(reference: f32) -> Self {
         let Some([zero, per_count, lower_rail, upper_rail]) = identified::rig::CHANNEL else {
@@ -63,16 +62,15 @@ impl Channel {
             range: Range {
                 lower_rail,
                 upper_rail,
-                // A slow quantity may well stay the same.
+                // A slow quantity may be constant.
                 stuck_after: u32::MAX,
             },
             reference,
         }
     }
 
-    /// A channel whose middle counts are its reference and whose whole range is
-    /// twice the reference, or 2 units where that is more: to be replaced by
-    /// what was measured.
+    /// A default channel whose middle counts are its reference and whose range is twice the reference, or 2
+    /// units if that is more; to be replaced by a calibration.
     #[must_use]
     pub const fn around(reference: f32) -> Self {
         const MIDDLE: f32 = 2048.0;
@@ -90,7 +88,7 @@ impl Channel {
             range: Range {
                 lower_rail: 8.0,
                 upper_rail: 4087.0,
-                // A slow quantity may well stay the same.
+                // A slow quantity may be constant.
                 stuck_after: u32::MAX,
             },
             reference,
@@ -98,7 +96,7 @@ impl Channel {
     }
 }
 
-/// Watches the readings.
+/// Plausibility check of readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Watch {
     last: f32,
@@ -106,7 +104,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Nothing seen yet.
+    /// Initial state.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -115,7 +113,7 @@ impl Watch {
         }
     }
 
-    /// Takes a reading in counts and says what is wrong with it, if anything.
+    /// Checks a reading in counts; returns the fault, if any.
     #[inline]
     pub fn check(&mut self, range: &Range, counts: f32) -> Option<Fault> {
         if counts == self.last {

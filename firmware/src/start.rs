@@ -1,5 +1,4 @@
-//! What is checked before the first sample: the constants, and why the board
-//! started.
+//! Start-up checks: the constants, and the reason of the start.
 
 use crate::controller::Controller;
 use crate::fault::Fault;
@@ -9,22 +8,22 @@ use model_core::history::Memory;
 use model_core::model::StateOf;
 use model_core::self_test::{Golden, checksum};
 
-/// What the self-test found wrong.
+/// A failed self-test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Failure {
-    /// Structure and coefficients are not those that were generated.
+    /// Structure and coefficients differ from the generated ones.
     Checksum,
-    /// The model does not say what it said where it was generated.
+    /// The model does not reproduce its golden run.
     Golden,
-    /// The law does not decide what it decided where it was generated.
+    /// The law does not reproduce its golden run.
     Law,
 }
 
 /// Compares the constants' checksum and runs the golden trajectory.
 ///
 /// # Errors
-/// What is wrong.
+/// The failed test.
 pub fn self_test<M, Y, J, const N: usize>(
     model: &M,
     state: StateOf<f32, M, Y, J>,
@@ -46,8 +45,7 @@ where
     }
 }
 
-/// Latches what the start brought to light: nothing is armed before the
-/// operator has taken note.
+/// Latches a fault found at the start: the operator must acknowledge it before arming.
 pub fn latch<L: Law>(
     controller: &mut Controller<L>,
     tested: Result<(), Failure>,
@@ -107,7 +105,7 @@ mod tests {
             latch(&mut controller, test, by_watchdog);
             controller.arm();
             assert_eq!(controller.mode(), Mode::Faulted(fault));
-            // A restart is disarmed by the operator, damaged constants never.
+            // A restart can be acknowledged by the operator, damaged constants cannot.
             controller.disarm();
             controller.arm();
             let armed = fault == Fault::Watchdog;

@@ -7,11 +7,11 @@ use model_core::control::{Tracking, TrackingState};
 use model_core::history::Memory;
 use model_core::model::StateOf;
 
-/// What the law remembers.
+/// State of the law.
 #[derive(Clone)]
 pub struct Tracked<S, const A: usize> {
     law: TrackingState<f32, S, A>,
-    /// Whether the law has been idle: its memory is of another time.
+    /// Whether the law has been idle, so that its state is outdated.
     stale: bool,
 }
 

@@ -1,31 +1,31 @@
-//! What the commands of a data set can tell, before anything is fitted.
+//! Excitation of a data set, checked before any fit.
 //!
-//! Two input delays that differ by d samples can be told apart by the samples at which u_k and u_{k−d} differ, and by
-//! nothing else. [`Excitation`] counts those: for a square wave they vanish whenever d is a multiple of the period, for a
-//! single step they are d per edge and no more. Beside the pairs, the whole span of delays is judged at once: the
-//! eigenvalues of the covariance of lagged inputs tell how many of them are free of the others.
+//! Two input delays that differ by d samples are distinguishable only by the samples at which u_k and u_{k−d}
+//! differ. [`Excitation`] counts these: for a square wave the count vanishes if d is a multiple of the
+//! period, for a single step it is d per edge. In addition the eigenvalues of the covariance of lagged inputs
+//! show how many delays are linearly independent.
 
 use crate::data::{DataSet, FilePlace, Record, Use};
 use crate::linalg::symmetric_eigenvalues;
 use crate::rules;
 
 rules! {
-    /// What the commands of a data set can tell, and what deserves a remark.
+    /// Excitation: criteria for the commands of a data set, and when a remark is made.
     pub struct Rules in "excitation";
 
-    /// Lags put side by side in the covariance.
+    /// Number of lags in the covariance.
     lags: usize = 32, "", "judgement";
-    /// An eigenvalue below this share of the largest stands for a direction that noise decides.
+    /// An eigenvalue below this share of the largest is a direction without excitation.
     negligible: f64 = 0.01, "share of the largest", "judgement: a tenth of the amplitude";
-    /// A command that separates fewer of the lags than this share leaves the rest to noise.
+    /// A command that separates fewer of the lags than this share excites too few directions.
     separated: f64 = 0.25, "share of the lags", "judgement";
-    /// Delays count as alike when they differ at less than this share of the samples at which they could.
+    /// Delays count as not distinguishable if they differ at less than this share of the possible samples.
     alike: f64 = 0.1, "share of the samples", "judgement";
-    /// Fewer edges than this say nothing of how delays depend on the flow.
+    /// With fewer edges than this, a dependence of the delay on the flow is not identifiable.
     fewest_edges: usize = 4, "edges", "judgement";
 }
 
-/// What a fit is going to ask of the data.
+/// Requirements of a fit on the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Demand {
     /// Longest lag or delay in the model, samples.
@@ -34,7 +34,7 @@ pub struct Demand {
     pub coefficients: usize,
 }
 
-/// Why the data cannot bear a fit at all.
+/// Why the data do not permit a fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExcitationError {
@@ -108,35 +108,36 @@ pub struct RecordExcitation {
     pub duty: f64,
 }
 
-/// What the identify records can tell.
+/// Excitation of the identify records.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Excitation {
     /// Each identify record.
     pub records: Vec<RecordExcitation>,
     /// Whether the command is 0 or 1 throughout; if not, edges are changes from and to 0.
     pub on_off: bool,
-    /// How often the command changes from one sample to the next, in all identify records.
+    /// Number of command changes in all identify records.
     pub changes: usize,
-    /// Different times on, of all identify records, to the sample.
+    /// Number of distinct on times in all identify records, to the sample.
     pub distinct_on_times: usize,
-    /// Different times off.
+    /// Number of distinct off times.
     pub distinct_off_times: usize,
-    /// For d = 0 … max_lag: Σ (u_k − u_{k−d})², summed over the identify records with u = 0 before each. For an on/off
-    /// command it is the number of samples at which delays d apart predict different things.
+    /// For d = 0 … max_lag: Σ (u_k − u_{k−d})², summed over the identify records with u = 0 before each. For
+    /// an on/off command, the number of samples at which delays d apart give different predictions.
     pub separation: Vec<f64>,
-    /// Ranges of d (first, last), beyond the shortest, at which two delays d apart look alike.
+    /// Ranges of d (first, last), beyond the shortest, at which two delays d apart are not distinguishable.
     pub alike: Vec<(usize, usize)>,
-    /// Lags put side by side, evenly spaced up to the longest.
+    /// Number of lags compared, evenly spaced up to the longest.
     pub lags_tried: usize,
-    /// How many of them the commands separate (eigenvalues of their covariance above 1/100 of the largest).
+    /// Number of those that the commands separate (eigenvalues of their covariance above 1/100 of the
+    /// largest).
     pub lags_separated: usize,
     /// Condition number of that covariance, capped at 1e16.
     pub condition: f64,
-    /// The same in plain sentences, worst first; empty if there is nothing to remark.
+    /// Remarks for the user, worst first.
     pub remarks: Vec<String>,
 }
 
-/// How often the command of `records` changes from one sample to the next.
+/// Number of command changes in `records`.
 fn changes(records: &[&Record]) -> usize {
     let each = records.iter().map(|r| {
         let pairs = r.u.windows(2);
@@ -145,7 +146,7 @@ fn changes(records: &[&Record]) -> usize {
     each.sum()
 }
 
-/// What is said of a command that changes so seldom.
+/// The remark on a command with so few changes.
 fn too_few(changes: usize, on_off: bool) -> Option<String> {
     let does = if on_off { "switches" } else { "changes" };
     let times = if changes == 1 { "time" } else { "times" };
@@ -156,7 +157,8 @@ fn too_few(changes: usize, on_off: bool) -> Option<String> {
     })
 }
 
-/// A remark on records whose command changes too seldom to tell how the response depends on anything; none if it does not.
+/// A remark on records with too few command changes to identify how the response depends on a coordinate;
+/// none if there are enough.
 #[must_use]
 pub fn says_little(records: &[Record]) -> Option<String> {
     let learning: Vec<&Record> = records.iter().filter(|r| r.role == Use::Identify).collect();
@@ -164,15 +166,15 @@ pub fn says_little(records: &[Record]) -> Option<String> {
     too_few(changes(&learning), on_off)
 }
 
-/// Whether records bear no more than a delay and time constants: the command says little, and nothing else was measured
-/// that moves y.
+/// Whether the records identify no more than a delay and time constants: little excitation, and no other
+/// measured input.
 #[must_use]
 pub fn bears_little(records: &[Record]) -> bool {
     says_little(records).is_some() && records.iter().all(|record| record.channels.is_empty())
 }
 
 impl Excitation {
-    /// Judges the identify records of a data set for a model that reaches `max_lag` samples back.
+    /// Excitation of the identify records of a data set for a model with lags up to `max_lag`.
     #[must_use]
     pub fn of(set: &DataSet, max_lag: usize) -> Self {
         let records: Vec<&Record> = set.identify().collect();
@@ -240,10 +242,11 @@ impl Excitation {
     }
 }
 
-/// Refuses data on which a fit is hopeless, and reports what the rest can tell.
+/// Rejects data on which a fit is impossible, and reports the excitation of the rest.
 ///
 /// # Errors
-/// [`ExcitationError`] when no record is for identification, u or y is constant in all that are, or they are too short.
+/// [`ExcitationError`] if no record is for identification, if u or y is constant in all of them, or if they
+/// are too short.
 pub fn check_excitation(set: &DataSet, demand: Demand) -> Result<Excitation, ExcitationError> {
     let all = set.records.iter().enumerate();
     let records: Vec<(usize, &Record)> = all.filter(|(_, r)| r.role == Use::Identify).collect();
@@ -251,7 +254,7 @@ pub fn check_excitation(set: &DataSet, demand: Demand) -> Result<Excitation, Exc
     let Some((first, any)) = records.first() else {
         return Err(ExcitationError::NoIdentifyRecord);
     };
-    // A record that starts blowing has its edge against the zero history.
+    // A record that starts with blowing has an edge against the zero history.
     let varies = |r: &Record| r.u.iter().any(|u| Some(u) != r.u.first());
     if !records.iter().any(|(_, r)| varies(r)) {
         return Err(ExcitationError::ConstantInput {
@@ -296,7 +299,7 @@ fn describe(record: &Record, on: &mut Vec<usize>, off: &mut Vec<usize>) -> Recor
         if now == level {
             continue;
         }
-        // Times that the record's ends cut off are not known.
+        // Dwells cut off by the ends of the record are not counted.
         if let Some(since) = since {
             if level { &mut my_on } else { &mut my_off }.push(k - since);
         }
@@ -331,7 +334,7 @@ fn separation(records: &[&Record], d: usize) -> f64 {
         .sum()
 }
 
-/// Ranges of d in which the separation has fallen back to a small share of what it had reached before.
+/// Ranges of d in which the separation has fallen back to a small share of its previous maximum.
 fn alike_ranges(separation: &[f64]) -> Vec<(usize, usize)> {
     let mut reached: f64 = 0.0;
     let mut ranges: Vec<(usize, usize)> = Vec::new();
@@ -347,7 +350,8 @@ fn alike_ranges(separation: &[f64]) -> Vec<(usize, usize)> {
     ranges
 }
 
-/// Lags spread over 0 … max_lag: how many are tried, how many the covariance separates, its condition number.
+/// Lags spread over 0 … max_lag: their number, the number that the covariance separates, and its condition
+/// number.
 fn separated_lags(records: &[&Record], max_lag: usize) -> (usize, usize, f64) {
     let count = RULES.lags.min(max_lag + 1);
     let step = max_lag as f64 / (count - 1).max(1) as f64;
@@ -381,7 +385,7 @@ fn separated_lags(records: &[&Record], max_lag: usize) -> (usize, usize, f64) {
             }
         }
     }
-    // Without a decomposition nothing is known to be separated.
+    // Without a decomposition no separation is claimed.
     let eigenvalues = symmetric_eigenvalues(&covariance, count).unwrap_or_default();
     let largest = eigenvalues.iter().copied().fold(0.0, f64::max);
     let smallest = eigenvalues.iter().copied().fold(f64::INFINITY, f64::min);

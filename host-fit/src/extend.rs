@@ -1,9 +1,8 @@
-//! Adding physical effects to a model: everything is refitted with them.
+//! Addition of physical effects to a model with a full refit.
 //!
-//! A model with many free lags has absorbed part of what it lacks, so the
-//! effects are added to the given structure and to the leanest one, and the
-//! better of the two is kept; where both fit alike, the one with fewer
-//! parameters.
+//! A model of high order imitates part of a missing effect. The effects are therefore added to the given
+//! structure and to the one of lowest order, and the better of the two is kept; if both fit equally well, the
+//! one with fewer parameters.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,12 +24,12 @@ use thiserror::Error;
 #[derive(Clone, Debug, Error)]
 #[non_exhaustive]
 pub enum ExtendError {
-    /// Neither the catalogue nor the user's effect files have such an effect.
+    /// No effect of this name in the catalogue or in the user's effect files.
     #[error("{}", nearest_name(.name, .known))]
     Unknown {
         /// The name.
         name: String,
-        /// What is known: the catalogue, and the user's own effects.
+        /// All known effects: the catalogue's and the user's own.
         known: Vec<&'static str>,
     },
     /// The effect is in the model, or was named twice.
@@ -44,7 +43,7 @@ pub enum ExtendError {
          Set `use = \"identify\"` for at least one record in dataset.toml."
     )]
     NothingToLearnFrom,
-    /// Somebody asked for an end.
+    /// Interrupted by the user.
     #[error("the refit was interrupted before it had a result; nothing was written.")]
     Interrupted,
     /// No structure could be fitted with the effects.
@@ -61,7 +60,7 @@ pub enum ExtendError {
 pub enum StructureKept {
     /// That of the given model.
     Given,
-    /// One lag each and one input.
+    /// The lowest order: one lag each and one input.
     Lean,
 }
 
@@ -98,8 +97,8 @@ pub fn nearest_name(name: &str, known: &[&str]) -> String {
     )
 }
 
-/// The effects called `names`, which are new to `model`: of the catalogue, or
-/// the user's own that the model knows.
+/// The effects with these `names`, none of which `model` may contain yet: from the catalogue, or user effects
+/// of the model.
 ///
 /// # Errors
 /// [`ExtendError::Unknown`] and [`ExtendError::Doubled`].
@@ -120,12 +119,11 @@ pub fn effects_for(model: &Model, names: &[String]) -> Result<Vec<&'static Spec>
     Ok(specs)
 }
 
-/// Adds the effects called `names` to `model` and refits everything to the
-/// identify records among `records` (as the model sees them, see
-/// [`Model::targets`]).
+/// Adds the effects `names` to `model` and refits all parameters to the identify records among `records` (see
+/// [`Model::targets`] for the model's view of them).
 ///
 /// # Errors
-/// [`ExtendError`]; a missing channel is named, not guessed. `interrupt` is asked between fits.
+/// [`ExtendError`]; a missing channel is named, not guessed. `interrupt` is checked between fits.
 pub fn extend(
     model: &Model,
     records: &[Record],
@@ -137,7 +135,7 @@ pub fn extend(
     if learning.is_empty() {
         return Err(ExtendError::NothingToLearnFrom);
     }
-    // A held-out record without the channel could not be judged afterwards.
+    // A validation record without the channel could not be simulated afterwards.
     let all: Vec<&Record> = records.iter().collect();
     for spec in &specs {
         channel_reference(spec, &all)?;
@@ -169,14 +167,13 @@ pub fn extend(
             last = Some(fitted);
         }
         match last {
-            // Effects added one after the other are settled together.
+            // Effects added one by one are refitted together.
             Some(fitted) if names.len() == 1 => Ok(fitted),
             _ if interrupt.load(Ordering::Relaxed) => Err(ExtendError::Interrupted),
             _ => Ok::<Fit, ExtendError>(fit(&current, &learning, &options)?),
         }
     };
-    // The first of two effects bends to imitate the second and may not find back:
-    // each comes before the other once.
+    // The first of two effects imitates the second and may not recover: both orders are tried.
     let with_all = |base: Model| {
         let forth = with_each(&base, &mut specs.iter());
         if specs.len() < 2 {
@@ -194,7 +191,7 @@ pub fn extend(
     } else {
         Err(ExtendError::NothingToLearnFrom)
     };
-    // What is done by then is not the best of all.
+    // After an interrupt the intermediate result is not the best: no result is returned.
     if interrupt.load(Ordering::Relaxed) {
         return Err(ExtendError::Interrupted);
     }
@@ -220,14 +217,14 @@ pub fn extend(
         parameters: parameters.collect(),
         identify_rmse: fitted.mean_square().sqrt(),
         model: Model {
-            // A law was designed for the model as it was.
+            // A control law belongs to the model it was designed for.
             law: None,
             ..fitted.model
         },
     })
 }
 
-/// The leanest structure with the effects that `model` has.
+/// The lowest-order structure with the effects of `model`.
 fn lean_structure(
     model: &Model,
     learning: &[&Record],

@@ -1,13 +1,13 @@
-//! The simulated flows that stress a law: the physical plant that a model resembles most, that plant with every effect
-//! that the law does not know of, drawn from its usual range whatever the records say, and under worse conditions than
-//! designed for.
+//! Stress trials of a law on simulated plants: the continuous-time plant nearest to the model, that plant
+//! with each effect of the catalogue at its usual strength, and under conditions beyond the design.
 //!
-//! Plants are no part of the library: a fit must not be judged by a simulator that it depends on.
+//! The plants are not part of the library, because a fit must not be tested by a simulator that it depends
+//! on.
 //!
-//! The simulator's clock is 1 ms a sample. A model of another period is brought to that clock, all its times with it, and
-//! the plant that resembles it there is run with the model's own period for a sample: a plant a hundred times as slow is
-//! the plant of a model at 100 ms. Its friction is of order one; the trial shows it in the units of the model, the
-//! sensor's zero included.
+//! The simulator runs at 1 ms per sample. A model of another period is converted to that clock with all its
+//! times, and its plant runs at the model's own period: the plant of a model at 100 ms is a hundred times
+//! slower. Friction is of order one in the simulator; the trial converts it to the model's units, sensor
+//! offset included.
 
 use anyhow::{Context, bail};
 use closed_loop::{Controlled, span};
@@ -27,7 +27,7 @@ use rand_chacha::ChaCha8Rng;
 
 const NO_PLANT: &str = "no physical plant could be made from the model";
 
-/// A plant on the model's clock and in its units.
+/// A plant in the model's time and units.
 #[derive(Clone, Debug)]
 pub(crate) struct Clocked {
     flow: Disturbed<Rig>,
@@ -47,11 +47,11 @@ impl Controlled for Clocked {
     }
 }
 
-/// The flows that stress a law.
+/// The plants of the stress trials.
 pub(crate) struct Plants {
-    /// The plant that the model resembles most, seen through a noisy sensor; then that plant with something else about it.
+    /// The plant nearest to the model with sensor noise, then variations of it.
     pub(crate) stress: Vec<Trial<Clocked>>,
-    /// What of the model no simulated plant has, one sentence each; the plants are without it.
+    /// Parts of the model that no simulated plant can represent, one sentence each.
     pub(crate) left_out: Vec<String>,
 }
 
@@ -59,7 +59,7 @@ impl Plants {
     /// The plants for `model`, repeatable by `seed`.
     ///
     /// # Errors
-    /// When the model does not settle or its constants are no plant's.
+    /// The model does not settle, or its constants are not physical.
     pub(crate) fn of(model: &Model, seed: u64) -> anyhow::Result<Self> {
         let units = Units {
             time: model.sample_period_s / SAMPLE_PERIOD_S,
@@ -77,12 +77,11 @@ impl Plants {
     }
 }
 
-/// A first-order flow with the model's levels, its time constants of attachment
-/// and separation, its transport delay in continuous time, and those of its effects
-/// that the simulated plants know as continuous-time physics.
+/// A first-order flow with the model's levels, attachment and separation times and continuous-time transport
+/// delay, and those of its effects that the simulator can represent.
 ///
 /// # Errors
-/// When the model does not settle or its constants are no plant's.
+/// The model does not settle, or its constants are not physical.
 fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
     let bare = Model {
         effects: Vec::new(),
@@ -111,7 +110,7 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
         rate_law: RateLaw::default(),
     };
     let (mut effects, mut left_out) = (Vec::new(), Vec::new());
-    // The trial shows the sensor's zero.
+    // The sensor's offset is added by the trial.
     let shown = |added: &&Added| added.name != ZERO_OFFSET.name;
     let is_nuisance = |added: &&Added| NUISANCES.iter().any(|spec| spec.name == added.name);
     let (nuisances, physical): (Vec<_>, Vec<_>) =
@@ -119,7 +118,7 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
     if !nuisances.is_empty() {
         let names: Vec<&str> = nuisances.iter().map(|added| added.name.as_str()).collect();
         left_out.push(format!(
-            "stressed on plants without {}: their flow is of first order",
+            "stress trials use plants without {}: their flow is of first order",
             names.join(", ")
         ));
     }
@@ -127,7 +126,7 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
         match physical_effect(&added.name, &added.parameters) {
             Ok(effect) => effects.push(effect),
             Err(error) => left_out.push(format!(
-                "stressed on plants without {}, which the simulator does not have so: {error:#}",
+                "stress trials use plants without {}, which the simulator cannot represent: {error:#}",
                 added.name
             )),
         }
@@ -135,8 +134,7 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
     Ok((PlantSpec::new(base, &effects), left_out))
 }
 
-/// The law in continuous time; where the plants have no such law, the longest of
-/// its delays.
+/// The law in continuous time; if the simulator lacks it, the longest of its delays.
 fn transport(law: &TransportLaw, period: f64) -> FlowDelay {
     let factor = law.factors.iter().copied().fold(f64::INFINITY, f64::min);
     let known = physical_effect(law.spec.name, &law.parameters).ok();
@@ -147,9 +145,9 @@ fn transport(law: &TransportLaw, period: f64) -> FlowDelay {
     delay.unwrap_or_else(longest).scaled(factor)
 }
 
-/// The effect of that name with a model's values for it.
+/// The simulator's effect of that name with the model's values.
 fn physical_effect(name: &str, values: &[f64]) -> anyhow::Result<Effect> {
-    // Drawn for its kind alone.
+    // Only the kind is used, not the drawn values.
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let base = BasePlant::draw(&mut rng);
     let mut effect = Effect::draw(name, &base, &mut rng)?;
@@ -160,14 +158,14 @@ fn physical_effect(name: &str, values: &[f64]) -> anyhow::Result<Effect> {
     Ok(effect)
 }
 
-/// What a plant is tried under.
+/// Conditions of a trial.
 #[derive(Clone, Copy)]
 struct Circumstances {
-    /// Sensor noise, in units of a hot film's.
+    /// Sensor noise relative to a hot film's.
     noise: f64,
     lost: Lost,
     seed: u64,
-    /// The model's units, its clock among them, in units of the simulator's.
+    /// The model's units, time included, in the simulator's.
     units: Units,
 }
 
@@ -186,7 +184,7 @@ impl Circumstances {
         SAMPLE_PERIOD_S * self.units.time
     }
 
-    /// How long a run of so many samples is at the model's period.
+    /// Length of a run of so many samples at the model's period.
     fn span(&self, samples: usize) -> usize {
         span(samples, self.sample_period_s())
     }
@@ -217,7 +215,7 @@ fn trial(
     })
 }
 
-/// The plant with every effect of the catalogue in turn, then otherwise than designed for.
+/// The plant with every effect of the catalogue in turn, then under conditions beyond the design.
 fn others(plant: &PlantSpec, seed: u64, units: Units) -> anyhow::Result<Vec<Trial<Clocked>>> {
     let usual = Circumstances::usual(seed, units);
     let mut others = Vec::new();
@@ -256,7 +254,7 @@ fn others(plant: &PlantSpec, seed: u64, units: Units) -> anyhow::Result<Vec<Tria
         lost: Lost { share, stretch },
         ..usual
     };
-    // A second of the simulator's clock, in its samples.
+    // One second of the simulator's clock, in samples.
     let [from, length] = [6000, 1000].map(|samples| usual.span(samples));
     let gap_s = length as f64 * usual.sample_period_s();
     let gap = if (gap_s - 1.0).abs() < 1e-6 {
@@ -298,7 +296,7 @@ mod tests {
         }
     }
 
-    /// The paper's model rises to .62 in 0.5 s and to .84 in 1 s; the nearest plant must be near.
+    /// The paper's model rises to .62 in 0.5 s and to .84 in 1 s; the nearest plant must be close to that.
     #[test]
     fn the_plant_rises_as_the_model() {
         let mut model = paper();
@@ -320,7 +318,7 @@ mod tests {
     }
 
     fn proof_of(model: &Model, target: f64, seed: u64) -> Proof {
-        // Ten samples, whatever they last.
+        // Ten samples at any period.
         let shortest = 10.0 * model.sample_period_s;
         let request = TrackRequest {
             min_on_s: shortest,
@@ -365,7 +363,7 @@ mod tests {
         assert_eq!(proof(0.6, 7), proof(0.6, 7));
     }
 
-    /// The paper's flow, every time of it `slower` times as long and its samples with it.
+    /// The paper's flow with all times, sample period included, multiplied by `slower`.
     fn slowed(slower: f64) -> Model {
         let mut model = paper();
         let spec = model_core::effects::spec("plenum-droop").unwrap();
@@ -377,7 +375,7 @@ mod tests {
         clock.model_out(&model)
     }
 
-    /// t → c·t: the law is the same one, and so is what comes of it, with its times c times as long.
+    /// t → c·t: the law is the same, and so are its results, with times multiplied by c.
     #[test]
     fn a_slower_clock_changes_times_and_nothing_else() {
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-6 * a.abs().max(1e-3);

@@ -1,11 +1,11 @@
-//! What would have been seen, had it been there: the amplitude of each effect at which
-//! the diagnosis of these records names it in eight cases of ten.
+//! Detectable effect sizes: the amplitude at which the diagnosis of these records would name each effect in
+//! 80 % of cases.
 //!
-//! The amplitude has to pass what decides there. Whoever has such records identifies a model on them
-//! first, and its lags imitate what they can: what the effect changes in the free run, less what the
-//! model's own parameters do in its place and less ever more lags and other terms without a name, as long as
-//! each is worth its price, must be worth a name and be significant among all alternatives. A gain x²·‖z‖² scatters by 2x·S, S² = Σ (z·e)² over blocks longer
-//! than the correlation of the error e; what is asked for has to be passed by 0.84 of that.
+//! The amplitude is limited by what the base model can imitate. From the effect's change of the free run, the
+//! part is subtracted that the model's own parameters can follow, and further lags and unnamed terms as long
+//! as each pays for its parameters. The rest must exceed the practical margin and be significant over all
+//! candidates. A gain x²·‖z‖² has the standard deviation 2x·S, with S² = Σ (z·e)² over blocks longer than the
+//! correlation time of the error e; the threshold must be passed by 0.84 of that.
 
 use crate::data::Record;
 use crate::diagnose::RULES as NAMED;
@@ -23,22 +23,22 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 rules! {
-    /// Which amplitude of an effect would have been seen.
+    /// Detectable effect sizes.
     pub struct Rules in "power";
 
-    /// What is seen is seen so often.
+    /// Power: an effect counts as detectable if it is found in this share of cases.
     power: f64 = 0.8, "share of cases", "convention; `cargo xtask calibrate` counts";
-    /// Lags and other terms without a name that may imitate it …
-    terms: usize = 6, "", "what `identify` takes of a flow with two memories";
-    /// … each for the price of so many parameters.
+    /// Most unnamed terms that may imitate the effect.
+    terms: usize = 6, "", "number of terms that `identify` adds for a flow with two memories";
+    /// Penalty of each of those terms, in parameters.
     term_cost: f64 = 2.0, "parameters", "a lag and its weight";
-    /// What passes to first order has to be so many times as large: a search that lets all lags move imitates more.
+    /// Factor on the first-order detectable amplitude, because a search that moves all lags imitates more.
     margin: f64 = 2.0, "times the amplitude", "`cargo xtask calibrate`: 13 of 37 were named without it, 9 of 15 with it before pairs of lags counted as one term";
-    /// An effect that is not linear in its amplitude is probed this often, ever nearer to the amplitude that comes out.
+    /// Iterations for an effect that is not linear in its amplitude.
     probes: usize = 4, "", "judgement";
 }
 
-/// The smallest amplitude that would have been seen.
+/// The smallest detectable amplitude of an effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Detectable {
     /// The effect.
@@ -47,19 +47,17 @@ pub struct Detectable {
     pub parameter: String,
     /// The amplitude's unit.
     pub unit: String,
-    /// The amplitude that is named with 80 % power; none if no amplitude in the
-    /// parameter's range is.
+    /// The amplitude that is named with 80 % power; none if no amplitude in the parameter's range is.
     pub amplitude: Option<f64>,
-    /// All parameters of the effect of that amplitude, in the order of its card.
+    /// All parameters of the effect at that amplitude, in the order of its card.
     pub parameters: Vec<f64>,
     /// The same in words.
     pub words: String,
 }
 
-/// For each effect of the catalogue that has an amplitude, is not in the model
-/// and can be tried on these records: the amplitude that would have been named. The effect's
-/// other parameters are at the middle of the catalogue's starting values. `usual` is the share of
-/// the held-out energy that noise alone lets the best of all effects take
+/// The detectable amplitude of each effect of the catalogue that has an amplitude, is not in the model and
+/// can be tried on these records. Other parameters are at the middle of the catalogue's starting values.
+/// `usual` is the largest share of the validation error energy that noise alone usually gives any effect
 /// ([`Diagnosis::usual_by_chance`](crate::diagnose::Diagnosis::usual_by_chance)).
 ///
 /// # Errors
@@ -92,22 +90,22 @@ pub fn detectable(
     Ok(found.into_iter().flatten().collect())
 }
 
-/// What has to be left of an effect.
+/// The threshold for naming an effect.
 struct Asked {
-    /// Energy, as a share of that of the validation error.
+    /// Threshold on the energy, as a share of the validation error's.
     share: f64,
-    /// Standard deviations by which it is passed in so many cases.
+    /// Standard deviations that correspond to the required power.
     often: f64,
 }
 
 impl Asked {
     fn of(judge: &Judge, rmse: f64, usual: f64) -> Self {
-        // Where no noise floor is known, a name has to take more.
+        // Without a known noise level, the practical margin is larger.
         let worthwhile = match judge.noise_source {
             NoiseSource::Measured | NoiseSource::Repeats => NAMED.worthwhile,
             NoiseSource::Scatter => NAMED.worthwhile_in_the_dark,
         };
-        // What leaves the error at the floor is not looked for.
+        // An error that is at the noise level already leaves nothing to detect.
         let from_floor = (judge.over_noise(rmse) / TERMS.at_the_floor).powi(2);
         let taken = (1.0 - (1.0 - worthwhile).powi(2))
             .max(usual.min(0.99))
@@ -118,15 +116,16 @@ impl Asked {
         }
     }
 
-    /// The multiple that passes with what is left.
+    /// The factor on the amplitude at which the remaining part passes the threshold.
     fn passes(&self, left: &Left, error: f64) -> f64 {
         let scatter = self.often * left.deviation;
         let wanted = scatter * scatter + left.energy * self.share * error;
         (scatter + wanted.sqrt()) / left.energy
     }
 
-    /// The multiple of what is shown that is seen: `margin` times what passes beside as many terms as are worth it then. One of
-    /// them may be worth little without the next: two lags side by side are an echo.
+    /// The factor on the amplitude at which the effect is detected: `margin` times the one that passes beside
+    /// as many unnamed terms as pay. A term may pay only together with the next: two neighbouring lags make
+    /// an echo.
     fn multiple(&self, shown: &Shown) -> f64 {
         let (mut x, mut beside) = (0.0_f64, 0);
         while let Some(left) = shown.beside.get(beside) {
@@ -148,9 +147,9 @@ impl Asked {
 
 struct Detector<'a> {
     screen: Screen<'a>,
-    /// What the model may have without a name.
+    /// The unnamed terms of the model.
     unnamed: Unnamed,
-    /// Samples that count as independent of the next as many.
+    /// Block length in samples; blocks count as independent.
     block: usize,
     asked: Asked,
     units: &'a Units,
@@ -192,11 +191,11 @@ impl Detector<'_> {
         };
         let words = match amplitude {
             Some(_) => format!(
-                "{} above {} {unit} would have been seen",
+                "{} above {} {unit} would have been detected",
                 card.words,
                 significant(value, 2)
             ),
-            None => format!("{} of any size could have stayed unseen", card.words),
+            None => format!("{} is not detectable at any size", card.words),
         };
         Some(Detectable {
             effect: spec.name.to_owned(),
@@ -208,7 +207,7 @@ impl Detector<'_> {
         })
     }
 
-    /// The amplitude that is named, from the change that `parameters` of that size make.
+    /// The detectable amplitude, given the change of the free run by `parameters`.
     fn seen(&self, spec: &'static Spec, parameters: &[f64], size: f64) -> Option<f64> {
         let mut model = self.screen.model().clone();
         let reference = channel_reference(spec, self.screen.records()).ok()?;
@@ -229,8 +228,7 @@ mod tests {
     use model_core::effects::spec;
     use std::sync::atomic::AtomicBool;
 
-    /// What the diagnosis says of records into which `effect` was put, `times` as large as
-    /// what is said to be seen.
+    /// The verdict of a diagnosis on records with `effect` at `times` its detectable amplitude.
     fn named(model: &Model, records: &[Record], effect: &str, times: f64) -> Vec<String> {
         let found = detectable(model, records, 0.01).expect("stable");
         let found = found.iter().find(|d| d.effect == effect).expect("judged");

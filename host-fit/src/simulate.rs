@@ -21,14 +21,14 @@ rules! {
     diverged: f64 = 1e3, "times the largest |y|", "judgement: far above any swing from which a stable run returns";
 }
 
-/// A search may move a delay law up to this many samples.
+/// Memory for a delay law that a search varies, samples.
 const ROOM: usize = 1020;
 
-/// Why a free run could not be made or finished.
+/// Why a free run failed.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum SimulateError {
-    /// An effect needs a channel that the record does not have.
+    /// An effect needs a channel that the record lacks.
     #[error(
         "record `{record}` has no channel `{channel}`, which the model's effects need. \
          Add the column `{channel}` to the record's CSV file, or use a model without that effect."
@@ -47,28 +47,28 @@ pub enum SimulateError {
     Diverged {
         /// The record.
         record: String,
-        /// Where the run left all bounds.
+        /// First sample beyond the divergence limit.
         sample: usize,
-        /// The same as time, s.
+        /// Its time, s.
         time: f64,
     },
 }
 
-/// The signals a model runs on, from their beginning on.
+/// The input signals of a model, from their first sample on.
 #[derive(Clone, Debug)]
 pub struct Signals<'a> {
-    /// The command, in shares of a full jet.
+    /// The command, as fraction of a full jet.
     pub u: Cow<'a, [f64]>,
-    /// The measured output, where there is one.
+    /// The measured output, if available.
     pub y: Option<&'a [f64]>,
     /// The channels in the order of [`Model::channels`].
     pub channels: Vec<&'a [f64]>,
-    /// The command before the first sample, in shares of a full jet; none where nobody knows: none of a model that
-    /// starts from rest, the first one otherwise.
+    /// The command before the first sample, as fraction of a full jet. None: 0 for a model that starts from
+    /// rest, the first value otherwise.
     pub u_before: Option<f64>,
-    /// y before the first sample; none for the first one.
+    /// y before the first sample; none: the first value.
     pub y_before: Option<f64>,
-    /// y that the run takes over at its first samples.
+    /// y of the first samples, which the run follows.
     pub followed: &'a [f64],
 }
 
@@ -113,8 +113,8 @@ impl<'a> Signals<'a> {
         }
     }
 
-    /// How far a flow may stray: by the range of the measured output and its distance from 0; where nothing was
-    /// measured, or 0 throughout, by `usual`.
+    /// Scale of the divergence limit: the range of the measured output and its distance from 0; without a
+    /// measurement, or if it is 0, `usual`.
     fn scale(&self, usual: f64) -> f64 {
         let largest = |y: &[f64]| y.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
         let measured = self.y.map(largest).filter(|most| *most > 0.0);
@@ -126,7 +126,7 @@ impl<'a> Signals<'a> {
 pub type HostState<T> = StateOf<T, Prepared<T>, Ring<T>, Ring<T>>;
 
 impl Footprint {
-    /// The state of `prepared` at rest, with memories that hold what is needed.
+    /// The state of `prepared` at rest, with memories of the required length.
     #[must_use]
     pub fn at_rest<T: Real>(&self, prepared: &Prepared<T>) -> HostState<T> {
         let (outputs, jets) = (Ring::reaching(self.outputs), Ring::reaching(self.jets));
@@ -134,17 +134,17 @@ impl Footprint {
     }
 }
 
-/// A model ready to be run over records, in numbers of type `T`.
+/// A model prepared for running over records, with numbers of type `T`.
 #[derive(Clone, Debug)]
 pub struct Simulator<T: Real> {
     prepared: Prepared<T>,
     start: Start,
     memory: Footprint,
-    /// The largest |y| of the records that the model comes from; 1 where that is not known.
+    /// The largest |y| of the training records; 1 if unknown.
     usual: f64,
-    /// Samples after which a slow wake and a lagging drive have come to rest.
+    /// Samples after which a slow wake and a lagging drive have settled.
     fades: usize,
-    /// What the sensor shows at rest: what was measured is the flow and this.
+    /// The sensor's offset: the reading is the flow plus this.
     zero: T,
 }
 
@@ -167,15 +167,15 @@ impl<T: Real> Simulator<T> {
         }
     }
 
-    /// Runs free over `signals`, handing every sample to `sink` until it breaks off.
+    /// Free run over `signals`; every sample is passed to `sink` until it breaks off.
     ///
-    /// Gives the sample at which the run left all bounds, if it did.
+    /// Returns the sample of divergence, if any.
     pub fn run(
         &self,
         signals: &Signals<'_>,
         sink: impl FnMut(usize, &Output<T>) -> ControlFlow<()>,
     ) -> Option<usize> {
-        // The partials of a number go through the machine's vector unit side by side; the result is the same.
+        // The derivatives are vectorised; the result is the same.
         pulp::Arch::new().dispatch(
             #[inline(always)]
             || self.run_inlined(signals, sink),
@@ -211,8 +211,8 @@ impl<T: Real> Simulator<T> {
         None
     }
 
-    /// Predicts y_{k+1} from measured y up to y_k, for every k but the last.
-    /// Sensor effects are left out: the recursion reads the sensor.
+    /// Predicts y_{k+1} from measured y up to y_k, for every k but the last. Sensor effects are ignored: the
+    /// recursion works on readings.
     pub fn predict(&self, signals: &Signals<'_>, mut sink: impl FnMut(usize, T)) {
         let mut state = self.state();
         let window = self.prepared.averaging().window;
@@ -239,7 +239,7 @@ impl<T: Real> Simulator<T> {
         self.memory.at_rest(&self.prepared)
     }
 
-    /// Makes `flow` the newest output; the average is kept where something reads it.
+    /// Makes `flow` the newest output; the average is updated if something reads it.
     #[inline(always)]
     fn advance(&self, state: &mut HostState<T>, flow: T, window: u32) {
         if self.prepared.follows_average() {
@@ -268,15 +268,15 @@ impl<T: Real> Simulator<T> {
         observe(&self.prepared, state, &input)
     }
 
-    /// Whether something else than rest under no command was before the first sample.
+    /// Whether the state before the first sample differs from rest without command.
     fn begins_held(&self, signals: &Signals<'_>) -> bool {
         self.start == Start::Measured
             || !signals.followed.is_empty()
             || signals.u_before.is_some_and(|u| u != 0.0)
     }
 
-    /// Lives through what was before the first sample until the memories are full of it; where y was not measured, until
-    /// the model has come to rest under the command.
+    /// Runs constant inputs before the first sample until the memories are filled; without measured y, until
+    /// the model has settled.
     fn hold_first(
         &self,
         signals: &Signals<'_>,
@@ -324,18 +324,18 @@ impl<T: Real> Simulator<T> {
 fn memory(model: &Model) -> Footprint {
     match model.delay {
         Delay::Fixed { .. } => model.memory(),
-        // Room for a search to move the law.
+        // Includes memory for a search to vary the law.
         Delay::Law(_) => model.memory_for(model.longest_delay().max(ROOM)),
     }
 }
 
-/// Samples that a run which does not begin at rest lives through before its first one.
+/// Number of samples of that run before the first sample.
 pub(crate) fn held_samples(model: &Model) -> usize {
     let memory = memory(model);
     memory.outputs.max(memory.jets).max(wake_fades(model))
 }
 
-/// After so many time constants a wake or a lagging drive is at rest: a twentieth is left.
+/// Settling time of a wake or a lagging drive in time constants: 5 % remain.
 const WAKE_FADES: f64 = 3.0;
 
 fn wake_fades(model: &Model) -> usize {
@@ -349,14 +349,14 @@ fn wake_fades(model: &Model) -> usize {
     samples.min(SETTLED)
 }
 
-/// Samples after which a model that starts without measurements counts as settled, and a slow wake as faded.
+/// Largest settling time of a model that starts without measurements, and of a slow wake, samples.
 const SETTLED: usize = 200_000;
 
 impl Model {
-    /// The free run over signals, measured or not: what the sensor would show.
+    /// The free run over signals, measured or not: the predicted reading.
     ///
     /// # Errors
-    /// The sample at which the run left all bounds.
+    /// The sample of divergence.
     pub fn run_free(&self, signals: &Signals<'_>) -> Result<Vec<f64>, usize> {
         let simulator = Simulator::with_values(self, &self.values(), Rounding::Samples);
         let mut y = Vec::with_capacity(signals.u.len());
@@ -367,7 +367,7 @@ impl Model {
         left.map_or(Ok(y), Err)
     }
 
-    /// The free run over a record: what the sensor would have shown, y_sim.
+    /// The free run over a record: the predicted reading y_sim.
     ///
     /// # Errors
     /// A missing channel, or divergence.

@@ -1,10 +1,8 @@
-//! Moving averages that stay right for ever.
+//! Moving averages without accumulating rounding errors.
 //!
-//! A running sum in floating point drifts without bound. Here the sum of every
-//! block of a window's length is formed afresh and replaces the running one, and
-//! both are carried in two words. However many samples went by, the error is
-//! below that of summing the present window once, even just after values much
-//! larger than it have left it.
+//! A running sum in floating point drifts without bound. Here the sum of every block of a window's length is
+//! computed afresh and replaces the running one; both are kept in two words. After any number of samples the
+//! error is below that of summing the present window once, even after much larger values have left it.
 
 use crate::history::{DelayLine, Memory, Past};
 use crate::real::Real;
@@ -20,7 +18,7 @@ pub struct WindowSum<T> {
     in_block: u32,
 }
 
-/// A sum and what rounding took from it.
+/// A sum and its rounding error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct TwoWords<T> {
     high: T,
@@ -52,7 +50,7 @@ impl<T: Real> WindowSum<T> {
         }
     }
 
-    /// Moves a window of `terms` samples on by one sample.
+    /// Advances a window of `terms` samples by one sample.
     #[inline(always)]
     pub fn slide(&mut self, entering: T, leaving: T, terms: u32) {
         self.fresh.add(entering);
@@ -67,8 +65,8 @@ impl<T: Real> WindowSum<T> {
         }
     }
 
-    /// Moves the window on by one sample for a look ahead: cheaper than
-    /// [`slide`](Self::slide), and good for less than a window's length.
+    /// Advances the window by one sample for a look-ahead: cheaper than [`slide`](Self::slide), and accurate
+    /// for less than a window's length.
     #[inline]
     pub(crate) fn lean(&mut self, entering: T, leaving: T) {
         self.running.low = self.running.low + (entering - leaving);
@@ -97,7 +95,7 @@ pub struct MovingAverage<T, const W: usize> {
 }
 
 impl<T: Real, const W: usize> MovingAverage<T, W> {
-    /// An average over zeros.
+    /// An average of zeros.
     #[must_use]
     pub const fn new() -> Self {
         const { assert!(W < u32::MAX as usize, "a window fits in 32 bits") };

@@ -1,11 +1,10 @@
-//! The transport delay between jets and sensor: which past jet strength the
-//! flow receives now.
+//! The transport delay between jets and sensor: which past jet strength acts on the flow now.
 
 use crate::history::Past;
 use crate::real::Real;
 
-/// Where the flow reads the jet history: `whole` samples back, or between that
-/// sample and the one before it when `fraction` (0–1) is not 0.
+/// Position in the jet history: `whole` samples back, or between that sample and the next older one if
+/// `fraction` (0–1) is not 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tap<T> {
     /// Whole samples of delay.
@@ -15,7 +14,7 @@ pub struct Tap<T> {
 }
 
 impl<T: Real> Tap<T> {
-    /// A tap on a sample.
+    /// A tap on a whole sample.
     #[inline]
     #[must_use]
     pub fn on(whole: usize) -> Self {
@@ -49,7 +48,7 @@ impl<T: Real> Tap<T> {
         }
     }
 
-    /// The signal that far back: between two samples, straight from one to the other.
+    /// The signal at the tap, linearly interpolated.
     #[inline]
     pub fn read(&self, past: &impl Past<T>) -> T {
         let newer = past.back(self.whole);
@@ -58,19 +57,18 @@ impl<T: Real> Tap<T> {
     }
 }
 
-/// A law of the transport from the jets to the flow: what one file of
-/// [`effects`](crate::effects) defines.
+/// A law of the transport from the jets to the flow; each is defined in a file of
+/// [`effects`](crate::effects).
 ///
-/// It gives the delay of one input; those of a model's inputs are its multiples,
-/// see [`ScaledDelay`].
+/// It gives the delay of one input; those of a model's inputs are multiples of it, see [`ScaledDelay`].
 pub trait Transport<T: Real> {
-    /// What the law remembers of the command.
+    /// State of the law: its memory of the command.
     type State: Clone;
 
     /// The state before the first sample.
     fn start(&self) -> Self::State;
 
-    /// The command as the valve will get it; an edge may be held back here.
+    /// The command for the valve; a law may delay edges here.
     #[inline]
     fn command(&self, _state: &mut Self::State, command: T) -> T {
         command
@@ -84,8 +82,8 @@ pub trait Transport<T: Real> {
     /// the law has such bounds.
     fn bounds(&self) -> Option<[T; 2]>;
 
-    /// For how many samples [`command`](Self::command) holds rising and falling
-    /// edges back. A pulse (or a gap) shorter than that never arrives.
+    /// Number of samples by which [`command`](Self::command) delays rising and falling edges. A pulse or gap
+    /// shorter than that never arrives.
     #[inline]
     fn held_back(&self) -> [T; 2] {
         [T::ZERO; 2]
@@ -94,7 +92,7 @@ pub trait Transport<T: Real> {
 
 /// The input delays h_l of eqs. (3) and (4), as a model reads them.
 pub trait DelayLaw<T: Real> {
-    /// What the law remembers of the command.
+    /// State of the law: its memory of the command.
     type State: Clone;
     /// Whether taps can fall between samples.
     const INTERPOLATES: bool = false;
@@ -102,21 +100,20 @@ pub trait DelayLaw<T: Real> {
     /// The state before the first sample.
     fn start(&self) -> Self::State;
 
-    /// The command as the valve will get it; an edge may be held back here.
+    /// The command for the valve; a law may delay edges here.
     #[inline]
     fn command(&self, _state: &mut Self::State, command: T) -> T {
         command
     }
 
-    /// The part of the law that all inputs share, evaluated once a sample at
-    /// the averaged output ỹ_k, or y_k for an averaged model.
+    /// The common part of the law for all inputs, evaluated once per sample at the averaged output ỹ_k, or
+    /// y_k for an averaged model.
     #[inline]
     fn evaluate(&self, _output: T) -> T {
         T::ZERO
     }
 
-    /// The nearest and the farthest sample that taps of input `l` read for outputs
-    /// that are numbers ≥ 0, where that is known.
+    /// The nearest and farthest sample that taps of input `l` can read for outputs ≥ 0, if known.
     #[inline]
     fn range(&self, _l: usize) -> Option<(usize, usize)> {
         None
@@ -172,8 +169,8 @@ impl<T: Real, L: Transport<T>, F: AsRef<[T]>, const ROUNDED: bool> DelayLaw<T>
     fn evaluate(&self, output: T) -> T {
         self.law.delay(output)
     }
-    /// A law lies between its bounds, and every operation after it keeps the
-    /// order, roundings included: the bounds' taps are the ends.
+    /// A law stays within its bounds, and all further operations are monotonic, roundings included: the taps
+    /// of the bounds are the extremes.
     #[inline]
     fn range(&self, l: usize) -> Option<(usize, usize)> {
         if !ROUNDED {

@@ -1,5 +1,5 @@
-//! What the model remembers: fixed ring buffers for outputs and jet strength,
-//! one bit per sample for an on/off command.
+//! Memories of the model: fixed ring buffers for outputs and jet strength, one bit per sample for an on/off
+//! command.
 
 use crate::real::Real;
 
@@ -10,20 +10,20 @@ pub trait Past<T> {
     fn back(&self, lag: usize) -> T;
 }
 
-/// A past that grows by one sample at a time.
+/// A past to which samples are appended.
 pub trait Memory<T>: Past<T> + Clone {
-    /// Makes `value` the newest sample.
+    /// Appends the newest sample.
     fn push(&mut self, value: T);
-    /// The value of all samples from lag `from` to lag `to` where they are known,
-    /// at little cost, to be equal.
+    /// The common value of all samples from lag `from` to lag `to`, if it is cheaply known that they are
+    /// equal.
     #[inline]
     fn steady(&self, _from: usize, _to: usize) -> Option<T> {
         None
     }
     /// How many samples are kept: `back` reaches lags below this.
     fn capacity(&self) -> usize;
-    /// Mean of `window` samples, the newest of them `lag` back: eq. (13) for a
-    /// delayed input. Costs `window` reads unless the memory knows better.
+    /// Mean of `window` samples, the newest of them `lag` back: eq. (13) for a delayed input. Costs `window`
+    /// reads by default.
     fn mean_back(&self, lag: usize, window: u32) -> T
     where
         T: Real,
@@ -38,9 +38,8 @@ pub trait Memory<T>: Past<T> + Clone {
 
 /// Ring buffer of the last `LEN` samples.
 ///
-/// Every sample is kept twice, `LEN` apart, so that the past lies in one piece
-/// behind the newest sample and a constant lag is a constant offset: no index to
-/// wrap for each of the twenty lags that a step reads.
+/// Every sample is stored twice, `LEN` apart, so that the past is contiguous behind the newest sample and a
+/// constant lag is a constant offset: the twenty lags of a step need no index wrapping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DelayLine<T, const LEN: usize> {
     samples: [[T; LEN]; 2],
@@ -71,7 +70,7 @@ impl<T: Real, const LEN: usize> Past<T> for DelayLine<T, LEN> {
         if lag >= LEN {
             return T::ZERO;
         }
-        // `newest` is below LEN; said once more, the check of the bounds goes.
+        // `newest` is below LEN; the redundant limit lets the compiler drop the bounds check.
         let index = self.newest.min(LEN - 1) + LEN - lag;
         let samples = self.samples.as_flattened();
         samples.get(index).copied().unwrap_or(T::ZERO)

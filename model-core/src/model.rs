@@ -19,10 +19,10 @@ pub struct Averaging {
     pub averaged_model: bool,
 }
 
-/// The constant part of a model: everything an identification gives.
+/// The constant part of a model, as an identification gives it.
 ///
-/// Implemented by [`Params`] with sizes known at compile time and by the host
-/// with sizes known at run time; [`step`] is the same function for both.
+/// Implemented by [`Params`] with sizes known at compile time and by the host with sizes known at run time;
+/// [`step`] is the same function for both.
 pub trait Parts<T: Real> {
     /// The delay law.
     type Delay: DelayLaw<T>;
@@ -37,8 +37,8 @@ pub trait Parts<T: Real> {
     /// How signals are averaged.
     fn averaging(&self) -> Averaging;
 
-    /// At rest, for an on/off command: `NY` outputs (more than the longest lag,
-    /// and at least the averaging window), 32·`WORDS` commands.
+    /// State at rest for an on/off command: `NY` outputs (more than the longest lag, and at least the
+    /// averaging window), 32·`WORDS` commands.
     fn on_off_state<const NY: usize, const WORDS: usize>(&self) -> OnOffState<T, NY, WORDS, Self>
     where
         Self: Sized,
@@ -46,7 +46,7 @@ pub trait Parts<T: Real> {
         State::at_rest(self, DelayLine::new(), BitHistory::new())
     }
 
-    /// At rest, for jets of any strength: `NY` outputs, `NJ` jet strengths.
+    /// State at rest for jets of any strength: `NY` outputs, `NJ` jet strengths.
     fn graded_state<const NY: usize, const NJ: usize>(&self) -> GradedState<T, NY, NJ, Self>
     where
         Self: Sized,
@@ -70,7 +70,7 @@ pub const fn matrix<T, const R: usize, const C: usize>(columns: [[T; R]; C]) -> 
 /// A model with N1 state delays, N2 product delays and N3 inputs.
 #[derive(Clone, Copy, Debug)]
 pub struct Params<T: Real, const N1: usize, const N2: usize, const N3: usize, D, E> {
-    /// What the lags mean.
+    /// Meaning of the lags.
     pub convention: LagConvention,
     /// Averages.
     pub averaging: Averaging,
@@ -130,22 +130,21 @@ where
     }
 }
 
-/// How often a state-dependent delay that was asked had to be clamped (counts
-/// saturate).
+/// Numbers of evaluations at which a state-dependent delay had to be clamped (saturating).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clamps {
-    /// The averaged output was below 0 and was taken as 0.
+    /// The averaged output was below 0 and was replaced by 0.
     pub below_zero: u32,
-    /// The delay reached beyond the input memory and was cut to it.
+    /// The delay exceeded the input memory and was limited to it.
     pub beyond_memory: u32,
 }
 
-/// Everything a model remembers. `Y` holds the output, `J` the jets.
+/// State of a model. `Y` holds the output, `J` the jets.
 #[derive(Clone, Copy, Debug)]
 pub struct State<T, Y, J, D, E> {
     /// Past outputs of the flow; the newest is s_k.
     pub outputs: Y,
-    /// Past jet strengths as they left the jets.
+    /// Past jet strengths, before the delay.
     pub jets: J,
     /// Counts of clamped delays.
     pub clamps: Clamps,
@@ -194,8 +193,7 @@ where
         }
     }
 
-    /// Makes `flow` the newest output s_{k+1}: what [`step`] does with its own
-    /// prediction, or a measurement takes the place of.
+    /// Makes `flow` the newest output s_{k+1}: the prediction of [`step`], or a measurement instead.
     #[inline(always)]
     pub fn advance(&mut self, flow: T, window: u32) {
         let terms = window.saturating_sub(1).max(1);
@@ -206,7 +204,7 @@ where
     }
 }
 
-/// What the model is given at a sample.
+/// Inputs of a model at a sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a, T> {
     /// The command u_k: 0 or 1 for on/off blowers.
@@ -215,24 +213,24 @@ pub struct Input<'a, T> {
     pub channels: &'a [T],
 }
 
-/// What the model says at a sample.
+/// Outputs of a model at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Output<T> {
-    /// What the sensor shows at this sample, y_k.
+    /// Sensor reading at this sample, y_k.
     pub measured: T,
-    /// What the flow does at this sample, s_k; equals `measured` without sensor effects.
+    /// Flow at this sample, s_k; equals `measured` without sensor effects.
     pub flow: T,
-    /// What the flow will do at the next sample, s_{k+1}.
+    /// Flow at the next sample, s_{k+1}.
     pub next: T,
-    /// The jet strength arriving now (through the first input delay).
+    /// Jet strength that arrives now (through the first input delay).
     pub arrived: T,
 }
 
-/// Computes what happens at sample k without moving on: effects and input
-/// memory take the sample in, the flow's output does not advance.
+/// Computes sample k without advancing: effects and input memory take the sample, the flow's output does not
+/// advance.
 ///
-/// Call [`State::advance`] afterwards, with `next` for a free run or with a
-/// measurement for one-step prediction.
+/// Call [`State::advance`] afterwards, with `next` for a free run or with a measurement for one-step
+/// prediction.
 #[inline(always)]
 pub fn observe<T, M, Y, J>(
     model: &M,
@@ -248,12 +246,10 @@ where
     observe_delay::<true, _, _, _, _>(model, state, input, 0, (&Known::NOTHING, usize::MAX)).0
 }
 
-/// [`observe`], and the shortest of the input delays. The delay may come out too
-/// short where it is longer than `within`: where the command has not changed for
-/// as long as delays differ, the same is read whichever it is, and the delay law
-/// is not asked. Of the recursion's terms those that are known are given, with
-/// the lag from which on they are. Where `SENSED` is false the sensor is not
-/// asked either: the flow stands for what it would show.
+/// [`observe`], and the shortest input delay. A delay longer than `within` may be reported too short: if the
+/// command has been constant over the whole range of delays, the law is not evaluated. `known` are
+/// precomputed terms of the recursion, with the smallest lag that they cover. If `SENSED` is false the sensor
+/// is not evaluated, and the flow is returned as the reading.
 #[inline(always)]
 pub(crate) fn observe_delay<const SENSED: bool, T, M, Y, J>(
     model: &M,
@@ -335,29 +331,28 @@ where
     (output, nearest)
 }
 
-/// What arrives at the flow through the input delays at a sample.
+/// Jets that arrive at the flow through the input delays.
 struct Arriving<'a, T, L, J> {
     law: &'a L,
     jets: &'a J,
     averaging: Averaging,
     flow: T,
     average: &'a WindowSum<T>,
-    /// Delays need only be exact up to this one.
+    /// Delays above this need not be exact.
     within: usize,
-    /// What the delay law says, once it was asked.
+    /// The value of the delay law, once evaluated.
     evaluated: Option<T>,
-    /// The shortest delay met.
+    /// The shortest delay so far.
     nearest: usize,
-    /// Whether the delay law followed a negative output.
+    /// Whether the law was evaluated at a negative output.
     below_zero: bool,
-    /// Whether a delay reached beyond the memory.
+    /// Whether a delay exceeded the memory.
     beyond: bool,
 }
 
 impl<T: Real, L: DelayLaw<T>, J: Memory<T>> Arriving<'_, T, L, J> {
-    /// What drives the flow until the next sample through input delay `l`, and
-    /// what is there now: the newest jet of a tap between samples arrives only on
-    /// the way.
+    /// The drive of the flow until the next sample through input delay `l`, and the jet present now: of a tap
+    /// between samples, the newer jet arrives within the interval.
     #[inline(always)]
     fn jet(&mut self, l: usize) -> (T, T) {
         let kept = self.jets.capacity();
@@ -380,8 +375,8 @@ impl<T: Real, L: DelayLaw<T>, J: Memory<T>> Arriving<'_, T, L, J> {
         let whole = tap.whole.min(farthest);
         self.nearest = self.nearest.min(whole);
         let newer = self.read(whole);
-        // An exact zero, value and derivatives: a delay of whole samples that is being
-        // fitted has a derivative.
+        // Skipped only if value and derivatives are exactly zero: a whole-sample delay that is being fitted
+        // has a derivative.
         if L::INTERPOLATES && tap.fraction != T::ZERO {
             let older = self.read(whole + 1);
             (newer + tap.fraction * (older - newer), older)
@@ -390,8 +385,8 @@ impl<T: Real, L: DelayLaw<T>, J: Memory<T>> Arriving<'_, T, L, J> {
         }
     }
 
-    /// Asks the delay law, which follows ỹ_k of eq. (1): the W − 1 outputs before
-    /// y_k, divided by W; an averaged model's output itself.
+    /// Evaluates the delay law at ỹ_k of eq. (1): the W − 1 outputs before y_k, divided by W; for an averaged
+    /// model at the output itself.
     #[inline(always)]
     fn evaluate(&mut self) -> T {
         let follows = if self.averaging.averaged_model {
@@ -415,7 +410,7 @@ impl<T: Real, L: DelayLaw<T>, J: Memory<T>> Arriving<'_, T, L, J> {
     }
 }
 
-/// One sample of a free run: observes sample k and moves on to k + 1.
+/// One sample of a free run: computes sample k and advances to k + 1.
 #[inline]
 pub fn step<T, M, Y, J>(
     model: &M,
@@ -490,7 +485,7 @@ mod tests {
         assert!((f64::from(single) - double).abs() < 2e-4);
     }
 
-    /// A first-order flow and a fixed delay, by hand.
+    /// A first-order flow with a fixed delay, compared with its closed form.
     #[test]
     fn the_recursion_starts_at_zero_and_waits_for_the_delay() {
         let model = Params::<f64, 1, 1, 1, _, ()> {
@@ -554,12 +549,12 @@ mod tests {
         for _ in 0..60 {
             last = step(&model, &mut state, &input);
         }
-        // 61 samples on: the first air has just arrived, at the valve's first opening.
+        // 61 samples on: the first jet has just arrived, while the valve was starting to open.
         assert!(last.arrived > 0.0 && last.arrived < 0.2);
         for _ in 0..200 {
             last = step(&model, &mut state, &input);
         }
-        // The valve is open by now; the film trails a rising friction by 50 ms.
+        // The valve is open by now; the film lags a rising friction by 50 ms.
         assert!((last.arrived - 1.0).abs() < 1e-6);
         let trailing = (last.flow - last.measured) / (last.next - last.flow);
         assert!((40.0..80.0).contains(&trailing), "{trailing} samples");

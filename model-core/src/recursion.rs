@@ -3,7 +3,7 @@
 use crate::history::Past;
 use crate::real::Real;
 
-/// What a printed lag τ means.
+/// Meaning of a printed lag τ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum LagConvention {
     /// As printed in eq. (3): τ is y_{k−τ}.
@@ -25,26 +25,26 @@ impl LagConvention {
     }
 }
 
-/// How the flow responds to jets between off and full strength, which valves,
-/// plenums and vortices produce. On/off jets make no difference between them.
+/// Response of the flow to jets between off and full strength, as produced by valves, plenums and vortices.
+/// For on/off jets all are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Grading {
-    /// Eq. (3) with j for u: drive and rate both grow with the jet.
+    /// Eq. (3) with j for u: drive and rate are both proportional to the jet.
     #[default]
     Proportional,
-    /// The equilibrium grows with the jet, and the rate at which the flow
-    /// approaches it goes over from the separated to the attached flow's.
+    /// The equilibrium is proportional to the jet; the rate is interpolated between the separated and the
+    /// attached flow's.
     Interpolated,
-    /// The equilibrium grows with the jet; the rate is the separated flow's
-    /// below half strength and the attached flow's above.
+    /// The equilibrium is proportional to the jet; the rate is the separated flow's below half strength and
+    /// the attached flow's above.
     Switched,
 }
 
-/// The jet strengths between which [`Grading::Switched`] goes over, as a slope
-/// around one half: steep, but not a jump, so that a fit has a derivative.
+/// Slope of the transition of [`Grading::Switched`] around one half: steep but finite, so that a fit has a
+/// derivative.
 const SWITCHING_SLOPE: f64 = 50.0;
 
-/// A lag below this, in samples, is of the order of the flow; from it on it is a memory.
+/// Lags below this, in samples, belong to the model order; longer ones are memories.
 pub const SHORTEST_MEMORY: usize = 20;
 
 impl Grading {
@@ -69,18 +69,17 @@ impl Grading {
 ///
 /// y_{k+1} = d + Σ_i a_i y_{k−τ_i} + Σ_l ( b_l + Σ_j c_jl y_{k−τ̄_j} ) j_l
 ///
-/// with j_l the jet strength that arrives through input delay l (u_{k−h_l}
-/// where nothing shapes the command). With another [`Grading`] than proportional, one
-/// input and jets of part strength, the flow goes at a rate between the separated flow's and the
-/// attached one's to a level in proportion between theirs; what terms of
-/// [`SHORTEST_MEMORY`] and more add is part of the level. For on/off jets it is the same.
+/// with j_l the jet strength that arrives through input delay l (u_{k−h_l} if no effect shapes the command).
+/// For one input, jets of part strength and a [`Grading`] other than proportional, the flow relaxes with a
+/// rate between the separated and the attached flow's towards a level proportionally between theirs; terms
+/// with lags of [`SHORTEST_MEMORY`] and more are part of the level. On/off jets give the same result.
 #[derive(Clone, Copy, Debug)]
 pub struct Bilinear<'a, T> {
-    /// What the lags mean.
+    /// Meaning of the lags.
     pub convention: LagConvention,
     /// The response to jets of part strength.
     pub grading: Grading,
-    /// d: what drives the flow without jets; 0 in the paper.
+    /// d: constant drive of the flow without jets; 0 in the paper.
     pub constant: T,
     /// τ_i, samples, length N1.
     pub state_lags: &'a [u16],
@@ -92,14 +91,14 @@ pub struct Bilinear<'a, T> {
     pub b: &'a [T],
     /// c_jl, N2 × N3, column-major: the N2 coefficients of input 1 first.
     pub c: &'a [T],
-    /// What [`pace`](Self::pace) makes of the rest, where that was asked before; `None` is right, and slower.
+    /// Cached result of [`pace`](Self::pace); `None` is valid, and slower.
     pub pace: Option<&'a Pace<T>>,
 }
 
-/// How fast a flow goes to the level of the moment, which holds what the flow remembers.
+/// Relaxation rates of the flow towards its present level, which includes its memories.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pace<T> {
-    /// Lags below this, in samples, are those of the flow's order.
+    /// Lags below this, in samples, belong to the model order.
     pub order: usize,
     /// The separated flow's rate, per sample: 1 − Σ a_i of those lags.
     pub off: T,
@@ -115,7 +114,7 @@ impl<T: Real> Pace<T> {
     }
 }
 
-/// Sums over terms of [`Bilinear::next`] that are known before the others.
+/// Precomputed partial sums of [`Bilinear::next`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Known<T> {
     /// Of the a_i y_{k−τ_i}.
@@ -125,7 +124,7 @@ pub struct Known<T> {
 }
 
 impl<T: Real> Known<T> {
-    /// No term is known.
+    /// No precomputed terms.
     pub const NOTHING: Self = Self {
         free: T::ZERO,
         gain: T::ZERO,
@@ -133,9 +132,8 @@ impl<T: Real> Known<T> {
 }
 
 impl<T: Real> Bilinear<'_, T> {
-    /// The terms with lags of `horizon` samples and more, `ahead` samples from
-    /// now (less than `horizon`, which is no less than [`SHORTEST_MEMORY`]): they read
-    /// what has happened already.
+    /// The terms with lags of at least `horizon` samples, `ahead` samples from now (less than `horizon`,
+    /// which is at least [`SHORTEST_MEMORY`]): they read only the past.
     #[inline(always)]
     pub fn known(&self, y: &impl Past<T>, horizon: usize, ahead: usize) -> Known<T> {
         let mut known = Known::NOTHING;
@@ -156,14 +154,13 @@ impl<T: Real> Bilinear<'_, T> {
 
     /// y_{k+1}; `y` reads y_k at lag 0 and `arriving(l)` is j_l.
     ///
-    /// The terms are added in the order in which they are written in eq. (3).
+    /// The terms are added in the order of eq. (3).
     #[inline(always)]
     pub fn next(&self, y: &impl Past<T>, arriving: impl FnMut(usize) -> T) -> T {
         self.next_from(&Known::NOTHING, usize::MAX, y, arriving)
     }
 
-    /// [`next`](Self::next) where the terms with lags of `horizon` samples and more
-    /// are `known`; they are added first.
+    /// [`next`](Self::next) with the terms of lags ≥ `horizon` precomputed in `known`; they are added first.
     #[inline(always)]
     pub fn next_from(
         &self,
@@ -186,7 +183,7 @@ impl<T: Real> Bilinear<'_, T> {
         }
         for l in 0..self.b.len() {
             let jet = arriving(l);
-            // An exact zero, value and derivatives, adds nothing.
+            // Skipped only if value and derivatives are exactly zero.
             if jet == T::ZERO {
                 continue;
             }
@@ -207,7 +204,7 @@ impl<T: Real> Bilinear<'_, T> {
         horizon: usize,
         y: &impl Past<T>,
     ) -> T {
-        // Only the first input's sums are known.
+        // Only the first input has precomputed sums.
         let (mut gain, horizon) = if l == 0 {
             (start + known.gain, horizon)
         } else {
@@ -222,12 +219,12 @@ impl<T: Real> Bilinear<'_, T> {
         gain
     }
 
-    /// [`next`](Self::next) of a flow with one input and another grading than proportional.
+    /// [`next`](Self::next) for one input and a grading other than proportional.
     fn graded(&self, drive: T, known: &Known<T>, horizon: usize, y: &impl Past<T>, jet: T) -> T {
         let pace = self.pace();
         let limit = pace.order;
         let share = self.grading.share(jet);
-        // What is known is of the past.
+        // Precomputed terms belong to the past.
         let (mut free, mut past) = (self.constant, known.free);
         for (a, lag) in self.a.iter().zip(self.state_lags) {
             let lag = self.convention.behind_newest(*lag);
@@ -252,7 +249,7 @@ impl<T: Real> Bilinear<'_, T> {
             return free + past;
         }
         if limit == usize::MAX {
-            // All is of the flow's order, the past that is known too.
+            // All lags belong to the model order, the precomputed ones too.
             (free, gain) = (free + past, gain + past_gain);
             (past, past_gain) = (T::ZERO, T::ZERO);
         }
@@ -265,8 +262,8 @@ impl<T: Real> Bilinear<'_, T> {
         free + gain * share + pace.at(share) * (separated + attached)
     }
 
-    /// How fast the flow goes to its level: with the lags below [`SHORTEST_MEMORY`], or with all of them where the
-    /// short ones alone would not let it go to any.
+    /// Relaxation rates from the lags below [`SHORTEST_MEMORY`], or from all lags if the short ones alone
+    /// give no positive rate.
     #[inline(always)]
     #[must_use]
     pub fn pace(&self) -> Pace<T> {
@@ -281,7 +278,7 @@ impl<T: Real> Bilinear<'_, T> {
         }
     }
 
-    /// The pace with the lags below `order`.
+    /// The rates from lags below `order`.
     #[inline(always)]
     fn rates(&self, order: usize) -> Pace<T> {
         let sum = |start: T, coefficients: &[T], lags: &[u16]| {
@@ -296,8 +293,8 @@ impl<T: Real> Bilinear<'_, T> {
         Pace { order, off, on }
     }
 
-    /// The rate, per sample, at which y goes to the level of the moment, which holds what the flow remembers, under
-    /// the first input's jet.
+    /// The relaxation rate per sample towards the present level (memories included) under the first input's
+    /// jet.
     #[inline(always)]
     pub(crate) fn rate(&self, jet: T) -> T {
         self.pace().at(self.grading.share(jet))
@@ -321,15 +318,15 @@ impl<T: Real> Bilinear<'_, T> {
     #[inline(always)]
     pub(crate) fn separated(&self, jet: T, rate: T) -> T {
         let share = self.grading.share(jet);
-        // On/off jets, and rates that cannot be shared out.
+        // On/off jets, and rates that cannot be divided.
         if share == T::ZERO || share == T::ONE || rate == T::ZERO {
             return T::ONE - share;
         }
         (T::ONE - share) * self.pace().off / rate
     }
 
-    /// Of a motion, s_{k+1} − s_k, what the separated flow makes, its share of the rate being `separated`:
-    /// where jets act in proportion, the two flows move side by side, and `free` is how it moves without jets.
+    /// The separated flow's part of the motion s_{k+1} − s_k, with its share `separated` of the rate. With
+    /// proportional grading both flows contribute in parallel, and `free` is the motion without jets.
     #[inline(always)]
     pub(crate) fn released(&self, motion: T, separated: T, jet: T, free: &impl Fn() -> T) -> T {
         let part = jet != T::ZERO && jet != T::ONE;
@@ -358,7 +355,7 @@ mod tests {
     use super::*;
     use crate::history::{DelayLine, Memory};
 
-    /// A flow at 0.3 that separates at 0.02 a sample and attaches at 0.05 towards 0.8.
+    /// A flow at 0.3 with rate 0.02 per sample when separated, and 0.05 towards 0.8 when attached.
     fn motion(grading: Grading, jet: f64) -> [f64; 2] {
         let flow = Bilinear {
             convention: LagConvention::OneStep,
@@ -387,13 +384,13 @@ mod tests {
             let [motion, released] = self::motion(grading, 1.0);
             assert!((motion - 0.05 * (0.8 - 0.3)).abs() < 1e-12 && released == 0.0);
         }
-        // Side by side, each for its part of the jet.
+        // In parallel, each for its part of the jet.
         let [_, released] = self::motion(Grading::Proportional, 0.4);
         assert!((released + 0.6 * 0.02 * 0.3).abs() < 1e-12);
-        // One flow of a rate between: 0.6 of 0.02 beside 0.4 of 0.05.
+        // One flow with an intermediate rate: 0.6 of 0.02 plus 0.4 of 0.05.
         let [motion, released] = self::motion(Grading::Interpolated, 0.4);
         assert!((released - motion * 0.012 / 0.032).abs() < 1e-12);
-        // One flow or the other.
+        // Either flow.
         let [motion, released] = self::motion(Grading::Switched, 0.4);
         assert!(motion > 0.0 && released == motion);
     }
@@ -422,10 +419,10 @@ mod tests {
             let next = |jet: f64| flow.next(&y, |_| jet);
             assert!((flow.rate(0.4) - rate).abs() < 1e-12);
             assert!((next(0.4) - now - rate * (level(0.4) - now)).abs() < 1e-12);
-            // On/off jets meet eq. (3).
+            // On/off jets give eq. (3).
             assert!((next(0.0) - now - 0.02 * (level(0.0) - now)).abs() < 1e-12);
             assert!((next(1.0) - now - 0.05 * (level(1.0) - now)).abs() < 1e-12);
-            // What is known before is added as if it were summed.
+            // Precomputed terms give the same sum.
             let known = flow.known(&y, SHORTEST_MEMORY, 0);
             let again = flow.next_from(&known, SHORTEST_MEMORY, &y, |_| 0.4);
             assert!((again - next(0.4)).abs() < 1e-12);

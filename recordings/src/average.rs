@@ -22,7 +22,7 @@ use crate::sampling::tidy;
 use crate::set::{DataSet, unite_periods};
 use crate::thresholds::RULES;
 
-/// Progress is reported about every so many bytes.
+/// Number of bytes between progress reports.
 const PROGRESS_BYTES: u64 = 1 << 22;
 
 /// Phase-averages several recordings into one data set: each file becomes one record named by its stem.
@@ -100,7 +100,7 @@ fn average<R: std::io::BufRead>(
         folding.rows += 1;
         let mut step = row.step;
         if skip > 0 {
-            // Rows before the start: only their number matters.
+            // Rows before the start are only counted.
             let passed = match step {
                 Step::Forward(n) => n,
                 Step::OffGrid | Step::Restart => 1,
@@ -151,7 +151,7 @@ fn average<R: std::io::BufRead>(
     found
 }
 
-/// Whether many periods were dropped because of their command, or none was left.
+/// Whether many periods were dropped for their command, or none remained.
 fn averaging_drops_commands(found: &Result<(Record, AverageSummary), AverageError>) -> bool {
     match found {
         Ok((_, summary)) => {
@@ -171,7 +171,7 @@ fn averaging_drops_commands(found: &Result<(Record, AverageSummary), AverageErro
     }
 }
 
-/// Whether `samples` is a whole number of times `repeat`, as well as the anchor of a period is looked for.
+/// Whether `samples` is a multiple of `repeat`, within the search range of the anchor.
 fn is_multiple(samples: f64, repeat: f64) -> bool {
     let times = (samples / repeat).round();
     times >= 1.0 && (samples - times * repeat).abs() <= 0.02 * samples
@@ -355,7 +355,7 @@ mod tests {
 
     #[test]
     fn edges_keep_the_average_sharp_when_the_two_clocks_drift() {
-        // The command's generator runs 0.5 % slow against the recording: 0.5 samples per period.
+        // The command generator's clock is 0.5 % slow relative to the recording's: 0.5 samples per period.
         let n = 100 * 200;
         let rows: Vec<Row> = (0..n)
             .map(|k| {

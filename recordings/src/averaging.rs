@@ -1,8 +1,8 @@
-//! How recordings are to be averaged, and what became of them.
+//! Options of averaging, and its summary.
 
 use crate::error::{DataError, FilePlace};
 
-/// On what the repeats are laid over each other.
+/// Alignment of the repeats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Align {
     /// On the command's rising edges (falls back to [`Align::Grid`] where the command never rises).
@@ -17,12 +17,12 @@ pub enum Align {
 pub struct Averaging {
     /// Length of one repeat of the command sequence, s; at least two samples.
     pub period_s: f64,
-    /// Time after the first row at which the first period starts, s, ≥ 0. It decides where in the sequence the
-    /// averaged record begins: best at rest, because history before a record counts as 0.
+    /// Time after the first row at which the first period starts, s, ≥ 0: best at rest, because the command
+    /// before a record counts as 0.
     pub start_s: f64,
     /// On what the repeats are aligned.
     pub align: Align,
-    /// Edges of the command may be this many samples off those of the other repeats, beside the anchor.
+    /// Allowed shift of an edge between repeats, samples, relative to the anchor.
     pub edge_jitter: usize,
 }
 
@@ -47,20 +47,20 @@ pub enum Defect {
     MissingSamples,
     /// A value is missing, not a number or not finite, or the row is too short or too long.
     UnreadableValue,
-    /// The time step is no whole number of sampling periods, or the time cannot be read.
+    /// The time step is not a multiple of the sampling period, or the time is unreadable.
     UnevenTime,
     /// The command is neither 0 nor 1.
     CommandNotOnOff,
-    /// No rising edge of the command where the period puts it.
+    /// No rising edge of the command at the expected time.
     NoAnchorEdge,
     /// The command differs from that of most periods.
     OtherCommand,
-    /// Time went back: the recording was restarted within the period.
+    /// Time decreases: the recording was restarted within the period.
     Restart,
 }
 
 impl Defect {
-    /// In words.
+    /// The defect in words.
     #[must_use]
     pub fn words(self) -> &'static str {
         match self {
@@ -68,8 +68,8 @@ impl Defect {
             Self::UnreadableValue => "a value is missing or not a finite number",
             Self::UnevenTime => "the time step is off the sampling grid",
             Self::CommandNotOnOff => "the command is neither 0 nor 1",
-            Self::NoAnchorEdge => "no rising edge where the period puts it",
-            Self::OtherCommand => "another command sequence than most periods",
+            Self::NoAnchorEdge => "no rising edge at the expected time",
+            Self::OtherCommand => "command sequence differs from most periods",
             Self::Restart => "time goes back",
         }
     }
@@ -82,11 +82,11 @@ pub struct Dropped {
     pub defect: Defect,
     /// How many periods.
     pub periods: u64,
-    /// Line of the file where it first shows (the line after the gap for missing samples).
+    /// Line of the file of its first occurrence (the line after the gap for missing samples).
     pub first_line: u64,
 }
 
-/// What became of one recording.
+/// Summary of one recording.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct AverageSummary {
     /// Name of the record.
@@ -123,12 +123,12 @@ pub enum AverageError {
         "the period of {period_s} s does not hold a usable number of samples at {sample_period_s} s each; give the length of one repeat of the command sequence in seconds"
     )]
     Period {
-        /// As asked for.
+        /// The stated period.
         period_s: f64,
-        /// Of the recording.
+        /// Sampling period of the recording.
         sample_period_s: f64,
     },
-    /// Not one good period.
+    /// No complete period.
     #[error(
         "{place}: no complete period to average ({found}); check --period against the recording and start it with --start at the beginning of a repeat"
     )]
@@ -138,7 +138,7 @@ pub enum AverageError {
         /// What was found instead.
         found: String,
     },
-    /// The command repeats after another time than the stated period.
+    /// The command repeats with another period than stated.
     #[error(
         "{place}: the command repeats every {found} s, not every {stated} s, so most periods of {stated} s would be dropped for their command; give --period {found}"
     )]
@@ -147,7 +147,7 @@ pub enum AverageError {
         place: Box<FilePlace>,
         /// The period as stated, s.
         stated: f64,
-        /// After which time the command repeats, s.
+        /// Repetition period of the command, s.
         found: f64,
     },
     /// Two recordings would make records of one name.

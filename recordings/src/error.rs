@@ -1,11 +1,11 @@
-//! What can be wrong with measured data, where it is, and what to do about it.
+//! Errors in measured data: problem, place and remedy.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use crate::import::problem::ImportProblem;
 
-/// Where in the user's data a fault lies: every part that is known is printed.
+/// Place of an error in the user's data; all known parts are printed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct FilePlace {
     /// The file (or folder) as the caller named it.
@@ -129,9 +129,9 @@ pub(crate) fn printable(text: &str) -> String {
 #[derive(Debug, thiserror::Error)]
 #[error("{place}: {problem}")]
 pub struct DataError {
-    /// Where.
+    /// The place.
     pub place: Box<FilePlace>,
-    /// What, with the remedy.
+    /// The problem with its remedy.
     pub problem: Box<DataProblem>,
 }
 
@@ -143,11 +143,11 @@ impl DataError {
     }
 }
 
-/// The kinds of fault; each message ends with the remedy.
+/// The kinds of problem; each message ends with the remedy.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DataProblem {
-    /// A file that is to be imported.
+    /// A problem of a file to import.
     #[error(transparent)]
     Import(#[from] ImportProblem),
     /// The operating system refused to open or read it.
@@ -159,7 +159,7 @@ pub enum DataProblem {
         folder = .0
     )]
     NoManifest(String),
-    /// Nothing in the file at all.
+    /// An empty file.
     #[error("the file is empty; it needs a header line `t,u,y` and one row per sample")]
     Empty,
     /// A header and no rows (or a single one).
@@ -168,7 +168,7 @@ pub enum DataProblem {
     /// Not text.
     #[error("is not UTF-8 text; export the data as a plain CSV file in UTF-8")]
     NotText,
-    /// A line beyond any sensible length.
+    /// A line above the length limit.
     #[error(
         "the line is longer than 1 MiB, which no row of measurements is; check that this is a CSV file"
     )]
@@ -183,19 +183,19 @@ pub enum DataProblem {
         "the header has no comma but {0}; separate columns with commas and write decimals with a point, or let `host-fit import` read the file"
     )]
     WrongSeparator(&'static str),
-    /// A column that has to be there is not.
+    /// A required column is missing.
     #[error(
         "no column `{name}` in the header ({found}); name the columns t (s), u and y, or say which is which with `host-fit import FILE -o DIR`",
         name = .name, found = .found
     )]
     MissingColumn {
-        /// The name that was looked for.
+        /// The required name.
         name: &'static str,
-        /// The names that are there.
+        /// The names found.
         found: String,
     },
-    /// The same name twice.
-    #[error("this column name stands twice in the header; rename or remove one of the two")]
+    /// A column name occurs twice.
+    #[error("this column name occurs twice in the header; rename or remove one of the two")]
     DoubledColumn,
     /// An empty name in the header.
     #[error("column {0} has no name in the header; name it or remove it")]
@@ -220,13 +220,13 @@ pub enum DataProblem {
         "`{0}` is not a number; write decimals with a point, without units or thousands marks, or let `host-fit import` read the file"
     )]
     NotANumber(String),
-    /// NaN or infinity.
+    /// A value that is NaN or infinite.
     #[error("the value is {0}, not a finite number; repair it, or split the record there")]
     NotFinite(f64),
-    /// So large that its square would not be finite.
+    /// A value so large that its square would overflow.
     #[error("the value {0:e} is beyond ±1e100; check the column's units")]
     TooLarge(f64),
-    /// Time stands still or goes back.
+    /// Time does not increase.
     #[error(
         "time does not increase: {time} s follows {before} s; sort the rows, remove doubled ones, and print t with enough digits"
     )]
@@ -248,7 +248,7 @@ pub enum DataProblem {
         /// Number of missing samples.
         missing: u64,
     },
-    /// Steps that vary.
+    /// Non-uniform time steps.
     #[error(
         "the time step is {step} s where the sampling period is {period} s (10 % and the rounding of the printed times are allowed); resample the record to a uniform period, or, if only the times are at fault, `host-fit import` it with --period SECONDS --ignore-time"
     )]
@@ -258,7 +258,7 @@ pub enum DataProblem {
         /// The sampling period.
         period: f64,
     },
-    /// The file's time and the stated sampling period differ.
+    /// The sampling periods from the times and as stated differ.
     #[error(
         "the rows are {found} s apart by their times, but {by} {stated} s; correct the one that is wrong"
     )]
@@ -267,7 +267,7 @@ pub enum DataProblem {
         found: f64,
         /// As stated.
         stated: f64,
-        /// What states it: subject and verb of a sentence.
+        /// Source of the statement: subject and verb of a sentence.
         by: &'static str,
     },
     /// Records of different sampling periods.
@@ -282,29 +282,30 @@ pub enum DataProblem {
         /// Name of the first record.
         first: String,
     },
-    /// A time that cannot be in seconds.
+    /// A time that cannot be in seconds, for example a Unix time in ms.
     #[error(
-        "t = {0} is no time in seconds; if it is a Unix time in ms, µs or ns, make a data set of the file with `host-fit import FILE -o DIR`"
+        "t = {0} is not a time in seconds; if it is a Unix time in ms, µs or ns, make a data set of the file with `host-fit import FILE -o DIR`"
     )]
     NotSeconds(f64),
-    /// A file of another program where a data set is asked for.
+    /// A file of another program instead of a data set.
     #[error(
         "is a {kind}, not a data set; make one of it with `host-fit import {name} -o DIR` and give the folder DIR here"
     )]
     ToImport {
-        /// What it is.
+        /// Kind of the file.
         kind: &'static str,
         /// The file's name.
         name: String,
     },
-    /// A sampling period that is none.
+    /// An invalid sampling period.
     #[error(
         "the sampling period is {0:?}; it must be a number of seconds above 0, from 1e-9 to 1e9; look for the unit of the times"
     )]
     BadPeriod(f64),
-    /// Times so late that double precision cannot tell samples apart.
+    /// Times so large that double precision does not resolve the samples.
     #[error(
-        "at t = {time} s numbers cannot tell samples apart that are {period} s apart; write the times from the beginning of the record"
+        "at t = {time} s double precision cannot resolve samples {period} s apart; count time from the \
+        beginning of the record"
     )]
     LateTimes {
         /// The latest time, s.
@@ -317,18 +318,18 @@ pub enum DataProblem {
         "has {found} measured channels and {most} are the most; keep those that are needed (`host-fit import` with --channel NAME, or --no-channels)"
     )]
     TooManyChannels {
-        /// How many there are.
+        /// Number of channels.
         found: usize,
-        /// How many there may be.
+        /// Largest number of channels.
         most: usize,
     },
-    /// A name of a column above the longest line of a header.
+    /// A column name longer than the limit.
     #[error("the name is longer than {0} bytes; shorten it")]
     LongName(usize),
-    /// A command before the record that is no number.
+    /// A non-finite command before the record.
     #[error("the command before the record is {0}; give a finite number in the unit of u")]
     BadCommandBefore(f64),
-    /// A lead that leaves no sample to judge.
+    /// A lead that leaves no scored sample.
     #[error(
         "the first {lead} samples only lead up to what is judged, but the record has {samples}; lower lead_samples below that"
     )]
@@ -366,12 +367,12 @@ pub enum DataProblem {
         "u = {0} is neither 0 nor 1, but an on/off command is needed here; scale the command so that off is 0 and on is 1"
     )]
     NotOnOff(f64),
-    /// A slip in an on/off command.
+    /// A single wrong value in an on/off command.
     #[error(
         "u = {0} in a command that is otherwise 0 or 1; correct the value, or, if the input has levels in between, say so with `input = \"graded\"` in the dataset.toml of a folder"
     )]
     StrayInput(f64),
-    /// A channel that carries the name of a column with a meaning of its own.
+    /// A channel with a reserved column name.
     #[error("this name is reserved (t, u, y, y_sd, y_min, y_max); rename the channel")]
     ReservedChannel,
     /// A name that cannot be printed or is empty.

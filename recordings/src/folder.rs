@@ -26,8 +26,8 @@ struct Manifest {
     record: Vec<Entry>,
 }
 
-/// What kind of command the records have, where the files say it. Where they do not, each command speaks for itself: one
-/// of 0 and 1 is on/off, any other is graded.
+/// Kind of the command, if stated in the file. Otherwise each record decides: a command of 0 and 1 is on/off,
+/// any other is graded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Input {
@@ -42,13 +42,13 @@ struct Entry {
     file: String,
     #[serde(rename = "use")]
     role: Use,
-    /// Command before the first sample; its first value where nothing is said.
+    /// Command before the first sample; its first value if omitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     u_before: Option<f64>,
-    /// First samples that only lead up to the judged ones.
+    /// Number of unscored samples at the start.
     #[serde(default, skip_serializing_if = "is_zero")]
     lead_samples: usize,
-    /// For people and for `host-fit import --like`; loading does not need it.
+    /// Mapping of an import, for users and for `host-fit import --like`; not needed for loading.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     from: Option<From>,
 }
@@ -112,7 +112,7 @@ impl DataSet {
         names
     }
 
-    /// As [`DataSet::save`], with where each record came from.
+    /// As [`DataSet::save`], with the mapping of each record.
     pub(crate) fn save_from(&self, dir: &Path, from: &[From]) -> Result<(), OutputError> {
         let mut staging = Staging::new(dir)?;
         let mut entries: Vec<Entry> = Vec::with_capacity(self.records.len());
@@ -131,7 +131,7 @@ impl DataSet {
             title: self.title.clone(),
             sample_period_s: self.sample_period_s,
             plant: self.plant,
-            // What looks like slips was said to be none, or was put together in memory.
+            // Stray values were declared as graded, or the set was built in memory.
             input: self.refuse_strays().is_err().then_some(Input::Graded),
             record: entries,
         };
@@ -418,7 +418,8 @@ mod tests {
         assert!(text.contains("no dataset.toml"), "{text}");
     }
 
-    /// A slip in an on/off command is named; a set may say that it is none, and says so again when it is saved.
+    /// A stray value in an on/off command is an error unless the set declares a graded input, which is saved
+    /// with it.
     #[test]
     fn levels_of_a_graded_input_are_no_slips() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Repeats laid over each other: the samples of the running period, and the sums over the complete ones.
+//! Accumulation of repeats: the samples of the running period, and the sums over complete periods.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crate::raw::RawReader;
 use crate::record::{Record, Use};
 use crate::thresholds::RULES;
 
-/// One sample that waits in the buffer until its period is complete.
+/// A sample of the running period.
 #[derive(Debug, Clone, Copy)]
 struct Waiting {
     line: u64,
@@ -24,18 +24,18 @@ pub(super) struct Folding {
     length: usize,
     width: usize,
     jitter: usize,
-    /// How far an anchor is looked for to either side.
+    /// Search range of an anchor to either side.
     slack: usize,
     align: Align,
     /// Sample of the anchor edge within the period, once known.
     anchor: Option<usize>,
     /// Command of the sample before the buffer.
     pub(super) before: Option<bool>,
-    /// Samples at the front of the buffer that belong to the period before (kept so that an anchor may come early).
+    /// Samples at the front of the buffer that belong to the period before, for an early anchor.
     lead_in: usize,
     waiting: Vec<Waiting>,
     values: Vec<f64>,
-    /// Grid alignment: the period that is running and the sample it started at, from the last restart.
+    /// Grid alignment: index and first sample of the running period since the last restart.
     period: u64,
     started_at: u64,
     sequences: Vec<Sequence>,
@@ -44,7 +44,7 @@ pub(super) struct Folding {
     edges: Vec<(usize, bool)>,
 }
 
-/// Sums over the periods that share one command sequence.
+/// Sums over the periods with the same command sequence.
 #[derive(Debug)]
 struct Sequence {
     edges: Vec<(usize, bool)>,
@@ -80,7 +80,8 @@ impl Sequence {
                 .all(|(a, b)| a.1 == b.1 && a.0.abs_diff(b.0) <= jitter)
     }
 
-    /// Adds one period: Welford's recursion; spread and envelope are those of `y`, the first value of each sample.
+    /// Adds one period (Welford's recursion); spread and envelope are those of `y`, the first value of each
+    /// sample.
     fn add(&mut self, samples: &[Waiting], values: &[f64], width: usize) {
         self.periods += 1;
         let weight = 1.0 / self.periods as f64;
@@ -201,7 +202,7 @@ impl Folding {
         self.settle();
     }
 
-    /// Closes the running period once all of it, and the room for a late anchor, is in the buffer.
+    /// Completes the running period once it, and the margin for a late anchor, is in the buffer.
     fn settle(&mut self) {
         let margin = match self.align {
             Align::Edges => self.slack,
@@ -236,7 +237,7 @@ impl Folding {
         self.values.drain(..keep_from * self.width);
     }
 
-    /// How many samples later than expected the anchor of the running period comes; `None` if it is not there.
+    /// Delay of the running period's anchor against its expected time, samples; `None` if there is none.
     fn anchor_shift(&mut self) -> Option<isize> {
         let rises = |i: usize| -> bool {
             let now = self.waiting.get(i).is_some_and(|w| w.on);
@@ -275,8 +276,8 @@ impl Folding {
             self.drop_period(defect.unwrap_or(Defect::UnreadableValue), line, 1);
             return;
         }
-        // Edges within the jitter of the period's ends may fall into the neighbouring period: only those between count,
-        // after the level at which the period starts.
+        // Edges within the jitter of the period's ends may belong to the neighbouring period: only edges
+        // between count, starting from the level at the start of the period.
         self.edges.clear();
         let inner = self.jitter..self.length.saturating_sub(self.jitter);
         let mut level = None;
@@ -286,7 +287,7 @@ impl Folding {
                 level = Some(sample.on);
             }
         }
-        // Without any edge there is nothing to anchor, and nothing to smear.
+        // Without edges there is no anchor, and no misalignment.
         if !anchored && self.anchor.is_some() {
             self.drop_period(Defect::NoAnchorEdge, first_line, 1);
             return;
@@ -303,7 +304,7 @@ impl Folding {
                     self.sequences.push(fresh);
                     self.sequences.len() - 1
                 } else {
-                    // Room is made by forgetting the rarest sequence; it was no rule.
+                    // The rarest sequence is dropped to make room.
                     let rarest = (0..self.sequences.len())
                         .min_by_key(|&i| self.sequences.get(i).map_or(0, |s| s.periods))
                         .unwrap_or(0);
@@ -333,7 +334,7 @@ impl Folding {
         role: Use,
         place: FilePlace,
     ) -> Result<(Record, AverageSummary), AverageError> {
-        // A complete last period may still wait for the room of a late anchor.
+        // The last period may be complete and only wait for the margin of a late anchor.
         let mut left_over = self.waiting.len().saturating_sub(self.lead_in);
         if self.align == Align::Edges && left_over >= self.length {
             let shift = self.anchor_shift();
@@ -343,7 +344,7 @@ impl Folding {
                 left_over = self.waiting.len() - start - self.length;
             }
         }
-        // The first of the most frequent ones, so that a tie has one answer.
+        // The first of equally frequent ones, for a unique result.
         let most = self.sequences.iter().map(|s| s.periods).max().unwrap_or(0);
         let rule = self.sequences.iter().position(|s| s.periods == most);
         let Some(rule) = rule else {

@@ -1,26 +1,26 @@
-//! How much memory a command may ask for.
+//! Memory limit of a command.
 //!
-//! Whatever is sized by a user's file or option (an array in a `.mat`, a table of lags) is counted before it is made,
-//! so that a small file cannot bring the machine down.
+//! Sizes from a user's file or option (an array in a `.mat`, a table of lags) are checked before allocation,
+//! so that a small file cannot exhaust the memory.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// The limit where nobody says otherwise, bytes: what a laptop has to spare.
+/// Default limit, bytes.
 pub const USUAL: u64 = 2_000_000_000;
 
 static LIMIT: AtomicU64 = AtomicU64::new(USUAL);
 
-/// More memory would be needed than may be used.
+/// The memory limit would be exceeded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{what} would take {} of memory and {} may be used; {remedy}, or allow more with --memory {}", gigabytes(*.needed), gigabytes(*.limit), needed.div_ceil(1_000_000_000))]
 pub struct TooMuch {
-    /// What for.
+    /// The purpose.
     pub what: String,
-    /// Bytes that it takes.
+    /// Bytes needed.
     pub needed: u64,
-    /// Bytes that may be used.
+    /// Bytes allowed.
     pub limit: u64,
-    /// What else could be done.
+    /// Alternatives.
     pub remedy: &'static str,
 }
 
@@ -39,10 +39,10 @@ pub fn limit() -> u64 {
     LIMIT.load(Ordering::Relaxed)
 }
 
-/// Whether `what` may take so many bytes.
+/// Checks that `what` may take so many bytes.
 ///
 /// # Errors
-/// [`TooMuch`] with what is needed, what may be used, and the `remedy`.
+/// [`TooMuch`] with the need, the limit and the `remedy`.
 pub fn allow(needed: u64, what: &str, remedy: &'static str) -> Result<(), TooMuch> {
     let limit = limit();
     match needed <= limit {

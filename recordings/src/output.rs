@@ -1,8 +1,4 @@
-//! Output files appear whole or not at all.
-//!
-//! A file is written under a temporary name in the folder it belongs to, flushed to the disk and renamed; several
-//! files that belong together are written into a temporary folder first ([`Staging`]). An error, a full disk or a
-//! killed process therefore never leaves half a file under the name the user asked for.
+//! Atomic output: files are written completely or not at all.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -196,17 +192,17 @@ impl Staging {
     }
 }
 
-/// A folder put in the place of another at one stroke.
+/// Atomic exchange of two folders.
 mod swap {
     use std::fs;
     use std::io;
     use std::path::Path;
 
-    /// Exchanges the folders `new` and `old`, and leaves the files in `old`'s place that `new` did not have. Afterwards
-    /// `new` holds what was replaced.
+    /// Exchanges the folders `new` and `old`, and keeps the files of `old` that `new` did not have.
+    /// Afterwards `new` contains the replaced files.
     pub(super) fn with(new: &Path, old: &Path) -> io::Result<()> {
         let unfit = || io::Error::from(io::ErrorKind::Unsupported);
-        // Whoever stands in the folder would be left in the one that is taken away.
+        // A process inside the folder would remain in the removed one.
         let here = std::env::current_dir()?;
         if here.starts_with(old) {
             return Err(unfit());
@@ -223,7 +219,7 @@ mod swap {
         }
         fs::set_permissions(new, fs::metadata(old)?.permissions())?;
         exchange(new, old)?;
-        // What came in between.
+        // Files added in between.
         for entry in fs::read_dir(new)?.flatten() {
             let place = old.join(entry.file_name());
             if !place.exists() {
@@ -245,7 +241,7 @@ mod swap {
     }
 }
 
-/// What the operating system said, without the temporary name that the user has never heard of.
+/// The operating system's message without the temporary name, which the user does not know.
 fn without_temporary_name(error: io::Error) -> io::Error {
     match (error.get_ref(), error.kind()) {
         (None, _) => error,
@@ -261,8 +257,8 @@ fn parent_of(path: &Path) -> &Path {
     }
 }
 
-/// Temporary files and folders are private by default; what is put out has the permissions that the user's umask
-/// leaves of `mode`.
+/// Temporary files and folders are private by default; output gets the permissions of `mode` under the user's
+/// umask.
 fn permitted<'a, 'b>(
     builder: &'a mut tempfile::Builder<'b, 'b>,
     #[cfg_attr(not(unix), expect(unused_variables))] mode: u32,
@@ -368,7 +364,7 @@ mod tests {
         assert!(Staging::new(&target.join("a.csv")).is_err());
     }
 
-    /// Whoever looks while a folder is replaced sees all of the old or all of the new.
+    /// A concurrent reader sees either all old or all new files.
     #[test]
     fn a_folder_is_replaced_at_one_stroke_and_keeps_what_is_not_replaced() {
         use std::sync::atomic::{AtomicBool, Ordering};
@@ -390,10 +386,10 @@ mod tests {
             let looks = scope.spawn(|| {
                 let (mut mixed, mut seen) = (0, 0);
                 while !done.load(Ordering::Relaxed) {
-                    // A folder that is held open stays what it was.
+                    // A folder that is open stays unchanged.
                     let names = ["dataset.toml", "a.csv", "b.csv", "dataset.toml"];
                     let read = names.map(|n| fs::read(target.join(n)).unwrap_or_default());
-                    // Only where nothing was swapped while it was read.
+                    // Only if nothing was exchanged while reading.
                     if read[0] == read[3] && !read[0].is_empty() {
                         seen += 1;
                         mixed += u32::from(read[1] != read[0] || read[2] != read[0]);
@@ -414,7 +410,7 @@ mod tests {
         );
         assert_eq!(fs::read(target.join("notes.txt")).unwrap(), b"mine");
         assert_eq!(entries(folder.path()), ["set"]);
-        // With a folder inside, its files are moved, the last one last.
+        // With a folder inside, files are moved one by one, the last one last.
         fs::create_dir(target.join("more")).unwrap();
         write("end");
         assert_eq!(fs::read(target.join("a.csv")).unwrap(), b"end");

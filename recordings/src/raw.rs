@@ -1,4 +1,5 @@
-//! A raw recording as a stream of samples: one row in memory, faults reported with the row and not as an end.
+//! A raw recording as a stream of samples: one row in memory; faulty rows are reported and do not end the
+//! stream.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -9,10 +10,10 @@ use crate::rows::{RowReader, number, open_text};
 use crate::sampling::tidy;
 use crate::thresholds::RULES;
 
-/// Samples over which a gap can be told; a longer one is taken for so many.
+/// Longest gap in samples that is resolved; a longer one counts as this.
 const FARTHEST: f64 = 1e15;
 
-/// Where a cell of a row goes.
+/// Destination of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Slot {
     Time,
@@ -20,14 +21,14 @@ enum Slot {
     Value(usize),
 }
 
-/// How a row follows the one before it on the grid of samples.
+/// Position of a row relative to the previous one on the sampling grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Step {
     /// This many samples after the row before (1 = the next one; more = samples are missing between them).
     Forward(u64),
-    /// Time went back or stood still: the recording was restarted.
+    /// Time decreased or stood still: the recording was restarted.
     Restart,
-    /// Not on the grid, or no readable time: taken as the next sample, unfit for averaging.
+    /// Off the grid, or without a readable time: treated as the next sample, excluded from averaging.
     OffGrid,
 }
 
@@ -36,7 +37,7 @@ pub(crate) enum Step {
 pub(crate) struct RawRow {
     pub(crate) line: u64,
     pub(crate) step: Step,
-    /// The command as on or off; `None` if it is neither or could not be read.
+    /// Whether the command is on; `None` if it is not on/off or unreadable.
     pub(crate) on: Option<bool>,
     /// Whether all values are finite numbers.
     pub(crate) readable: bool,
@@ -171,7 +172,7 @@ impl<R: BufRead> RawReader<R> {
     }
 }
 
-/// The sampling period of the first rows, whatever gaps or bad rows are among them.
+/// The sampling period from the first rows, robust to gaps and bad rows.
 fn head_period(source: impl BufRead, path: &Path) -> Result<f64, DataError> {
     let mut rows = RowReader::new(source, path)?;
     let column = rows.required("t")?;

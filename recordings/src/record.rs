@@ -1,4 +1,4 @@
-//! One recording: its columns, and what they have to keep to.
+//! A record: its columns and their constraints.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crate::thresholds::RULES;
 /// Names of columns with a meaning of their own; every other column is a measured channel.
 pub(crate) const RESERVED: [&str; 6] = ["t", "u", "y", "y_sd", "y_min", "y_max"];
 
-/// Values beyond this are refused: their squares would not be finite.
+/// Larger values are rejected: their squares would overflow.
 const LARGEST: f64 = 1e100;
 
 /// Shortest and longest sampling period, s: times are written to 12 decimals, a thousandth of the shortest.
@@ -18,13 +18,13 @@ pub const PERIODS_S: [f64; 2] = [1e-9, 1e9];
 /// shorter than the longest line that is read.
 const CHANNELS: (usize, usize) = (4096, 200);
 
-/// What a record is used for.
+/// Use of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Use {
-    /// Parameters are fitted on it.
+    /// Estimation: parameters are fitted to it.
     Identify,
-    /// Held out: models are judged on it.
+    /// Validation: models are compared on it.
     Validate,
 }
 
@@ -33,22 +33,22 @@ pub enum Use {
 pub struct Record {
     /// Unique within the data set.
     pub name: String,
-    /// Fitted on, or held out.
+    /// Estimation or validation.
     pub role: Use,
     /// Sampling period, s, above 0.
     pub sample_period_s: f64,
     /// Time of sample 0 as written in the file, s.
     pub t0: f64,
-    /// Command before the first sample, in the unit of `u`, constant for all times before it; the first value of `u`
-    /// where nothing is said.
+    /// Command before the first sample, in the unit of `u`, constant before it; none for the first value of
+    /// `u`.
     pub u_before: Option<f64>,
-    /// Number of first samples that only lead up to the judged ones: they are simulated and not scored. At least one
-    /// sample follows them. 0 for a record that is judged whole.
+    /// Number of unscored samples at the start (simulated as a lead); at least one sample follows. 0 for
+    /// none.
     pub lead: usize,
-    /// y before the first sample, where it is known; prepared from the data, no part of a file.
+    /// y before the first sample, if known; set by the preparation, not stored in files.
     pub y_before: Option<f64>,
-    /// y that a free run takes over at its first samples, as the past that they answer is not recorded; empty for a
-    /// record that begins at rest. Prepared from the data, no part of a file.
+    /// y of the first samples, which a free run follows because the past that they depend on is not recorded;
+    /// empty for a record that starts at rest. Set by the preparation, not stored in files.
     pub followed: Vec<f64>,
     /// Command (or input) per sample; 0 and 1 for an on/off actuator, any finite value otherwise.
     pub u: Vec<f64>,
@@ -127,7 +127,7 @@ impl Record {
         self.u.len()
     }
 
-    /// Bytes of memory that it takes.
+    /// Its memory in bytes.
     pub(crate) fn bytes(&self) -> u64 {
         let columns = self.columns().count() as u64;
         (columns + 2) * 8 * self.len() as u64
@@ -151,7 +151,8 @@ impl Record {
         self.u.iter().all(|&u| u == 0.0 || u == 1.0)
     }
 
-    /// The first sample of an otherwise on/off command that is neither 0 nor 1. A command with levels of its own has none.
+    /// The first sample of an otherwise on/off command that is neither 0 nor 1; none for a command with
+    /// levels.
     pub(crate) fn stray(&self) -> Option<usize> {
         let takes = |level: f64| self.u.contains(&level);
         let odd = |u: &f64| *u != 0.0 && *u != 1.0;
@@ -250,7 +251,7 @@ impl Record {
 }
 
 impl Record {
-    /// Whether the times are some, and tell samples apart in double precision.
+    /// Checks that the times are finite and resolved in double precision.
     fn check_times(&self) -> Result<(), DataProblem> {
         let latest = self.t0.abs().max(self.time(self.len()).abs());
         if latest >= RULES.latest_s {
@@ -265,7 +266,7 @@ impl Record {
         Ok(())
     }
 
-    /// Checks what is said about the start of the record; `place` is the file or record, or its `dataset.toml`.
+    /// Checks the start settings of the record; `place` is the file or record, or its `dataset.toml`.
     pub(crate) fn check_start(&self, place: &FilePlace) -> Result<(), DataError> {
         let before = self.u_before.unwrap_or(0.0);
         if !before.is_finite() || before.abs() > LARGEST {
@@ -283,7 +284,7 @@ impl Record {
     }
 }
 
-/// Whether a sampling period is one, s.
+/// Checks a sampling period, s.
 pub(crate) fn check_period(seconds: f64) -> Result<(), DataProblem> {
     let [shortest, longest] = PERIODS_S;
     match (shortest..=longest).contains(&seconds) {
@@ -315,7 +316,7 @@ pub(crate) fn check_values(
     Ok(())
 }
 
-/// Where a record came from.
+/// Origin of a record.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Origin {
     pub(crate) file: Option<std::path::PathBuf>,
@@ -370,7 +371,7 @@ mod tests {
         assert_eq!(of(command.clone()), Some(60));
         command[10] = 0.5;
         assert_eq!(of(command.clone()), Some(10));
-        // A staircase, a relay between other levels, a short command with one slip.
+        // A staircase, a relay between other levels, a short command with one wrong value.
         let levels = (0..200).map(|k| f64::from(k / 20) / 9.0).collect();
         assert_eq!(of(levels), None);
         assert_eq!(of(vec![0.0, 0.0, 2.0, 0.0]), None);

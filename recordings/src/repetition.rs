@@ -1,8 +1,8 @@
-//! How long the command sequence of a raw recording is before it repeats, told from its edges.
+//! The repetition period of the command sequence of a raw recording, from its edges.
 
 use crate::thresholds::RULES;
 
-/// Edges that are kept; the recording behind them is taken to go on as it began.
+/// Largest number of edges kept; the rest of the recording is assumed to continue alike.
 const MOST: usize = 8000;
 
 /// Edges of a command: the sample in which the new level begins, and whether it is on.
@@ -15,7 +15,7 @@ pub(crate) struct Edges {
 }
 
 impl Edges {
-    /// The command of the next sample, `steps` after the one before it; none where it cannot be read.
+    /// Adds the command of the next sample, `steps` after the previous one; none if unreadable.
     pub(crate) fn push(&mut self, steps: u64, on: Option<bool>) {
         self.sample = self.sample.saturating_add(steps);
         let Some(on) = on else { return };
@@ -29,13 +29,13 @@ impl Edges {
         self.is_over = self.edges.len() >= MOST;
     }
 
-    /// The recording was started again: what follows is another count.
+    /// The recording was restarted: counting starts again.
     pub(crate) fn end(&mut self) {
         self.is_over = true;
     }
 
-    /// The shortest time, in samples, after which the command repeats at least twice in the recording; none where it does
-    /// not. Edges may be `jitter` samples off.
+    /// The shortest time, in samples, after which the command repeats at least twice in the recording; none
+    /// if it does not. Edges may differ by `jitter` samples.
     pub(crate) fn repeat(&self, jitter: usize) -> Option<u64> {
         let last = self.edges.last()?.0;
         let rises = || self.edges.iter().filter(|e| e.1).map(|e| e.0);
@@ -55,7 +55,7 @@ impl Edges {
         lags.get(at).copied()
     }
 
-    /// The share of the edges that have another one of their kind `lag` later or earlier, where there is a record.
+    /// The share of the edges with an equal edge at distance `lag`, where recorded.
     fn share(&self, lag: u64, jitter: u64) -> f64 {
         let (Some(first), Some(last)) = (self.edges.first(), self.edges.last()) else {
             return 0.0;
@@ -99,16 +99,16 @@ mod tests {
         let two_pulses = |k: u64| (10..30).contains(&(k % 100)) || (50..60).contains(&(k % 100));
         assert_eq!(edges(1000, two_pulses).repeat(1), Some(100));
         assert_eq!(edges(1000, |k| k % 50 < 20).repeat(1), Some(50));
-        // One of twenty pulses is left out.
+        // One of twenty pulses is missing.
         let gapped = |k: u64| k % 50 < 20 && k % 1000 > 50;
         assert_eq!(edges(5000, gapped).repeat(1), Some(1000));
-        // A clock that drifts by half a sample a repeat, and one wrong sample.
+        // A clock drift of half a sample per repeat, and one wrong sample.
         let drifting = |k: u64| two_pulses((k as f64 / 1.005) as u64) ^ (k == 512);
         let found = edges(2000, drifting).repeat(1).unwrap();
         assert!((100..=101).contains(&found), "{found}");
         assert_eq!(edges(150, two_pulses).repeat(1), None);
         assert_eq!(edges(1000, |_| true).repeat(1), None);
-        // Pulses of lengths that never come again.
+        // Pulses of ever-changing lengths.
         let chirp = |k: u64| (0.6 * (k as f64).sqrt()) as u64 % 2 == 1;
         assert_eq!(edges(5000, chirp).repeat(1), None);
     }

@@ -12,10 +12,10 @@ use std::path::{Path, PathBuf};
 use crate::error::{DataError, DataProblem, FilePlace, printable};
 use crate::import::ImportProblem;
 
-/// The longest line that is still taken for a row of measurements, bytes.
+/// Longest line accepted as a row of measurements, bytes.
 const LONGEST_LINE: u64 = 1 << 20;
 
-/// Opens a file whose rows are to be read; one of another program is named as such, with the command that reads it.
+/// Opens a file of rows; a file of another program is reported with the command that reads it.
 pub(crate) fn open_text(path: &Path, buffer: usize) -> Result<BufReader<File>, DataError> {
     let unreadable = |e| DataError::unreadable(path, e);
     let mut reader = BufReader::with_capacity(buffer, File::open(path).map_err(unreadable)?);
@@ -84,7 +84,7 @@ impl<R: BufRead> RowReader<R> {
         self.names.iter().position(|n| n == name)
     }
 
-    /// Index of a column that has to be there.
+    /// Index of a required column.
     pub(crate) fn required(&self, name: &'static str) -> Result<usize, DataError> {
         self.column(name).ok_or_else(|| {
             self.place().at_line(1).error(DataProblem::MissingColumn {

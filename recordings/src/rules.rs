@@ -1,11 +1,4 @@
-//! Rules: the thresholds by which the tool decides, each with its meaning and where its value comes from.
-//!
-//! Every room keeps its own in one structure, written with the macro [`rules!`](crate::rules!): what a rule means is said
-//! once, as the field's documentation, and the same words are printed by `host-fit rules` and stand in `docs/rules.md`. It is
-//! at home here because this is the lowest crate that has thresholds.
-//!
-//! A rule decides something a user can see (what counts as significant, as worth saying, as diverged). What only says
-//! how a computation is carried out (block lengths of a loop, memory limits) is no rule and stays where it is used.
+//! Rules: thresholds of the tool, each with its meaning and the origin of its value.
 
 use serde::Serialize;
 
@@ -18,9 +11,9 @@ pub struct Rule {
     pub value: Value,
     /// Unit of the value; empty for a pure number.
     pub unit: &'static str,
-    /// What it decides.
+    /// Its meaning.
     pub meaning: String,
-    /// Where the value comes from: the data it was tuned on, the test that holds it, or that it is a convention.
+    /// Origin of the value: the data it was tuned on, the test that covers it, or a convention.
     pub calibrated: &'static str,
 }
 
@@ -91,12 +84,12 @@ impl std::fmt::Display for Value {
     }
 }
 
-/// The rules of one room.
+/// The rules of one module.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Rulebook {
-    /// The room: a module of `host-fit`, or a crate.
+    /// The module of `host-fit`, or a crate.
     pub room: &'static str,
-    /// What its rules decide.
+    /// The subject of its rules.
     pub about: String,
     /// The rules.
     pub rules: Vec<Rule>,
@@ -138,7 +131,7 @@ macro_rules! rules {
             )+
         }
 
-        /// The rules in force.
+        /// The values in force.
         $vis const RULES: $name = $name { $($rule: $value,)+ };
 
         impl $name {
@@ -163,7 +156,7 @@ macro_rules! rules {
     };
 }
 
-/// The lines of a documentation comment as one paragraph.
+/// The lines of a documentation comment, joined.
 #[must_use]
 pub fn paragraph(lines: &[&str]) -> String {
     let lines: Vec<&str> = lines.iter().map(|line| line.trim()).collect();

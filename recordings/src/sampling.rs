@@ -1,40 +1,40 @@
-//! Uniform sampling: what period a printed time column has, and whether it holds throughout.
+//! Uniform sampling: the period of a printed time column, and its uniformity.
 
 use crate::error::DataProblem;
 use crate::thresholds::RULES;
 
-/// Times of a record as printed, with one unit in the last printed place of each.
+/// Times of a record as printed, each with one unit in its last place.
 #[derive(Debug, Default)]
 pub(crate) struct PrintedTimes {
     pub(crate) time: Vec<f64>,
     pub(crate) unit: Vec<f64>,
 }
 
-/// A fault in a time column: the row where it shows (0 is the first row) and what it is.
+/// A problem of a time column: its row (0 is the first) and the problem.
 #[derive(Debug)]
 pub(crate) struct TimeFault {
     pub(crate) row: usize,
     pub(crate) problem: DataProblem,
 }
 
-/// A sampling period that somebody stated.
+/// A stated sampling period.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stated {
     pub(crate) period_s: f64,
-    /// Where: subject and verb of a sentence, ``"`sample_period_s` is"``.
+    /// Its source: subject and verb of a sentence, ``"`sample_period_s` is"``.
     pub(crate) by: &'static str,
 }
 
-/// What a time column says of the sampling.
+/// Sampling according to a time column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Clock {
     /// Sampling period, s.
     pub(crate) period_s: f64,
-    /// Set where steps differ by more than the allowance, and the rounding of the printed times explains it.
+    /// Set if steps differ by more than the tolerance and rounding of the printed times explains it.
     pub(crate) rounded: Option<Rounded>,
 }
 
-/// A time column whose steps differ because its times are rounded to about the sampling period, or coarser.
+/// A time column with uneven steps because its times are rounded to about the sampling period or coarser.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Rounded {
     /// One unit in the last printed place, s.
@@ -43,7 +43,7 @@ pub(crate) struct Rounded {
     pub(crate) shortest: f64,
     /// Longest step, s.
     pub(crate) longest: f64,
-    /// Steps that differ from the most common one by more than the allowance.
+    /// Number of steps that differ from the most common one by more than the tolerance.
     pub(crate) uncommon: usize,
     /// The row after the first of them.
     pub(crate) row: usize,
@@ -107,7 +107,7 @@ impl PrintedTimes {
         if !is_evident {
             return None;
         }
-        // The spread of t - k·p about the best p; convex in p, so thirds close in on its minimum.
+        // The spread of t − k·p as a function of p is convex: ternary search.
         let first = *self.time.first()?;
         let spread = |p: f64| {
             let off = |(k, t): (usize, &f64)| t - first - k as f64 * p;
@@ -173,7 +173,7 @@ impl PrintedTimes {
         let middle = steps.len() / 2;
         let median = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
         let rounding = |row: usize| self.unit[row - 1].max(self.unit[row]);
-        // A period that fits no step at all is a wrong statement, not a gap in row 2.
+        // A period that fits no step is a wrong statement, not a gap in row 2.
         if let Some(stated) = stated
             && (median - stated.period_s).abs() > tolerance(stated.period_s, rounding(1))
         {
@@ -202,8 +202,8 @@ impl PrintedTimes {
         self.mean_period(stated)
     }
 
-    /// The mean step over the record in the fewest digits that its rounding leaves, or the stated period, which the mean
-    /// may not contradict.
+    /// The mean step over the record in the fewest digits that its uncertainty permits, or the stated period,
+    /// with which the mean must agree.
     fn mean_period(&self, stated: Option<Stated>) -> Result<f64, TimeFault> {
         let (span, steps) = self.span();
         if steps == 0 {
@@ -234,7 +234,7 @@ impl Stated {
     }
 }
 
-/// By how much a step may differ from `period`, s, with times printed to within `rounding`, s.
+/// Tolerance of a step relative to `period`, s, for times printed to within `rounding`, s.
 fn tolerance(period: f64, rounding: f64) -> f64 {
     (RULES.uneven * period + rounding).min(RULES.most_uneven * period)
 }
@@ -355,7 +355,7 @@ mod tests {
         ));
     }
 
-    /// Times of a clock that is read every `period` s and printed in whole units.
+    /// Times of a clock with this period, printed in whole units.
     fn whole(n: usize, period: f64, unit: f64, phase: f64) -> PrintedTimes {
         let read = |k: usize| ((k as f64 + phase) * period / unit).floor() * unit;
         PrintedTimes {
@@ -386,7 +386,7 @@ mod tests {
             let wrong = times.clock(stated(1.5 * period)).unwrap_err();
             assert!(matches!(wrong.problem, DataProblem::PeriodMismatch { .. }));
         }
-        // Two samples missing at once, or single ones where no clock puts them, are no rounding.
+        // Two consecutive missing samples, or single ones at irregular positions, are no rounding.
         for missing in [&[200, 201][..], &[100, 150, 170]] {
             let mut times = whole(600, 1.0, 1.0, 0.0);
             for &row in missing.iter().rev() {
@@ -400,7 +400,7 @@ mod tests {
         assert!((minutes.period_s - 10.0).abs() < 0.2);
     }
 
-    /// Milliseconds are printed by clocks that do not slip: a step of two periods there is a missing sample.
+    /// Clocks with milliseconds do not slip: a step of two periods is a missing sample.
     #[test]
     fn fine_clocks_are_rounded_only_where_many_steps_say_so() {
         let slow = whole(5000, 0.001_3, 0.001, 0.0).clock(None).unwrap();

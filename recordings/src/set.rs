@@ -1,4 +1,4 @@
-//! Records that belong together, checked as one.
+//! Consistent records as a data set.
 
 use crate::error::{DataError, DataProblem, FilePlace};
 use crate::hash;
@@ -16,22 +16,22 @@ pub(crate) const MANIFEST: &str = "dataset.toml";
 /// renews the hash.
 #[derive(Debug, Clone)]
 pub struct DataSet {
-    /// For reports.
+    /// Title for reports.
     pub title: Option<String>,
     /// Sampling period of every record, s.
     pub sample_period_s: f64,
-    /// What kind of plant was recorded: decides how effects are interpreted, never what is computed.
+    /// Kind of plant: affects the interpretation of effects, not the computation.
     pub plant: Plant,
-    /// At least one; names are unique.
+    /// At least one record; names are unique.
     pub records: Vec<Record>,
     /// Hash of names, uses, sampling period and every value, 16 hexadecimal digits: FNV-1a, 64 bits.
     pub hash: String,
-    /// Where each record was read from (folder or file, line of each sample), for later messages.
+    /// Source of each record (folder or file, line of each sample), for messages.
     origin: Vec<Origin>,
 }
 
-/// Kinds of plants (`plant` in `dataset.toml`). Effects of the catalogue are named after what they are in a flow; in
-/// other plants only the observed behaviour is reported.
+/// Kinds of plants (`plant` in `dataset.toml`). Names of effects refer to flows; for other plants only the
+/// observed behaviour is reported.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Plant {
@@ -49,7 +49,7 @@ pub enum Plant {
 }
 
 impl Plant {
-    /// Whether it is the default, which files leave out.
+    /// Whether it is the default, which is not written to files.
     #[must_use]
     pub fn is_flow(&self) -> bool {
         *self == Self::Flow
@@ -67,7 +67,7 @@ impl DataSet {
         Self::assemble(title, records, origin, &FilePlace::default())
     }
 
-    /// Checks the records and what binds them; `whole` is the place for faults of the set itself.
+    /// Checks the records and their consistency; `whole` is the place for errors of the set itself.
     pub(crate) fn assemble(
         title: Option<String>,
         records: Vec<Record>,
@@ -106,12 +106,12 @@ impl DataSet {
         })
     }
 
-    /// The records that parameters are fitted on.
+    /// The estimation records.
     pub fn identify(&self) -> impl Iterator<Item = &Record> {
         self.records.iter().filter(|r| r.role == Use::Identify)
     }
 
-    /// The records that are held out.
+    /// The validation records.
     pub fn validate(&self) -> impl Iterator<Item = &Record> {
         self.records.iter().filter(|r| r.role == Use::Validate)
     }
@@ -122,7 +122,7 @@ impl DataSet {
         self.records.iter().all(Record::is_on_off)
     }
 
-    /// Where sample `k` of record `record` stands in the user's files, for messages.
+    /// Position of sample `k` of record `record` in the user's files, for messages.
     #[must_use]
     pub fn place(&self, record: usize, k: Option<usize>) -> FilePlace {
         let name = self.records.get(record).map_or("", |r| r.name.as_str());
@@ -165,14 +165,14 @@ impl DataSet {
     }
 }
 
-/// Sampling periods of records that were made one.
+/// Sampling periods of records before they were unified.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct OnePeriod {
-    /// Shortest of the records' own periods, s.
+    /// Shortest period, s.
     pub(crate) shortest: f64,
     /// Longest, s.
     pub(crate) longest: f64,
-    /// Their mean over all steps, s: the period of the records now.
+    /// Mean over all steps, s: the unified period.
     pub(crate) mean: f64,
 }
 

@@ -21,17 +21,17 @@ pub(crate) struct Table {
     origin: Origin,
 }
 
-/// Rows after which the memory is checked.
+/// Interval of the memory check, rows.
 const CHECKED: usize = 4096;
 const REMEDY: &str = "phase-average it with `host-fit average`, or use a part of it";
 
 impl Table {
-    /// Reads a file; `stated` is the sampling period it has to have, otherwise its own is found.
+    /// Reads a file; `stated` is its required sampling period, otherwise it is estimated.
     pub(crate) fn load(path: &Path, stated: Option<Stated>) -> Result<Self, DataError> {
         Self::load_beside(path, stated, 0)
     }
 
-    /// The same where so many bytes of memory are taken already.
+    /// The same with so many bytes of memory already in use.
     pub(crate) fn load_beside(
         path: &Path,
         stated: Option<Stated>,
@@ -53,7 +53,7 @@ impl Table {
         let mut columns = vec![Vec::new(); names.len()];
         let mut times = PrintedTimes::default();
         let mut lines = Vec::new();
-        // Its values, and of each row its line and the last place of its time.
+        // Memory of a row: its values, its line, and the last place of its time.
         let row = 8 * (names.len() as u64 + 2);
         while rows.advance()? {
             if lines.len() % CHECKED == 0 {
@@ -153,7 +153,7 @@ impl Table {
     }
 }
 
-/// A command sequence with whatever was measured beside it: columns `t`, `u` and any channels. `y` is not needed.
+/// A command sequence with measured channels: columns `t`, `u` and any others. `y` is optional.
 #[derive(Debug, Clone)]
 pub struct InputFile {
     /// Sampling period, s.
@@ -188,7 +188,7 @@ impl InputFile {
         })
     }
 
-    /// Where sample `k` stands in the user's file, for messages.
+    /// Position of sample `k` in the user's file, for messages.
     #[must_use]
     pub fn place(&self, k: Option<usize>) -> FilePlace {
         self.origin.place("", k)

@@ -1,4 +1,4 @@
-//! Text of unknown origin, made safe to print: names and notes come from files that anybody may have written.
+//! Escaping of text of unknown origin before printing.
 
 use std::borrow::Cow;
 
@@ -46,7 +46,7 @@ fn escaped(text: &str, escape: impl Fn(char, &mut String)) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Whether a character acts instead of being seen.
+/// Whether a character controls the display instead of being shown.
 fn acts(c: char) -> bool {
     (c.is_control() && !matches!(c, '\n' | '\t'))
         || matches!(c,

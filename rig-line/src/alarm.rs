@@ -1,30 +1,20 @@
-//! Whether a model in service has stopped being true.
-//!
-//! The residual (reading minus what the model said, running free beside the loop)
-//! has a mean that is not exactly 0, and noise with a memory. Both are learnt from
-//! the first blocks of the watch, when the model was as true as it will be: means
-//! of the residual over blocks that are much longer than the noise remembers are
-//! all but independent and normal. A later block is judged against them: under the
-//! null hypothesis its distance, over s · √(1 + 1/n), is Student's t with n − 1
-//! degrees of freedom. The level of a single block is the day's divided by the
-//! blocks of a day (Bonferroni), so that on a day of 8 hours the chance of any
-//! false alarm is at most what is stated.
+//! Monitoring of a model in operation.
 
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// How a model in service is judged.
+/// Parameters of the monitoring.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Test {
-    /// Length of a block, s: many times what the noise remembers.
+    /// Length of a block, s: many correlation times of the noise.
     pub block_s: f64,
-    /// Blocks that say what is usual.
+    /// Number of blocks of the baseline.
     pub learn: u32,
-    /// Chance of a false alarm in [`DAY_S`].
+    /// Probability of a false alarm in [`DAY_S`].
     pub false_alarms_per_day: f64,
 }
 
-/// A working day, s.
+/// Reference duration of the false-alarm probability, s.
 pub const DAY_S: f64 = 8.0 * 3600.0;
 
 impl Default for Test {
@@ -38,7 +28,7 @@ impl Default for Test {
 }
 
 impl Test {
-    /// How many standard deviations a block may be off.
+    /// Alarm threshold in standard deviations.
     #[must_use]
     pub fn threshold(&self) -> f64 {
         let blocks = (DAY_S / self.block_s).max(1.0);
@@ -49,56 +39,56 @@ impl Test {
     }
 }
 
-/// What is known of the model.
+/// State of the monitoring.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "verdict", rename_all = "kebab-case")]
 pub enum Verdict {
-    /// Not enough seen yet.
+    /// The baseline is not complete.
     Learning {
-        /// Blocks to come.
+        /// Blocks missing.
         blocks_left: u32,
     },
-    /// As true as it was.
+    /// The model still fits.
     True {
-        /// Largest distance of a block so far, in standard deviations of the test.
+        /// Largest deviation of a block so far, in standard deviations of the test.
         largest: f64,
-        /// The distance that would be an alarm.
+        /// Alarm threshold in standard deviations.
         threshold: f64,
     },
-    /// No longer.
+    /// The model no longer fits.
     Stopped {
-        /// When, s from the beginning.
+        /// Time of the alarm, s from the start.
         at_s: f64,
         /// Mean residual of the block, y.
         residual: f64,
-        /// What was usual, y.
+        /// Mean residual of the baseline, y.
         usual: f64,
-        /// Its distance from that, standard deviations.
+        /// Deviation from the baseline, standard deviations.
         distance: f64,
-        /// The distance that is an alarm.
+        /// Alarm threshold in standard deviations.
         threshold: f64,
     },
 }
 
-/// Watches residuals.
+/// Monitor of residuals.
 #[derive(Clone, Debug)]
 pub struct Alarm {
     test: Test,
     threshold: f64,
-    /// Samples of a block.
+    /// Length of a block, samples.
     block: u32,
     period_s: f64,
     sum: f64,
     count: u32,
     samples: u64,
-    /// Mean and sum of squares of the blocks that were learnt (Welford).
+    /// Count, mean and sum of squares of the baseline blocks (Welford).
     learnt: (u32, f64, f64),
     largest: f64,
     stopped: Option<Verdict>,
 }
 
 impl Alarm {
-    /// Nothing seen.
+    /// Initial state.
     #[must_use]
     pub fn new(test: Test, sample_period_s: f64) -> Self {
         Self {
@@ -115,13 +105,13 @@ impl Alarm {
         }
     }
 
-    /// Samples that are missing: the block that they fall into is not judged.
+    /// Missing samples: their block is not tested.
     pub fn gap(&mut self, samples: u32) {
         self.samples += u64::from(samples);
         (self.sum, self.count) = (0.0, 0);
     }
 
-    /// Takes a residual, y. The first alarm stays.
+    /// Adds a residual, y. The first alarm is kept.
     pub fn push(&mut self, residual: f64) {
         self.samples += 1;
         self.sum += residual;
@@ -143,7 +133,7 @@ impl Alarm {
         let spread = (squares / (n - 1.0) * (1.0 + 1.0 / n)).sqrt();
         let distance = (mean - usual) / spread;
         self.largest = self.largest.max(distance.abs());
-        // Also for no number.
+        // NaN counts as an alarm.
         if self.stopped.is_none() && (distance.is_nan() || distance.abs() > self.threshold) {
             self.stopped = Some(Verdict::Stopped {
                 at_s: self.samples as f64 * self.period_s,
@@ -155,7 +145,7 @@ impl Alarm {
         }
     }
 
-    /// What is known now.
+    /// Present state.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         if let Some(stopped) = self.stopped {
@@ -200,8 +190,8 @@ mod tests {
         }
     }
 
-    /// At a rate that can be counted: of many days of 200 blocks a fifth may give a
-    /// false alarm, and about as many do (each day learns anew).
+    /// At a false-alarm rate of a fifth per day of 200 blocks, about as many of many days have one; each day
+    /// learns its own baseline.
     #[test]
     fn false_alarms_are_as_rare_as_stated() {
         let test = Test {
@@ -213,7 +203,7 @@ mod tests {
         let days = 150;
         let alarms = (0..days).filter(|seed| {
             let mut film = Film::new(*seed);
-            // The model is off by a little, and always was.
+            // A constant model error is part of the baseline.
             let mut alarm = Alarm::new(test, 0.001);
             for _ in 0..260_000 {
                 alarm.push(0.004 + film.sample());
@@ -238,7 +228,7 @@ mod tests {
             "{:?}",
             alarm.verdict()
         );
-        // A twentieth of the range, of which a single sample shows nothing.
+        // A change by a twentieth of the range, invisible in a single sample.
         for _ in 0..5_000 {
             alarm.push(0.05 + film.sample());
         }

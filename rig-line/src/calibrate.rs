@@ -13,7 +13,7 @@ use crate::host::{Host, word};
 use crate::record::{MOST_SAMPLES, Progress, record};
 use crate::rig_file::{ChannelEntry, FULL_SCALE, RigFile, SensorEntry, VERSION, ValveEntry};
 
-/// How a rig is measured.
+/// Parameters of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
     /// How long the valve stays open, and shut, for the flow to become steady, s; the second half of it is measured.
@@ -22,12 +22,11 @@ pub struct Plan {
     pub steady_s: Option<f64>,
     /// Pulses of each length.
     pub pulses: u32,
-    /// Standard errors by which the flow must have answered a pulse.
+    /// Standard errors by which a response to a pulse must exceed the noise.
     pub sigmas: f64,
-    /// Standard deviations of the noise, averaged over 64 samples, that a model
-    /// may be off: the residual's envelope.
+    /// Alarm limit of the residual, in standard deviations of noise averaged over 64 samples.
     pub envelope_sigmas: f64,
-    /// Smallest envelope, y.
+    /// Smallest alarm limit, y.
     pub least_envelope: f64,
 }
 
@@ -43,15 +42,15 @@ impl Default for Plan {
     }
 }
 
-/// How long a usual flow takes to become steady, s, and the fewest samples that it is given.
+/// Usual settling time of a flow, s, and its least number of samples.
 const STEADY: (f64, f64) = (4.0, 1000.0);
 
-/// How long flow and valve are given, s.
+/// Waiting times of a calibration, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Times {
     /// For a steady flow.
     steady: f64,
-    /// Between two pulses: as long as the flow needs to forget.
+    /// Between two pulses, until the flow has settled.
     rest: f64,
     /// Longest pulse that is tried.
     longest_pulse: f64,
@@ -69,20 +68,20 @@ impl Times {
     }
 }
 
-/// How much longer than the longest seen a run of equal readings is a stuck
-/// sensor, and the least.
+/// A run of equal readings counts as a stuck sensor if it is this factor longer than the longest seen, and at
+/// least this long.
 const STUCK: (u32, u32) = (20, 200);
-/// Distance from the ends of the converter's range at which a reading is at a rail.
+/// Readings this close to the ends of the converter's range count as saturated.
 const RAIL: f64 = 8.0;
 
-/// The channel that a rig has, as the user says: the board cannot know.
+/// The measured channel of a rig, stated by the user.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelSaid {
     /// Its name.
     pub name: String,
     /// Its unit.
     pub unit: String,
-    /// Counts of 0.
+    /// Counts at 0.
     pub zero_counts: f64,
     /// Units per count.
     pub per_count: f64,
@@ -123,7 +122,7 @@ pub fn calibrate(
         played(host, &command, &mut |progress| watch(what, progress))
     };
     let shut = play("valve shut", vec![false; steady])?;
-    // Open, then shut again for as long: the next thing begins at rest.
+    // Open, then closed for as long: the next test starts at rest.
     let blown = play(
         "valve open",
         [vec![true; steady], vec![false; steady]].concat(),
@@ -139,7 +138,7 @@ pub fn calibrate(
             "the reading does not move at all; is the sensor connected?".into(),
         ));
     }
-    // Noise is coloured: the scatter of stretches says how sure the means are.
+    // Noise is coloured: the scatter of segment means gives the standard error.
     let sure = stretches(&off).max(stretches(&on));
     if swing.abs() < plan.sigmas * sure || swing.abs() < 20.0 {
         return Err(LineError::Calibration(format!(
@@ -196,10 +195,10 @@ pub fn calibrate(
     })
 }
 
-/// Plays levels, under a name for the user, and gives the counts.
+/// Plays levels under a display name and returns the counts.
 type Play<'a> = dyn FnMut(&str, Vec<bool>) -> Result<Vec<f64>, LineError> + 'a;
 
-/// The shortest pulse (`open`), or gap in steady blowing, that the flow answers, s.
+/// The shortest pulse (`open`), or gap in steady blowing, with a significant response, s.
 fn shortest(
     play: &mut Play<'_>,
     (plan, times): (&Plan, Times),
@@ -223,7 +222,7 @@ fn shortest(
         let text = format!("{what} of {:.0} ms", length as f64 * period * 1e3);
         let counts = match play(&text, levels) {
             Ok(counts) => counts,
-            // Shorter than the hold times that the board knows.
+            // Shorter than the board's hold times.
             Err(LineError::Refused { reason, .. }) if reason.contains("hold time") => {
                 return Ok(false);
             }
@@ -232,7 +231,7 @@ fn shortest(
         let answers: Vec<f64> = (0..plan.pulses as usize)
             .filter_map(|n| {
                 let edge = lead + n * (rest + length) + rest;
-                // Before the pulse, and the extreme of what comes after it.
+                // The level before the pulse, and the extreme after it.
                 let before = mean(counts.get(edge - rest / 4..edge)?);
                 let after = mean(counts.get(edge + 20.min(rest / 8)..edge + rest / 2)?);
                 Some((after - before) * if open { swing } else { -swing } / swing.abs())
@@ -250,7 +249,7 @@ fn shortest(
     }
 }
 
-/// Lengths that are tried, samples: all short ones, then each a quarter longer.
+/// Lengths to try, samples: all short ones, then in steps of a quarter.
 fn lengths(longest: usize) -> Vec<usize> {
     let longer = |length: &usize| {
         Some(if *length < 8 {
@@ -265,13 +264,13 @@ fn lengths(longest: usize) -> Vec<usize> {
         .collect()
 }
 
-/// The first of `lengths` that is answered, if longer ones are answered too: by
-/// leaps that double, then by halves, since every one costs a quarter of a minute.
+/// The first of `lengths` with a response, provided that longer ones have one too: doubling steps, then
+/// bisection, because each test takes a quarter of a minute.
 fn first_that(
     lengths: &[usize],
     answers: &mut impl FnMut(usize) -> Result<bool, LineError>,
 ) -> Result<Option<usize>, LineError> {
-    // Nothing below `low` is answered; `high` is, unless it is behind the end.
+    // Nothing below `low` has a response; `high` has one, unless it is past the end.
     let (mut low, mut high, mut leap) = (0, lengths.len(), 1);
     while low < high {
         let at = if high == lengths.len() {
@@ -322,7 +321,7 @@ fn deviation(values: &[f64]) -> f64 {
     (square / (values.len().max(2) - 1) as f64).sqrt()
 }
 
-/// Standard error of the mean from the scatter of ten stretches.
+/// Standard error of the mean from the scatter of ten segments.
 fn stretches(values: &[f64]) -> f64 {
     let each = (values.len() / 10).max(1);
     let means: Vec<f64> = values.chunks_exact(each).map(mean).collect();
@@ -349,7 +348,7 @@ fn rounded(value: f64, digits: i32) -> f64 {
     (value * scale).round() / scale
 }
 
-/// Seven digits: a float's.
+/// Seven digits, as in single precision.
 fn significant(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
 }
@@ -376,7 +375,7 @@ mod tests {
         };
         assert_eq!(of(None, 2e-4), usual);
         assert_eq!(of(None, 1e-3), usual);
-        // Less is asked for at the user's risk; pulses are not shorter for it.
+        // A shorter time is at the user's risk; pulses are not shortened.
         let hasty = Times {
             steady: 1.5,
             ..usual

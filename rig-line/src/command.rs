@@ -1,4 +1,4 @@
-//! A command of the valve as run lengths.
+//! On/off commands as run lengths.
 
 use std::path::Path;
 
@@ -9,11 +9,11 @@ use crate::error::LineError;
 /// An on/off command.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Command {
-    /// Where it is from, for messages and files.
+    /// Its origin, for messages and files.
     pub name: String,
     /// Sampling period, s.
     pub sample_period_s: f64,
-    /// Run lengths in samples, taking turns, the first one shut (it may be 0).
+    /// Run lengths in samples, alternating, closed first (may be 0).
     pub runs: Vec<u32>,
 }
 
@@ -30,14 +30,14 @@ impl Command {
         if let Some(k) = file.u.iter().position(|u| *u != 0.0 && *u != 1.0) {
             return Err(LineError::Command {
                 command: file.place(Some(k)).in_column("u").to_string(),
-                reason: "the valve knows 0 and 1 only; play an on/off command".into(),
+                reason: "the valve accepts 0 and 1 only; play an on/off command".into(),
             });
         }
         let levels = file.u.iter().map(|u| *u == 1.0);
         Ok(Self::new(&name, file.sample_period_s, levels))
     }
 
-    /// From levels.
+    /// The command from levels.
     pub fn new(name: &str, sample_period_s: f64, levels: impl IntoIterator<Item = bool>) -> Self {
         let mut runs = vec![0];
         let mut now = false;
@@ -57,8 +57,8 @@ impl Command {
         }
     }
 
-    /// The same with the valve shut at the end for so long that it has been shut
-    /// for `rest` samples when the command begins again.
+    /// The same with a final rest, so that the valve has been closed for `rest` samples when the command
+    /// repeats.
     #[must_use]
     pub fn with_rest(mut self, rest: u32) -> Self {
         let tail = if self.runs.len().is_multiple_of(2) {

@@ -17,39 +17,38 @@ use wire::reply::lost_after_samples;
 use crate::error::LineError;
 use crate::port::Port;
 
-/// Samples of `period_us` that the rig runs ahead of what the host was told: well below those after which a board gives
-/// its host up.
+/// Samples that the rig may run ahead of its host: well below the number after which a board drops its host.
 fn ahead(period_us: u32) -> u64 {
     u64::from(lost_after_samples(period_us) * 3 / 10)
 }
 
-/// What is measured and driven.
+/// A simulated rig: sensor and valve.
 pub trait Rig: Send {
     /// Holds the valve for a sample period, then gives the counts of sensor and
     /// channel, 12 bits each.
     fn sample(&mut self, open: bool) -> [u16; 2];
 }
 
-/// How far host and rig are.
+/// Synchronisation of host and rig.
 #[derive(Clone, Debug, Default)]
 pub struct Pace(Arc<(Mutex<Ahead>, Condvar)>);
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Ahead {
-    /// Samples until the host must be heard.
+    /// Samples until the host must respond.
     left: u64,
-    /// Hosts that live.
+    /// Number of active hosts.
     hosts: u32,
     /// Samples so far.
     samples: u64,
 }
 
-/// A host that lives; time waits for it, and goes on when it has died.
+/// Registration of an active host: the simulated time waits for it.
 #[derive(Debug)]
 pub struct Presence(Pace);
 
 impl Pace {
-    /// A host comes.
+    /// Registers a host.
     #[must_use]
     pub fn enter(&self) -> Presence {
         self.change(|ahead| ahead.hosts += 1);
@@ -64,7 +63,7 @@ impl Pace {
         }
     }
 
-    /// Waits until the host is near enough for another sample.
+    /// Waits until the host permits another sample.
     pub fn wait(&self) {
         let (ahead, changed) = &*self.0;
         let Ok(ahead) = ahead.lock() else { return };
@@ -76,7 +75,7 @@ impl Pace {
 }
 
 impl Presence {
-    /// The host of a board that samples every `period_us` was there.
+    /// Records activity of the host of a board that samples every `period_us`.
     pub fn touch(&self, period_us: u32) {
         self.0.change(|now| now.left = ahead(period_us));
     }
@@ -96,7 +95,7 @@ impl Drop for Presence {
 /// A board under QEMU with its rig.
 pub struct Emulator {
     process: Child,
-    /// How far host and rig are.
+    /// Synchronisation of host and rig.
     pub pace: Pace,
     reset: Arc<AtomicBool>,
     samples: Arc<AtomicU64>,
@@ -150,7 +149,7 @@ impl Emulator {
         std::thread::spawn(move || {
             if let Ok((line, _)) = listener.accept() {
                 let _ = line.set_nodelay(true);
-                // QEMU has ended when the line does.
+                // QEMU ends when the serial line does.
                 let _ = behind.run(&line, &mut *rig);
             }
         });
@@ -164,12 +163,12 @@ impl Emulator {
         })
     }
 
-    /// The serial line; there is one.
+    /// Takes the serial line.
     pub fn port(&mut self) -> Option<Port> {
         self.lines.take()
     }
 
-    /// Puts the line back, for another host.
+    /// Returns the serial line for another host.
     pub fn put_back(&mut self, port: Port) {
         self.lines = Some(port);
     }
@@ -199,7 +198,7 @@ impl Drop for Emulator {
     }
 }
 
-/// The rig's end of the second line.
+/// The rig's end of the second serial line.
 struct Behind {
     pace: Pace,
     reset: Arc<AtomicBool>,

@@ -1,11 +1,11 @@
-//! What can go wrong between host and board, each with what to do.
+//! Errors between host and board, each with its remedy.
 
 use std::path::PathBuf;
 
 use recordings::DataError;
 use recordings::output::OutputError;
 
-/// Why a board does not do what it was asked.
+/// Why a request to a board failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LineError {
@@ -14,85 +14,86 @@ pub enum LineError {
         "{port} cannot be opened ({cause}); is the board plugged in, and may you use the port?"
     )]
     Open {
-        /// The device, or the program that stands for it.
+        /// The device, or the program behind it.
         port: String,
-        /// What the operating system said.
+        /// Message of the operating system.
         cause: std::io::Error,
     },
     /// Another program has the device.
     #[error("{0} is in use by another program; a board listens to one host at a time")]
     InUse(String),
-    /// Nothing comes any more.
-    #[error("the line to the board has gone ({0})")]
+    /// The connection is lost.
+    #[error("the connection to the board is lost ({0})")]
     Gone(String),
-    /// No answer.
+    /// The board does not answer.
     #[error(
         "the board does not answer `{0}`; is the right firmware on it? (`cargo xtask firmware`)"
     )]
     Silent(&'static str),
-    /// Host and board speak different versions.
+    /// Host and board use different protocol versions.
     #[error(
-        "the board speaks version {board} of the dialogue and this program version {host}; build the firmware anew with \
+        "the board speaks version {board} of the protocol and this program version {host}; build the firmware anew with \
          `cargo xtask firmware`"
     )]
     Version {
-        /// The board's.
+        /// Version of the board.
         board: u8,
-        /// This program's.
+        /// Version of this program.
         host: u8,
     },
-    /// The board's constants are none.
+    /// The board reports invalid constants.
     #[error(
-        "the board says that it has {0}, which cannot be; build the firmware anew with `cargo xtask firmware`"
+        "the board reports {0}, which is impossible; build the firmware anew with `cargo xtask firmware`"
     )]
     Constants(String),
-    /// After a broken link somebody else answers.
+    /// After a broken link a different board answers.
     #[error(
-        "after the link was broken a board with other firmware or constants answered; what was whole until then is kept"
+        "after the link was broken a board with other firmware or constants answered; complete repeats until \
+        then are kept"
     )]
     AnotherBoard,
-    /// Nothing of a recording came whole.
+    /// No complete repeat was recorded.
     #[error("nothing was recorded: {0}")]
     Nothing(String),
-    /// What was recorded cannot be kept.
+    /// The recording cannot be stored.
     #[error("the recording cannot be written ({0}); has the disk space?")]
     Keep(std::io::Error),
-    /// The board refuses.
+    /// The board refuses a request.
     #[error("the board refuses to {asked}: {reason}")]
     Refused {
-        /// What it was asked for.
+        /// The request.
         asked: &'static str,
-        /// Why, with what to do.
+        /// The reason with its remedy.
         reason: String,
     },
-    /// The command is no command for this board.
+    /// The command cannot be played on this board.
     #[error("{command}: {reason}")]
     Command {
         /// The command.
         command: String,
-        /// What is wrong with it, and what to do.
+        /// The problem with its remedy.
         reason: String,
     },
-    /// A time of more samples than memory is allowed for.
+    /// A time that exceeds the memory limit.
     #[error("the longest {what} at this board's period is {longest_s:.0} s; ask for less")]
     TooLong {
-        /// What is too long.
+        /// The quantity that is too long.
         what: &'static str,
-        /// The longest, s.
+        /// The limit, s.
         longest_s: f64,
     },
-    /// The rig is not as a calibration needs it.
+    /// The rig does not meet the requirements of a calibration.
     #[error("the rig cannot be calibrated: {0}")]
     Calibration(String),
-    /// A rig file is wrong.
+    /// A problem in a rig file.
     #[error("{file}: {reason}")]
     RigFile {
         /// The file.
         file: PathBuf,
-        /// The key, what is wrong with it, and what to do.
+        /// The key and the problem with its remedy.
         reason: String,
     },
-    /// The command's file is wrong.
+    /// A problem in the command file.
     #[error(transparent)]
     Data(#[from] DataError),
     /// A file cannot be written.

@@ -1,5 +1,4 @@
-//! The dialogue: requests that are repeated until they are answered, and the
-//! stream of samples, with the board told that its host is there.
+//! The protocol of the host: requests with retries, the stream of samples, and keep-alive messages.
 
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
@@ -14,19 +13,19 @@ use crate::emulator::{Pace, Presence};
 use crate::error::LineError;
 use crate::port::Port;
 
-/// A request is sent this often before the board counts as silent.
+/// Number of attempts per request before the board counts as silent.
 const ATTEMPTS: u32 = 8;
-/// How long an answer may take.
+/// Timeout of an answer.
 const ANSWER: Duration = Duration::from_millis(250);
-/// An emulated board that takes no sample is waited for so long: what it runs on may be busy.
+/// Timeout of an emulated board without progress, long because its machine may be busy.
 const EMULATED: Duration = Duration::from_secs(600);
-/// The board hears of its host after so long, and after so many samples.
+/// Keep-alive interval in time and in samples.
 const ALIVE: Duration = Duration::from_millis(100);
 const ALIVE_SAMPLES: usize = 48;
-/// Another host, if it is gone, is forgotten after half a second.
+/// Waiting time for another host to be released; a silent one is dropped after half a second.
 const BUSY: Duration = Duration::from_millis(2000);
 
-/// Words for the faults, in the order of the firmware's `Fault::ALL`.
+/// Names of the faults, in the order of the firmware's `Fault::ALL`.
 const FAULTS: [&str; 9] = [
     "overrun",
     "not-finite",
@@ -39,7 +38,7 @@ const FAULTS: [&str; 9] = [
     "self-test",
 ];
 
-/// The word for what the board does.
+/// Name of a phase of the board.
 #[must_use]
 pub fn word(phase: Phase) -> &'static str {
     match phase {
@@ -49,37 +48,37 @@ pub fn word(phase: Phase) -> &'static str {
         Phase::Faulted(number) => FAULTS
             .get(usize::from(number))
             .copied()
-            .unwrap_or("a fault that this program does not know"),
+            .unwrap_or("an unknown fault"),
     }
 }
 
-/// Samples that came together.
+/// A batch of samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Streamed {
-    /// Their numbers and what was sampled.
+    /// Sample numbers with the samples.
     pub samples: Vec<(u32, Sample)>,
     /// Number of the sample after them.
     pub next: u32,
-    /// What the board did.
+    /// Phase of the board.
     pub phase: Phase,
-    /// y* at the first of them.
+    /// y* at the first sample.
     pub reference: Option<f32>,
     /// Whether the stream ends here.
     pub last: bool,
-    /// Samples of the stream so far that found no room on the board.
+    /// Samples of the stream that were dropped for lack of memory on the board.
     pub left_out: u32,
 }
 
-/// What came over the line.
+/// An event on the line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// Samples of this host's stream.
     Samples(Streamed),
-    /// Nothing within the time.
+    /// Nothing within the timeout.
     Silence,
 }
 
-/// A board on the line.
+/// Connection to a board.
 pub struct Host {
     port: Port,
     receiver: Receiver,
@@ -88,18 +87,18 @@ pub struct Host {
     alive_at: Instant,
     unheard: usize,
     waiting: VecDeque<Streamed>,
-    /// The board's sample period, µs; until it has said so, that of the bundled model.
+    /// The board's sample period, µs; until it is known, that of the bundled model.
     period_us: u32,
-    /// Whether a whole frame has come: until then a board sends its operator's lines.
+    /// Whether a complete frame has been received: before that a board sends text for its operator.
     is_framed: bool,
-    /// Frames that came damaged.
+    /// Number of damaged frames.
     pub damaged: u64,
-    /// Of an emulated board, whose time waits for its host.
+    /// Registration with an emulated board, whose time waits for its host.
     presence: Option<Presence>,
 }
 
 impl Host {
-    /// Takes the line. `session` is a number that no other host has.
+    /// Opens a connection. `session` must be unique among hosts.
     #[must_use]
     pub fn new(port: Port, session: u32, pace: Option<Pace>) -> Self {
         Self {
@@ -117,27 +116,27 @@ impl Host {
         }
     }
 
-    /// The line, for whoever comes next.
+    /// Closes the connection and returns the line.
     #[must_use]
     pub fn into_port(self) -> Port {
         self.port
     }
 
-    /// The line, to do to it what a host does not do.
+    /// The line itself, for tests.
     pub fn port(&mut self) -> &mut Port {
         &mut self.port
     }
 
-    /// This host's number.
+    /// Session number of this host.
     #[must_use]
     pub fn session(&self) -> u32 {
         self.session
     }
 
-    /// Asks who is there.
+    /// Identifies the board.
     ///
     /// # Errors
-    /// [`LineError`] when nobody is, or one of another version.
+    /// [`LineError`] without an answer, or for another protocol version.
     pub fn hello(&mut self) -> Result<Info, LineError> {
         match self.ask("who are you", |_, _| Ask::Hello)? {
             Answer::Info(info) if info.protocol == PROTOCOL => {
@@ -153,7 +152,7 @@ impl Host {
         }
     }
 
-    /// Gives the board a command's runs.
+    /// Loads a command's runs.
     ///
     /// # Errors
     /// [`LineError`].
@@ -167,7 +166,7 @@ impl Host {
         Ok(())
     }
 
-    /// Has the loaded runs played; the stream begins.
+    /// Plays the loaded runs; starts the stream.
     ///
     /// # Errors
     /// [`LineError`].
@@ -184,7 +183,7 @@ impl Host {
         )
     }
 
-    /// Has every sample streamed.
+    /// Starts a stream of all samples.
     ///
     /// # Errors
     /// [`LineError`].
@@ -193,7 +192,7 @@ impl Host {
         self.carry_out("stream its samples", Ask::Stream)
     }
 
-    /// Lets the law have the valve.
+    /// Arms the law.
     ///
     /// # Errors
     /// [`LineError`].
@@ -201,7 +200,7 @@ impl Host {
         self.carry_out("arm", Ask::Arm)
     }
 
-    /// Shuts the valve.
+    /// Disarms and closes the valve.
     ///
     /// # Errors
     /// [`LineError`].
@@ -209,7 +208,7 @@ impl Host {
         self.carry_out("disarm", Ask::Disarm)
     }
 
-    /// Carries a request out; samples since the board's start when it was.
+    /// Executes a request; returns the board's sample count at its execution.
     fn carry_out(&mut self, asked: &'static str, ask: Ask<'_>) -> Result<u64, LineError> {
         self.number = self.number.wrapping_add(1);
         let request = Request {
@@ -233,7 +232,7 @@ impl Host {
             };
             match status {
                 Status::Done => return Ok(samples),
-                // The other one may be gone and not yet forgotten.
+                // The other host may be gone and not yet released.
                 Status::Busy if Instant::now() < until => {
                     let _ = self.port.receive(ALIVE)?;
                     self.touch();
@@ -262,7 +261,7 @@ impl Host {
         self.answer(asked, request.frame().bytes())
     }
 
-    /// Sends a request until its answer has come; samples that come meanwhile wait.
+    /// Repeats a request until it is answered; samples received meanwhile are queued.
     fn answer(&mut self, asked: &'static str, frame: &[u8]) -> Result<Answer, LineError> {
         let patience = self.patience(ATTEMPTS * ANSWER);
         while !patience.is_over(self.presence.as_ref()) {
@@ -280,7 +279,7 @@ impl Host {
         Err(LineError::Silent(asked))
     }
 
-    /// What comes next, within `patience`.
+    /// The next event within `patience`.
     ///
     /// # Errors
     /// [`LineError::Gone`].
@@ -301,7 +300,7 @@ impl Host {
         }
     }
 
-    /// Tells the board that its host is there; [`Self::next`] does it by itself.
+    /// Sends a keep-alive message; [`Self::next`] does so itself.
     ///
     /// # Errors
     /// [`LineError::Gone`].
@@ -334,7 +333,7 @@ impl Host {
         }
     }
 
-    /// Reads what comes: samples wait in the queue, answers are returned.
+    /// Reads from the line: samples are queued, answers are returned.
     fn read(&mut self, patience: Duration) -> Result<Vec<Reply>, LineError> {
         let bytes = self.port.receive(patience)?;
         let mut replies = Vec::new();
@@ -369,8 +368,7 @@ impl Host {
     }
 }
 
-/// How long something is waited for. An emulated board has a time of its own, its
-/// samples.
+/// A timeout. The time of an emulated board is counted in its samples.
 struct Patience {
     until: Instant,
     sample: Option<u64>,
@@ -388,10 +386,10 @@ impl Patience {
     }
 }
 
-/// Sampling periods that a board's loop can have, µs; `model_core::control::period` says so.
+/// Valid sample periods of a board's loop, µs, from `model_core::control::period`.
 const PERIODS_US: RangeInclusive<u32> = 200..=100_000;
 
-/// Refuses a board whose constants are none: everything that is recorded of it would be wrong.
+/// Rejects a board with invalid constants, whose recordings would be wrong.
 fn check(info: &Info) -> Result<(), LineError> {
     let wrong = |what: String| Err(LineError::Constants(what));
     let Scale { zero, per_count } = info.sensor;
@@ -410,7 +408,7 @@ fn check(info: &Info) -> Result<(), LineError> {
     Ok(())
 }
 
-/// Why the board refuses, and what to do.
+/// Why the board refuses, with the remedy.
 fn reason(status: Status, detail: u32) -> String {
     match status {
         Status::Busy => "another host has it; end that one first".into(),
@@ -420,7 +418,9 @@ fn reason(status: Status, detail: u32) -> String {
             "run {detail} (counted from 0, the first one shut) is shorter than the valve's hold time in the board's rig \
              constants; lengthen it"
         ),
-        Status::OtherCommand => "what it has is not what is to be played; start again".into(),
+        Status::OtherCommand => {
+            "the command on the board differs from the one to play; start again".into()
+        }
         Status::Nothing => "there is nothing to play, or more samples than 32 bits count".into(),
         Status::NotDisarmed => match Phase::from_byte(detail as u8) {
             Some(Phase::Faulted(number)) => format!(

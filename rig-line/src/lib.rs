@@ -1,9 +1,7 @@
-//! The host's end of the serial line to a board: who it is ([`Host`]), commands
-//! played and recorded ([`record`]), and an emulated board for everyone without
-//! one ([`emulator`]).
+//! The host's end of the serial line to a board: the connection ([`Host`]), playing and recording commands
+//! ([`record`]), and an emulated board ([`emulator`]).
 //!
-//! Nothing here knows of models. The dialogue itself is in the crate `wire`, which
-//! the board uses, too.
+//! This crate knows nothing about models. The protocol is in the crate `wire`, which the board uses too.
 
 pub mod alarm;
 pub mod calibrate;

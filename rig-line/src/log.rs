@@ -1,5 +1,4 @@
-//! Files of a recording: rows that `host-fit average` reads, and beside them what,
-//! when and by whom.
+//! Files of a recording: rows for `host-fit average`, and a header with board, command and time.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -21,41 +20,41 @@ pub struct Written {
     /// The rows: t, u, y and the channel.
     #[serde(serialize_with = "as_text")]
     pub file: PathBuf,
-    /// What is said of them.
+    /// The header.
     #[serde(serialize_with = "as_text")]
     pub header: PathBuf,
     /// Repeats in the file.
     pub repeats: u32,
-    /// Length of one, s.
+    /// Length of a repeat, s.
     pub period_s: f64,
-    /// Samples that did not come; their repeats were played again.
+    /// Lost samples; their repeats were played again.
     pub lost_samples: u64,
-    /// How many of them found no room on the board.
+    /// Lost samples that were dropped for lack of memory on the board.
     pub left_out_samples: u64,
-    /// Frames that came damaged.
+    /// Damaged frames.
     pub damaged_frames: u64,
-    /// Goes in which it was played: more than 1 if the link broke or samples were lost.
+    /// Number of attempts: more than 1 if the link broke or samples were lost.
     pub parts: usize,
-    /// Why there are fewer repeats than were asked for.
+    /// Why there are fewer repeats than requested, if so.
     pub cut_short: Option<String>,
 }
 
-/// JSON has no other names: what is no UTF-8 is shown as a mark.
+/// JSON strings must be UTF-8: other bytes are replaced.
 fn as_text<S: serde::Serializer>(path: &Path, to: S) -> Result<S::Ok, S::Error> {
     to.serialize_str(&path.to_string_lossy())
 }
 
-/// What the columns of a recording are.
+/// Columns of a recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Columns {
-    /// From counts to y; the board's own where none is given.
+    /// Scale from counts to y; the board's own if not given.
     pub sensor: Option<Scale>,
-    /// Name and scale of the measured channel, if it is to be kept.
+    /// Name and scale of the measured channel, if it is recorded.
     pub channel: Option<(String, Scale)>,
 }
 
 impl Columns {
-    /// Those of a rig.
+    /// The columns for a rig.
     #[must_use]
     pub fn of(rig: &RigFile) -> Self {
         let scale = |zero: f64, per_count: f64| Scale {
@@ -102,7 +101,7 @@ pub fn to_files(
         let mut keep = |repeat, samples: &[Sample]| rows.repeat(out, repeat, samples);
         outcome = record(host, connect, command, repeats, &mut keep, watch);
         match &outcome {
-            // Nothing whole: no file.
+            // Without a complete repeat there is no file.
             Ok(recording) if recording.whole > 0 => Ok(()),
             Ok(recording) => Err(io::Error::other(
                 recording.cut_short.clone().unwrap_or_default(),
@@ -130,7 +129,7 @@ pub fn to_files(
     })
 }
 
-/// Writes repeats one after the other on one clock.
+/// Writes consecutive repeats on one clock.
 struct Rows {
     period_s: f64,
     samples: u64,
@@ -149,7 +148,7 @@ impl Rows {
     fn repeat(&self, out: &mut dyn Write, repeat: u32, samples: &[Sample]) -> io::Result<()> {
         let first = u64::from(repeat) * self.samples;
         for (sample, k) in samples.iter().zip(first..) {
-            // Times as a person would write them: sums of a period would print 0.30000000000000004.
+            // Rounded to 1 ns: multiples of the period would print 0.30000000000000004.
             let t = (k as f64 * self.period_s * 1e9).round() / 1e9;
             let y = value(self.sensor, sample.counts);
             write!(out, "{t},{},{y}", u8::from(sample.open))?;
@@ -162,13 +161,13 @@ impl Rows {
     }
 }
 
-/// What counts stand for, as the board reckons it.
+/// Value of counts, computed as on the board.
 #[must_use]
 pub fn value(scale: Scale, counts: u16) -> f32 {
     (f32::from(counts) - scale.zero) * scale.per_count
 }
 
-/// What is said of a recording.
+/// Header of a recording.
 #[derive(Serialize)]
 struct Header<'a> {
     /// The command and how it was played.
@@ -193,7 +192,7 @@ struct Header<'a> {
 struct Board {
     firmware: String,
     protocol: u8,
-    /// Checksums of the constants that it was built with.
+    /// Checksums of the board's constants.
     model: String,
     rig: String,
     rails_counts: [f32; 2],

@@ -1,4 +1,4 @@
-//! A serial line: a device, or anything that reads and writes bytes.
+//! A serial line: a device, or any pair of byte streams.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Write};
@@ -15,23 +15,23 @@ use crate::error::LineError;
 pub struct Port {
     to: Box<dyn Write + Send>,
     from: Receiver<Vec<u8>>,
-    /// Keeps other hosts out while the line is open.
+    /// Lock against other hosts while the line is open.
     _lock: Option<File>,
     bad: Option<Bad>,
     reads: Arc<AtomicBool>,
 }
 
-/// A line that loses and changes bytes, to show that it is noticed.
+/// A line with lost and changed bytes, for tests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bad {
-    /// Share of bytes that are lost or changed, in millionths, either way.
+    /// Fraction of bytes lost or changed, in millionths, in both directions.
     pub millionths: u32,
-    /// Where the drawing is.
+    /// State of the random generator.
     pub seed: u64,
 }
 
 impl Bad {
-    /// What comes of a byte; `None` where it is lost.
+    /// The byte after transmission; `None` if it is lost.
     fn pass(&mut self, byte: u8) -> Option<u8> {
         // SplitMix64.
         self.seed = self.seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
@@ -63,7 +63,7 @@ impl Port {
             Err(TryLockError::WouldBlock) => {
                 return Err(LineError::InUse(device.display().to_string()));
             }
-            // A device that knows no locks has none.
+            // A device without locks is used unlocked.
             Ok(()) | Err(TryLockError::Error(_)) => {}
         }
         let set = Command::new("stty")
@@ -84,7 +84,7 @@ impl Port {
         })
     }
 
-    /// Any two ends.
+    /// A line over any two streams.
     #[must_use]
     pub fn over(to: impl Write + Send + 'static, mut from: impl Read + Send + 'static) -> Self {
         let (sender, receiver) = channel();
@@ -111,7 +111,7 @@ impl Port {
         }
     }
 
-    /// The same line with faults.
+    /// The same line with transmission errors.
     #[must_use]
     pub fn with_faults(self, bad: Bad) -> Self {
         Self {
@@ -120,8 +120,7 @@ impl Port {
         }
     }
 
-    /// Whether this end reads: one that does not lets the line fill up, to show what
-    /// the board does then.
+    /// Whether this end reads; without reading the line fills up, to test the board.
     pub fn reads(&self, reads: bool) {
         self.reads.store(reads, Ordering::Relaxed);
     }
@@ -138,7 +137,7 @@ impl Port {
             .map_err(|cause| LineError::Gone(cause.to_string()))
     }
 
-    /// Bytes that have come within `patience`; none if none have.
+    /// Bytes received within `patience`; empty if none.
     ///
     /// # Errors
     /// [`LineError::Gone`].

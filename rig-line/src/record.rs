@@ -1,8 +1,7 @@
-//! Plays a command again and again and keeps the repeats that came whole.
+//! Plays a command repeatedly and keeps the complete repeats.
 //!
-//! A repeat of which a sample was lost, on the board or on the line, is played
-//! again; so is one in which the link broke. Repeats are never put together from
-//! pieces: what is kept is played in one go, each from rest.
+//! A repeat with a lost sample (on the board or on the line) or a broken link is played again. Repeats are
+//! never assembled from pieces: each is played without interruption, from rest.
 
 use std::time::{Duration, Instant};
 
@@ -14,23 +13,23 @@ use crate::command::Command;
 use crate::error::LineError;
 use crate::host::{Event, Host, Streamed, word};
 
-/// So long nothing may come while something is played.
+/// Longest silence during playing.
 const SILENCE: Duration = Duration::from_millis(1000);
-/// A board that has gone is waited for so long.
+/// Time to wait for a lost board.
 const GONE: Duration = Duration::from_secs(30);
-/// So long samples may come without a new one among them.
+/// Longest time without a new sample.
 const NO_PROGRESS: Duration = Duration::from_secs(10);
-/// Longest command that is played at once, samples: 2.8 h at 1 kHz, some 100 MB until it is written.
+/// Longest command, samples: 2.8 h at 1 kHz, about 100 MB in memory.
 pub(crate) const MOST_SAMPLES: u64 = 10_000_000;
-/// Turns without a whole repeat after which the line is given up.
+/// Attempts without a complete repeat after which recording fails.
 const FRUITLESS: u32 = 10;
 
-/// Where a recording is.
+/// Progress of a recording.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
-    /// Whole repeats so far.
+    /// Complete repeats so far.
     pub whole: u32,
-    /// Samples of the present one.
+    /// Sample of the present repeat.
     pub sample: u32,
     /// Samples lost so far.
     pub lost: u64,
@@ -38,42 +37,42 @@ pub struct Progress {
     pub newest: Sample,
 }
 
-/// Repeats that were played in one go.
+/// Repeats that were played without interruption.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Part {
-    /// Samples of the board since its start when the first was played.
+    /// The board's sample count at the first of them.
     pub board_sample: u64,
-    /// Whole repeats before it.
+    /// Complete repeats before it.
     pub first_repeat: u32,
-    /// Repeats of it that came whole.
+    /// Complete repeats in it.
     pub whole: u32,
-    /// How it ended.
+    /// Why it ended.
     pub ended: String,
 }
 
-/// Samples that did not come.
+/// Lost samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Gap {
-    /// In which part, counted from 0.
+    /// Index of the part.
     pub part: usize,
-    /// Number of the first that is missing, from the part's beginning.
+    /// First lost sample, from the part's start.
     pub first: u32,
-    /// How many.
+    /// Number of lost samples.
     pub samples: u32,
-    /// How many of them found no room on the board; the others were lost on the line.
+    /// How many were dropped for lack of memory on the board; the others were lost on the line.
     pub left_out: u32,
 }
 
-/// What came of it.
+/// Result of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// Who played it.
+    /// The board.
     pub board: Info,
-    /// Whole repeats, all of them kept.
+    /// Complete repeats, all of them kept.
     pub whole: u32,
-    /// Pieces in one go.
+    /// Uninterrupted parts.
     pub parts: Vec<Part>,
-    /// What did not come.
+    /// Lost samples.
     pub gaps: Vec<Gap>,
     /// Samples that came, also of repeats that were not kept.
     pub samples: u64,
@@ -178,7 +177,7 @@ pub fn record(
         };
         let cut = cut.or_else(|| {
             (fruitless >= FRUITLESS).then(|| {
-                format!("{FRUITLESS} times no repeat came whole; see to the line, or play shorter commands")
+                format!("no complete repeat in {FRUITLESS} attempts; check the connection, or play shorter commands")
             })
         });
         if session.recording.whole < repeats {
@@ -205,7 +204,7 @@ fn fits(command: &Command, board: &Info) -> Result<(), LineError> {
     }
     if board.period_us < 400 {
         return Err(refused(format!(
-            "the board samples every {period} s, and the line takes every sample only from 0.0004 s on"
+            "the board samples every {period} s, and the line transmits every sample only from 0.0004 s on"
         )));
     }
     if command.samples() > MOST_SAMPLES {
@@ -269,7 +268,7 @@ impl Session<'_, '_> {
                     if taken.next != progressed.0 {
                         progressed = (taken.next, Instant::now());
                     } else if progressed.1.elapsed() > NO_PROGRESS {
-                        return Ok(End::Broken("the same samples come again and again".into()));
+                        return Ok(End::Broken("the board repeats the same samples".into()));
                     }
                     if u64::from(taken.next) > total {
                         return Ok(End::Broken(

@@ -114,7 +114,7 @@ impl RigFile {
     pub fn check(&self) -> Result<(), String> {
         if self.format_version != VERSION {
             return Err(format!(
-                "key `format_version`: this program reads version {VERSION}, not {}; calibrate anew",
+                "key `format_version`: this program reads version {VERSION}, not {}; calibrate again",
                 self.format_version
             ));
         }
@@ -158,13 +158,15 @@ impl RigFile {
         let between = sensor.lower_rail_counts..sensor.upper_rail_counts;
         if !between.contains(&sensor.zero_counts) {
             return Err(format!(
-                "key `sensor.zero_counts`: {} is not between the rails, so the natural flow would be a fault",
+                "key `sensor.zero_counts`: {} is not between the rails, so the reading without blowing would \
+                count as a fault",
                 sensor.zero_counts
             ));
         }
         if sensor.stuck_after_samples < 2 {
             return Err(
-                "key `sensor.stuck_after_samples`: two readings are equal now and then; 2 at least"
+                "key `sensor.stuck_after_samples`: give at least 2, because two equal readings in a row are \
+                normal"
                     .into(),
             );
         }
@@ -182,7 +184,8 @@ impl RigFile {
         for (key, noise) in noises {
             if !(0.0..=FULL_SCALE).contains(noise) {
                 return Err(format!(
-                    "key `sensor.{key}`: {noise:?} is no size of noise, in counts of a converter; calibrate anew"
+                    "key `sensor.{key}`: {noise:?} is not a noise level in converter counts; calibrate \
+                    again"
                 ));
             }
         }

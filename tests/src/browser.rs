@@ -12,17 +12,17 @@ use serde_json::{Value, json};
 use tungstenite::protocol::Role;
 use tungstenite::{Message, WebSocket};
 
-/// A browser; ends with this value.
+/// A running browser; closed on drop.
 pub struct Browser {
     child: Child,
     socket: WebSocket<TcpStream>,
     next: u64,
-    /// Errors that pages reported: exceptions, refused scripts, failed requests.
+    /// Errors reported by pages: exceptions, refused scripts, failed requests.
     faults: Vec<String>,
     _profile: tempfile::TempDir,
 }
 
-/// A page of it.
+/// An open page.
 #[derive(Debug, Clone)]
 pub struct Page {
     session: String,
@@ -43,7 +43,7 @@ fn upgrade(stream: &mut TcpStream, port: &str, path: &str) -> Result<()> {
         "GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
          Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\n\r\n"
     )?;
-    // Not a byte further: frames follow.
+    // Exactly to the end of the header: frames follow.
     let mut answer = Vec::new();
     while !answer.ends_with(b"\r\n\r\n") {
         let mut byte = [0];
@@ -69,7 +69,7 @@ impl Browser {
                 "--headless=new",
                 "--no-sandbox",
                 "--disable-gpu",
-                // Containers have little of it.
+                // Containers have a small `/dev/shm`.
                 "--disable-dev-shm-usage",
                 "--no-first-run",
             ])
@@ -148,7 +148,7 @@ impl Browser {
         }
     }
 
-    /// What pages reported as errors since the last call.
+    /// Errors reported by pages since the last call.
     pub fn faults(&mut self) -> Vec<String> {
         std::mem::take(&mut self.faults)
     }
@@ -169,7 +169,7 @@ impl Browser {
         for domain in ["Runtime.enable", "Log.enable", "Page.enable"] {
             self.on(&page, domain, &json!({}))?;
         }
-        // Time of the page's own thread: what others on the machine do does not count.
+        // Time of the page's own thread, independent of the machine's load.
         self.on(
             &page,
             "Performance.enable",
@@ -201,7 +201,7 @@ impl Browser {
     /// The value of an expression, which may be a promise.
     ///
     /// # Errors
-    /// When it throws.
+    /// The expression throws.
     pub fn eval(&mut self, page: &Page, expression: &str) -> Result<Value> {
         let params = json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
         let found = self.on(page, "Runtime.evaluate", &params)?;
@@ -211,10 +211,10 @@ impl Browser {
         Ok(found["result"]["value"].clone())
     }
 
-    /// How long the page has worked so far, s of its own thread: script, style, layout, paint.
+    /// Processor time of the page so far, s of its own thread: script, style, layout, paint.
     ///
     /// # Errors
-    /// When the browser does not say.
+    /// The browser does not answer.
     pub fn worked(&mut self, page: &Page) -> Result<f64> {
         let told = self.on(page, "Performance.getMetrics", &json!({}))?;
         let metrics = told["metrics"].as_array().context("metrics")?;
@@ -242,7 +242,7 @@ impl Browser {
         )
     }
 
-    /// Moves the mouse, and presses where `press`.
+    /// Moves the mouse, and clicks if `press` is set.
     ///
     /// # Errors
     /// When the browser does not.
@@ -273,7 +273,7 @@ impl Browser {
         Ok(())
     }
 
-    /// A picture of what is in view, PNG.
+    /// A screenshot of the visible part, PNG.
     ///
     /// # Errors
     /// When it cannot be taken or written.
@@ -288,7 +288,7 @@ impl Browser {
         Ok(fs::write(path, bytes)?)
     }
 
-    /// The page as it prints: a PDF.
+    /// The page printed to PDF.
     ///
     /// # Errors
     /// When it cannot be printed.

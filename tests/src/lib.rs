@@ -1,5 +1,5 @@
-//! Scenarios that cross the crates, the campaign that asks the diagnosis for effects hidden in simulated rigs, and
-//! records as strangers bring them.
+//! Scenarios across the crates: campaigns with hidden effects, agreement of languages, lockstep runs, and
+//! records from other loggers.
 
 pub mod agreement;
 pub mod browser;
@@ -16,7 +16,7 @@ use std::process::Command;
 /// The program `host-fit`, built beside the running test or tool.
 ///
 /// # Panics
-/// When it is not there and cannot be built: a test has nothing to test then.
+/// If it is missing and cannot be built.
 #[must_use]
 pub fn program() -> PathBuf {
     let running = std::env::current_exe().expect("what is running");

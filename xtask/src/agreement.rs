@@ -1,4 +1,4 @@
-//! Whether every model says the same in every language that `codegen` writes: `cargo xtask agreement`.
+//! Agreement of the exported models between languages: `cargo xtask agreement`.
 
 use crate::Task;
 use crate::shell::{run, scenario};

@@ -1,4 +1,4 @@
-//! The designed law against what people use, on plants that are not its model.
+//! The designed law compared with standard controllers, on plants that differ from its model.
 
 use crate::Task;
 use crate::shell::{run, scenario};

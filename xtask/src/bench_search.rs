@@ -1,4 +1,4 @@
-//! Our search, NOMAD and a genetic search on the same delay problem, in one run.
+//! Comparison of the delay search with NOMAD and a genetic algorithm on the same problem.
 
 use crate::Task;
 use crate::shell::{cargo, command, output, run, target};
@@ -27,7 +27,7 @@ struct Run {
     by_itself: bool,
 }
 
-/// What was asked for on the command line.
+/// Options of the command line.
 struct Request {
     sets: Vec<u64>,
     seeds: u64,
@@ -123,7 +123,7 @@ fn bench(arguments: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// The paper's kind of table from `method,problem,seed,evaluations,value,cpu,end` lines.
+/// The table from `method,problem,seed,evaluations,value,cpu,end` lines.
 fn table(lines: &str) -> Result<String> {
     let mut problems: BTreeMap<&str, BTreeMap<&str, Vec<Run>>> = BTreeMap::new();
     for line in lines.lines() {
@@ -166,7 +166,7 @@ fn table(lines: &str) -> Result<String> {
             let most = |f: fn(&Run) -> f64| runs.iter().map(f).fold(f64::NEG_INFINITY, f64::max);
             let lowest = runs.iter().map(|r| r.value).fold(f64::INFINITY, f64::min);
             let highest = most(|r| r.value);
-            // Runs that had used up what a peer is allowed, or broke off.
+            // Runs that reached the limit or failed.
             let stopped = runs.iter().filter(|r| !r.by_itself).count();
             text += &format!(
                 "  {method:<24}{:>5}{:>13.0}{lowest:>11.5}{highest:>11.5}{:>11.3}{:>9.2}{:>9.2}{stopped:>9}\n",

@@ -1,4 +1,4 @@
-//! One step of Table II's model against a C peer, counted in one QEMU run.
+//! Instructions of one step of Table II's model compared with a C implementation, in one QEMU run.
 
 use crate::Task;
 use crate::firmware::{BOARD_TARGET, qemu};
@@ -26,7 +26,7 @@ fn bench_step(_arguments: &[String]) -> Result<()> {
     let folder = firmware_target().join("peer");
     std::fs::create_dir_all(&folder)?;
     let source = root().join("firmware/peer/step.c");
-    // Cargo does not look into what it is told to link: another peer, another name.
+    // Cargo does not track linked objects: a new version gets a new name.
     let mut version = DefaultHasher::new();
     version.write(&std::fs::read(&source)?);
     let (object, linked) = (
@@ -41,7 +41,7 @@ fn bench_step(_arguments: &[String]) -> Result<()> {
     let library = |name: &str| {
         output(command("arm-none-eabi-gcc", &CPU).arg(format!("-print-file-name={name}")))
     };
-    // Only what the step needs of newlib comes along.
+    // Links only the parts of newlib that the step needs.
     run(command("arm-none-eabi-ld", &["-r", "-o"])
         .arg(&linked)
         .arg(&object)

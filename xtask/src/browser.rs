@@ -1,4 +1,4 @@
-//! Report and workbench in a real browser.
+//! Tests of report and workbench in a real browser.
 
 use crate::Task;
 use crate::shell::{cargo, command, exists, program, root, run};
@@ -19,7 +19,7 @@ pub(crate) fn browser(arguments: &[String]) -> Result<()> {
     if !exists("chromium") {
         bail!("chromium is missing; run `cargo xtask setup`");
     }
-    // The checker of accessibility.
+    // The accessibility checker.
     let web = root().join("host-fit/web");
     if !web.join("node_modules/axe-core").is_dir() {
         let mut npm = command(
@@ -29,7 +29,7 @@ pub(crate) fn browser(arguments: &[String]) -> Result<()> {
         npm.current_dir(web);
         run(&mut npm)?;
     }
-    // The tests run the program as it is now.
+    // The tests run the present program.
     program()?;
     let mut tests = cargo(&[
         "test",

@@ -1,5 +1,4 @@
-//! Compares what the processor-in-the-loop run measured with
-//! `firmware/budgets.toml`.
+//! Compares the figures of the processor-in-the-loop run with `firmware/budgets.toml`.
 
 use crate::firmware::{BOARDS, Size, build, size};
 use crate::pil::{Outcome, pil};
@@ -17,20 +16,20 @@ struct Budgets {
     stack_bytes: f64,
     board_flash_bytes: f64,
     instructions_per_step: BTreeMap<String, f64>,
-    /// Of single samples, for some cases.
+    /// Largest count in a single sample, for some cases.
     most_instructions: BTreeMap<String, f64>,
 }
 
-/// The budget of all cases whose names begin so and that have none of their own.
+/// Budget of all cases with this prefix without a budget of their own.
 const EFFECT: &str = "effect_";
 
-/// Runs the processor in the loop and checks what it took.
+/// Runs the processor in the loop and checks its figures.
 pub(crate) fn check() -> Result<()> {
     let path = root().join("firmware/budgets.toml");
     let text = std::fs::read_to_string(&path)
         .with_context(|| format!("could not read {}", path.display()))?;
     let budgets: Budgets = toml::from_str(&text).context("firmware/budgets.toml")?;
-    // Before the other constants of the run take the place of the bundled ones.
+    // Must run before other constants replace the bundled ones.
     let board = size(&build(BOARDS[0], BOARDS[0], &[], None)?)?;
     let outcome = pil(&[])?;
     let exceeded = exceeded(&budgets, &outcome, board);
@@ -76,7 +75,7 @@ fn exceeded(budgets: &Budgets, outcome: &Outcome, board: Size) -> Vec<String> {
             Some(limit) => Some(format!("{name} {found:.0} of {limit:.0}")),
             None => Some(format!("{name} has no budget")),
         });
-    // Without tolerance: what does not fit into its sample does not fit.
+    // Without tolerance: a step must fit into its sample.
     let worst = budgets
         .most_instructions
         .iter()

@@ -1,5 +1,4 @@
-//! Campaigns on rigs that hide something: what the diagnosis finds of effects, and the search of terms that no
-//! catalogue has.
+//! Campaigns on simulated rigs: diagnosis of hidden effects, and search for unknown terms.
 
 use crate::Task;
 use crate::shell::{cargo, output, program, root, run, scenario};
@@ -59,7 +58,7 @@ fn campaign(name: &str, arguments: &[String]) -> anyhow::Result<()> {
     run(scenario(name).args(arguments))
 }
 
-/// The whole campaign, its rows kept: what was stopped goes on, and the page tells of the rows that there are.
+/// The complete campaign with stored results: a stopped one continues, and the page shows the results so far.
 const CALIBRATION: &str = "--draws 4 --altered 17 --nulls 300 --pairs 0 --outside 0 --units 0 --power 3 --jobs 2 \
                            --seed 2026 --rows target/calibration.jsonl --calibration";
 

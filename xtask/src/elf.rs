@@ -10,16 +10,16 @@ pub(crate) struct Section {
     index: SectionIndex,
     /// Bytes.
     pub(crate) size: u64,
-    /// Bytes are in the file, hence in flash.
+    /// Whether its bytes are stored in the file, hence in flash.
     pub(crate) stored: bool,
-    /// In RAM.
+    /// Whether it is in RAM.
     pub(crate) writable: bool,
 }
 
 /// A function or an object with a size.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Symbol {
-    /// As in the file, mangled.
+    /// Name as in the file, mangled.
     pub(crate) name: String,
     address: u64,
     /// Bytes.
@@ -27,7 +27,7 @@ pub(crate) struct Symbol {
     section: SectionIndex,
 }
 
-/// What a program puts into the target's memory.
+/// Contents of a program in the target's memory.
 #[derive(Clone, Debug)]
 pub(crate) struct Elf {
     /// Sections in memory.
@@ -63,7 +63,7 @@ impl Elf {
             if let Some(section) = symbol.section_index().filter(here) {
                 symbols.push(Symbol {
                     name: symbol.name().with_context(place)?.to_owned(),
-                    // The lowest bit says Thumb.
+                    // The lowest bit marks Thumb code.
                     address: symbol.address() & !1,
                     size: symbol.size(),
                     section,

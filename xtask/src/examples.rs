@@ -1,4 +1,4 @@
-//! The recipes of `examples/`, run on exported models: `cargo xtask examples`.
+//! Tests of the recipes in `examples/` with exported models: `cargo xtask examples`.
 
 use crate::Task;
 use crate::shell::{output, program, root, run};
@@ -32,7 +32,7 @@ fn in_folder(folder: &Path) -> Result<()> {
     }
     let record = root().join(SET).join(RECORD).with_extension("csv");
     std::fs::copy(record, folder.join("record.csv"))?;
-    // The law is designed for another model than that of the record.
+    // The law was designed for another model than the record's.
     for (language, file, model) in [
         ("python", "flow.py", MODEL),
         ("matlab", "flow.m", MODEL),
@@ -86,7 +86,7 @@ fn in_folder(folder: &Path) -> Result<()> {
         .split([' ', ','])
         .filter_map(|word| word.parse().ok())
         .collect();
-    // Within a hundredth of y: far below what a law that does not hold leaves.
+    // Within 0.01 of y, far below the error of a failing law.
     let holds = matches!(numbers[..], [mean, reference] if (mean - reference).abs() < 0.01);
     ensure!(holds, "the law in C: {found}");
     println!("C: {found}");

@@ -18,7 +18,7 @@ pub(crate) const TASK: Task = Task {
     run: faults,
 };
 
-/// What is injected into the armed loop, and the reason that must be latched.
+/// Faults injected into the armed loop, with the reason that must be latched.
 const INJECTED: [(&str, &str); 6] = [
     ("1", "not-finite"),
     ("2", "at-rail"),
@@ -27,7 +27,7 @@ const INJECTED: [(&str, &str); 6] = [
     ("5", "overrun"),
     ("6", "watchdog"),
 ];
-/// A restart with damaged constants: what injects it, and what the log says.
+/// Restarts with damaged constants: injection, and expected log message.
 const DAMAGED: [(&str, &str); 2] = [("7", "self-test: Checksum"), ("8", "self-test: Golden")];
 
 pub(crate) fn faults(arguments: &[String]) -> Result<()> {
@@ -63,7 +63,7 @@ pub(crate) fn faults(arguments: &[String]) -> Result<()> {
             let (sender, lines) = channel();
             std::thread::spawn(move || {
                 let lines = BufReader::new(from).lines().map_while(Result::ok);
-                // Telemetry comes unasked; here only answers count.
+                // Telemetry is unsolicited; only answers count here.
                 for line in lines.filter(|line| !line.starts_with("t ")) {
                     if sender.send(line).is_err() {
                         return;
@@ -82,7 +82,7 @@ pub(crate) fn faults(arguments: &[String]) -> Result<()> {
             "--quiet",
             "--package",
             "log-reader",
-            // It runs for a second; the boards' profile would optimise for minutes.
+            // The test runs for a second; full optimisation would take minutes.
             "--config=profile.release.opt-level=0",
             "--config=profile.release.lto=\"off\"",
             "--config=profile.release.codegen-units=16",
@@ -102,25 +102,25 @@ pub(crate) fn faults(arguments: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// Those between host and board only.
+/// Only faults between host and board.
 pub(crate) fn on_the_line(constants: Option<&Path>) -> Result<()> {
     let rig = build("qemu-mps2", "qemu-rig", &[], constants)?;
     run(scenario("line-faults").arg(&rig))
 }
 
 fn dialogue(line: &mut Line) -> Result<()> {
-    // The self-test must have passed: a fault would show instead.
+    // The self-test must have passed, otherwise its fault is shown.
     line.until("status", |answer| answer.starts_with("disarmed"))?;
     for (injection, reason) in INJECTED {
         line.until("arm", |answer| answer.starts_with("armed"))?;
-        // The flow is held. Before that, a stuck sensor is seen by its residual first.
+        // The flow must be held: before that, a stuck sensor shows in the residual first.
         line.until("status", |answer| {
             answer.contains("valve=1") && friction(answer).is_some_and(|y| y > 0.4)
         })?;
         line.send(injection)?;
         let answer = line.until("status", latched(reason))?;
         println!("{injection}: {answer}");
-        // Well again: the fault stays, and arming does not help.
+        // The sensor has recovered: the fault stays latched, and arming is refused.
         line.send("0")?;
         line.until("arm", latched(reason))?;
         line.until("disarm", |answer| answer.starts_with("disarmed"))?;
@@ -129,7 +129,7 @@ fn dialogue(line: &mut Line) -> Result<()> {
         line.send(injection)?;
         let answer = line.until("status", latched("self-test"))?;
         println!("{injection}: {answer}");
-        // Damaged constants stay so: not even the operator clears this one.
+        // Damaged constants persist: the operator cannot clear this fault.
         line.until("disarm", latched("self-test"))?;
         line.until("arm", latched("self-test"))?;
     }
@@ -138,7 +138,7 @@ fn dialogue(line: &mut Line) -> Result<()> {
     Ok(())
 }
 
-/// The friction in a line of status.
+/// The friction in a status line.
 fn friction(answer: &str) -> Option<f32> {
     let y = answer.split(' ').find_map(|word| word.strip_prefix("y="))?;
     y.parse().ok()
@@ -160,8 +160,7 @@ impl Line {
         Ok(self.to.flush()?)
     }
 
-    /// Repeats `command` until the answer is as wanted. A board that restarts
-    /// gives none meanwhile.
+    /// Repeats `command` until the answer matches. A restarting board does not answer meanwhile.
     fn until(&mut self, command: &str, wanted: impl Fn(&str) -> bool) -> Result<String> {
         let until = Instant::now() + Duration::from_secs(30);
         let mut last = String::new();

@@ -18,10 +18,10 @@ pub(crate) const TASK: Task = Task {
 /// Cortex-M4F: both boards.
 pub(crate) const BOARD_TARGET: &str = TARGETS[0];
 
-/// A board with a program of its own name.
+/// Boards, each with a program of the same name.
 pub(crate) const BOARDS: [&str; 3] = ["nucleo-f446re", "qemu-mps2", "qemu-rig"];
 
-/// The package that a board's program is in.
+/// Package of a board's program.
 pub(crate) fn package(board: &str) -> &str {
     if board == "qemu-rig" {
         "qemu-mps2"
@@ -30,7 +30,7 @@ pub(crate) fn package(board: &str) -> &str {
     }
 }
 
-/// What to build, as the command line says.
+/// Options of a firmware build.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Chosen {
     /// The board.
@@ -65,7 +65,7 @@ impl Chosen {
         Ok(chosen)
     }
 
-    /// The board's own program, with the model that was chosen.
+    /// The board's own program with the chosen model.
     pub(crate) fn build(&self, board: &str) -> Result<PathBuf> {
         let (model, rig) = (self.model.as_deref(), self.rig.as_deref());
         let Some(named) = model.or(rig) else {
@@ -78,7 +78,7 @@ impl Chosen {
                 named.display()
             )
         })?;
-        // The next build of the bundled model must not take its place.
+        // A separate name, so that a build of the bundled model does not overwrite it.
         let stem = named.file_stem().unwrap_or_default().to_string_lossy();
         let own = firmware_target().join(format!("{board}-{stem}"));
         std::fs::copy(&elf, &own).with_context(|| own.display().to_string())?;
@@ -98,8 +98,8 @@ pub(crate) fn firmware(arguments: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// Builds program `bin` of package `board`; a panic in it would not link. The
-/// folder `constants` takes the place of the bundled ones.
+/// Builds program `bin` of package `board`; a panic in it would not link. The folder `constants` replaces the
+/// bundled ones.
 pub(crate) fn build(
     board: &str,
     bin: &str,
@@ -137,8 +137,8 @@ pub(crate) fn libraries(target: &str) -> Result<()> {
     libraries(&["--features", "defmt"])
 }
 
-/// QEMU with the program, its serial line on standard input and output. Time
-/// goes by instructions, as fast as the host can.
+/// QEMU with the program, its serial line on standard input and output. Time is counted in instructions and
+/// runs at full speed.
 pub(crate) fn qemu(elf: &Path) -> Command {
     let mut qemu = command(
         "qemu-system-arm",
@@ -151,7 +151,7 @@ pub(crate) fn qemu(elf: &Path) -> Command {
     qemu
 }
 
-/// What a program takes.
+/// Memory of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Size {
     /// Code, constants and initial values, bytes.

@@ -1,4 +1,4 @@
-//! The recipe that makes FMUs, tried: `cargo xtask fmu` by FMPy, CI's step `examples` by calling the library.
+//! Tests of the FMU recipe: `cargo xtask fmu` with FMPy, CI's step `examples` by calling the library.
 
 use crate::Task;
 use crate::shell::{command, output, program, root, run, target};
@@ -13,7 +13,7 @@ pub(crate) const TASK: Task = Task {
 
 const FMPY: &str = "fmpy==0.3.32";
 
-/// Models, the columns of a record for each, and its commands of no jet and of a full one.
+/// Models, each with the columns of a record and its commands for no jet and a full jet.
 const CASES: [(&str, &str, [u8; 2]); 3] = [
     ("data/paper/table-2-state-dependent.toml", "t,u", [0, 1]),
     (

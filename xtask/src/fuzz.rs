@@ -1,4 +1,4 @@
-//! Mutated input for everything that reads what others wrote.
+//! Fuzzing of every reader of untrusted input.
 
 use anyhow::Result;
 
@@ -11,7 +11,7 @@ pub(crate) const TASK: Task = Task {
     run: |arguments| run(scenario("fuzz").args(arguments)),
 };
 
-/// A while for each target: what breaks at once is seen.
+/// A short run of each target.
 pub(crate) fn brief() -> Result<()> {
     run(scenario("fuzz").args(["--minutes", "3"]))
 }

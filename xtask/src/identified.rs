@@ -1,5 +1,5 @@
-//! The generated constants in `firmware/identified`, whether they are fresh, and
-//! those of a user's model for one build.
+//! The generated constants in `firmware/identified`: freshness check, and constants of a user's model for one
+//! build.
 
 use crate::Task;
 use crate::shell::{firmware_target, program, root, run};
@@ -63,11 +63,11 @@ pub(crate) fn identified(arguments: &[String]) -> Result<()> {
 /// refused. Without a model the bundled one counts.
 pub(crate) fn of(model: Option<&Path>, rig: Option<&Path>) -> Result<PathBuf> {
     let bundled = root().join("firmware/identified/models/full.toml");
-    // As the user typed it: relative to where the task was called.
+    // Relative paths refer to the folder where the task was called.
     let model = model.map_or(Ok(bundled), std::path::absolute)?;
     let rig = rig.map(std::path::absolute).transpose()?;
     let folder = firmware_target().join("identified");
-    // Another rig's constants must not stay.
+    // Constants of another rig must not remain.
     if folder.exists() {
         std::fs::remove_dir_all(&folder)?;
     }

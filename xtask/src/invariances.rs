@@ -1,4 +1,4 @@
-//! What must not change the answer of the program: `cargo xtask invariances`.
+//! Invariances of the program's answer: `cargo xtask invariances`.
 
 use crate::Task;
 use crate::shell::{cargo, run, scenario};

@@ -1,4 +1,4 @@
-//! The project's chores; `cargo xtask help` lists them.
+//! Tasks of developers and CI; `cargo xtask help` lists them.
 
 mod agreement;
 mod bench_law;
@@ -34,7 +34,7 @@ mod supply;
 
 use std::process::ExitCode;
 
-/// A subcommand; each has a file of its own, but for the campaigns, which are run alike.
+/// A subcommand; each has its own file, except campaigns.
 struct Task {
     name: &'static str,
     does: &'static str,

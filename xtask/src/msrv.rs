@@ -38,7 +38,7 @@ pub(crate) fn msrv() -> Result<()> {
         ],
     ))?;
     let check = ["run", version, "cargo", "check", "--release", "--workspace"];
-    // Of another compiler nothing can be shared.
+    // Build products of another compiler cannot be shared.
     run(command("rustup", &check)
         .env_remove("RUSTC")
         .env_remove("CARGO")

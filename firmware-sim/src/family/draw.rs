@@ -16,7 +16,7 @@ use crate::plant::{
 use crate::recording::RigError;
 use crate::stream::{Stream, stream};
 
-/// Draws of an effect before the heaviest so far is taken.
+/// Number of draws of an effect before the heaviest so far is used.
 const ATTEMPTS: usize = 12;
 
 /// An effect as it is drawn: of the catalogue, altered, or beyond the catalogue.
@@ -50,7 +50,7 @@ impl Drawn {
             })
     }
 
-    /// Name, what it resembles, and where it acts.
+    /// Name, similar effect of the catalogue, and place.
     fn identity(&self) -> (&'static str, &'static str, Place) {
         match self {
             Self::Effect(e) => (e.name(), e.resembles(), e.place()),
@@ -69,7 +69,7 @@ impl Drawn {
 }
 
 impl RigPlan {
-    /// Whether these can be hidden in one rig.
+    /// Checks that these effects can be hidden together in one rig.
     ///
     /// # Errors
     /// [`RigError`] for unknown names and for effects that exclude each other.
@@ -79,7 +79,7 @@ impl RigPlan {
         Self::kinds(&names).map(|_| ())
     }
 
-    /// The effects with any parameters.
+    /// The effects with arbitrary parameters.
     fn kinds(names: &[&str]) -> Result<Vec<Drawn>, RigError> {
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let base = BasePlant::draw(&mut rng);
@@ -97,19 +97,19 @@ impl RigPlan {
         Ok(kinds)
     }
 
-    /// Draws the named effects and puts them into the plant. What the lightest of them weighs: at least 1 if
-    /// all of them matter; infinite without any.
+    /// Draws the named effects and adds them to the plant. Returns the smallest weight: at least 1 if all of
+    /// them are detectable; infinite without any.
     pub(super) fn hide(&mut self, names: &[&str]) -> Result<f64, RigError> {
         let mut rng = stream(self.seed, Stream::Effects);
         let faulty = |name: &&str| Fault::NAMES.contains(name);
         let (faults, names): (Vec<&str>, Vec<&str>) = names.iter().copied().partition(faulty);
         let draw = |name: &str| Fault::draw(name, &mut rng);
         self.plant.faults = faults.into_iter().filter_map(draw).collect();
-        // The same kinds with any parameters: they decide about the rest of the rig.
+        // The same kinds with arbitrary parameters: only the kinds determine the rest of the rig.
         let mut kinds = self.plant.clone();
         for kind in Self::kinds(&names)? {
             if kind.identity().2 == Place::Transport {
-                // The hidden law is all there is.
+                // The hidden law replaces the delay of the base.
                 self.plant.base = self.plant.base.with_fixed_delay(&mut rng);
             }
             kind.add_to(&mut kinds);
@@ -122,10 +122,10 @@ impl RigPlan {
         let wanders = channels.any(|channel| channel.is_some());
         self.free_stream = wanders || rng.random_bool(0.2);
 
-        // What depends on the time or breaks late shows in the whole record only.
+        // Effects that depend on time or start late are visible only in the whole record.
         let late = !kinds.beyond.is_empty();
         let bare = self.plant.clone();
-        // Effects are drawn for the friction that the flow reaches, not for what drives it.
+        // Effects are drawn for the friction that the flow reaches, not for its drive.
         let reached = BasePlant {
             gain: bare.base.gain / bare.character.overshoot(),
             ..bare.base
@@ -269,7 +269,7 @@ impl Family {
     }
 }
 
-/// Two of five memories are not exactly in the bilinear class: smeared or bounded.
+/// Two of five memories are outside the bilinear class: smeared or bounded.
 fn with_form(term: PastTerm, level: f64, rng: &mut ChaCha8Rng) -> PastTerm {
     match rng.random_range(0..5) {
         0 => PastTerm {
@@ -341,7 +341,7 @@ pub(super) fn squares(rng: &mut ChaCha8Rng) -> Vec<(f64, f64)> {
     all
 }
 
-/// A random telegraph with its own duty and pace.
+/// A random on/off command with an individual duty and pace.
 pub(super) fn telegraph(name: &str, rng: &mut ChaCha8Rng) -> Command {
     let [on, off] = [(); 2].map(|()| rng.random_range(200..=600));
     Command::telegraph(name, on, off, rng)

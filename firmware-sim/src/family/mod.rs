@@ -1,5 +1,5 @@
-//! Rigs of every family: flows wider than the model's class, with effects in the catalogue's laws and in
-//! others, noise that is not only white, and nuisances that are no effect at all.
+//! Simulated rigs of all families: flows beyond the model class, effects with the catalogue's laws and with
+//! others, non-white noise, and nuisances that are not effects.
 //!
 //! A [`RigPlan`] is drawn from a seed and determines its data set bit for bit.
 
@@ -20,18 +20,18 @@ use crate::stream::{Stream, stream};
 pub use crate::nuisance::{Nuisance, Nuisances};
 pub use crate::recording::Units;
 
-/// The kind of flow.
+/// Family of flows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Family {
-    /// One time constant each way: the leanest bilinear model is the truth.
+    /// One time constant per direction: the lowest-order bilinear model is exact.
     FirstOrder,
-    /// The flow feels one moment of its own past.
+    /// The flow depends on its own past at one lag.
     Memory1,
-    /// The flow feels two moments of its own past.
+    /// The flow depends on its own past at two lags.
     Memory2,
-    /// The flow is heavy, or a second lag follows the first.
+    /// Second order: inertia, or a second lag in series.
     Inertia,
-    /// A slow wake pulls back.
+    /// A slow wake reduces the level.
     Wake,
     /// The separation rate depends on the friction.
     RateOfY,
@@ -66,20 +66,20 @@ impl Family {
     }
 }
 
-/// What the repeats are disturbed by.
+/// Kind of noise in the repeats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum NoiseKind {
     /// White only.
     White,
     /// White and first-order coloured, 10–40 ms.
     Coloured,
-    /// With a slow component of 0.5–2 s.
+    /// With an additional slow component of 0.5–2 s.
     Wander,
     /// The level scatters between repeats by a few per cent.
     Scatter,
     /// White noise with the tails of Student's t.
     HeavyTails,
-    /// Now and then a reading is far off.
+    /// Occasional readings far off.
     Outliers,
 }
 
@@ -112,31 +112,30 @@ impl NoiseKind {
     }
 }
 
-/// Flows that are drawn before the one on which the effects weigh most is taken.
+/// Number of flows that are drawn; the one with the heaviest effects is used.
 const FLOWS: usize = 5;
 
-/// Repeats that are averaged at most where twenty do not show what is hidden.
+/// Largest number of averaged repeats, if twenty do not show the hidden effect.
 const MOST_REPEATS: usize = 100;
 
-/// Everything that determines a data set, bit for bit.
+/// Specification of a data set; determines it bit for bit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RigPlan {
-    /// The kind of flow.
+    /// Family of the flow.
     pub family: Family,
-    /// The rig with what it hides.
+    /// The rig with its hidden effects.
     pub plant: PlantSpec,
-    /// What the repeats are disturbed by.
+    /// Kind of noise in the repeats.
     pub noise: NoiseKind,
-    /// How it is measured.
+    /// The instruments.
     pub instrument: Instrument,
-    /// What is neither flow nor effect nor noise.
+    /// Nuisances: deviations that are neither flow nor effect nor noise.
     pub nuisances: Nuisances,
-    /// Whether the free stream wanders and is recorded as the channel `u_inf`.
+    /// Whether the free stream varies and is recorded as the channel `u_inf`.
     pub free_stream: bool,
-    /// In which units it is written down.
+    /// Units of the recorded data.
     pub units: Units,
-    /// How much the lightest of what it hides matters; below 1 nobody can be asked to find it. Infinite
-    /// where nothing is hidden that could be weighed.
+    /// Weight of the lightest hidden effect; below 1 it is not detectable. Infinite if nothing was weighed.
     pub weight: f64,
     /// Seed of commands, free stream and noise.
     pub seed: u64,
@@ -195,40 +194,39 @@ impl RigPlan {
         Ok(heaviest)
     }
 
-    /// Averages more repeats where too few show what is hidden.
+    /// Averages more repeats if too few show the hidden effect.
     fn repeat_more(&mut self) {
         let before = self.instrument.repeats as f64;
         if self.weight < 1.0 {
             let needed = (before / (self.weight * self.weight)).ceil();
-            // Of what weighs nothing, infinitely many.
+            // Weight 0 would need infinitely many repeats.
             self.instrument.repeats = needed.min(MOST_REPEATS as f64) as usize;
             self.weight *= (self.instrument.repeats as f64 / before).sqrt();
         }
     }
 
-    /// The same rig written down in other units.
+    /// The same rig recorded in other units.
     #[must_use]
     pub fn in_units(mut self, units: Units) -> Self {
         self.units = units;
         self
     }
 
-    /// The names that a diagnosis should find: effects of the catalogue, also where the rig has them in
-    /// another law.
+    /// The names that a diagnosis should find: hidden effects of the catalogue, also with another law.
     pub fn hidden(&self) -> Vec<&'static str> {
         let effects = self.plant.effects.iter().map(Effect::name);
         let altered = self.plant.altered.iter().map(|e| e.resembles());
         effects.chain(altered).collect()
     }
 
-    /// Names that would be no error beside the hidden ones: true of the rig, though nobody hid them.
+    /// Further correct names: properties of the rig that were not hidden on purpose.
     pub fn also_right(&self) -> Vec<&'static str> {
         let delay = self.plant.delay().effect();
         delay.into_iter().chain(self.nuisances.effect()).collect()
     }
 
-    /// Effects of the catalogue with their true parameters, in the rig's own units; those in other laws
-    /// have no true parameters.
+    /// Hidden effects of the catalogue with their true parameters, in the rig's own units; effects with other
+    /// laws have none.
     pub fn exact(&self) -> Vec<(&'static str, Vec<Parameter>)> {
         let effects = self.plant.effects.iter();
         effects.map(|e| (e.name(), e.parameters())).collect()
@@ -269,7 +267,7 @@ impl RigPlan {
         session.record(self.commands())
     }
 
-    /// The answer as TOML text for people and scoring scripts.
+    /// The true effects as TOML text for users and scoring scripts.
     pub fn answer(&self) -> String {
         let list = |names: Vec<&str>| {
             let quoted: Vec<String> = names.iter().map(|n| format!("\"{n}\"")).collect();
@@ -331,7 +329,7 @@ mod tests {
                 let floor = (sd.iter().map(|s| s * s).sum::<f64>() / 1e4).sqrt();
                 let off = record.y.iter().zip(truth).map(|(a, b)| (a - b) * (a - b));
                 let ratio = (off.sum::<f64>() / 1e4).sqrt() / floor;
-                // Slow parts and scatter have few independent samples in a record.
+                // Slow components and level scatter have few independent samples per record.
                 assert!((0.6..1.6).contains(&ratio), "{noise:?}: {ratio}");
             }
         }
@@ -362,7 +360,7 @@ mod tests {
         }
     }
 
-    /// An echo of the other sign drives the flow below rest, one of the same above full strength.
+    /// An echo of opposite sign drives the flow below rest, one of equal sign above full strength.
     #[test]
     fn no_flow_runs_away() {
         let draw =

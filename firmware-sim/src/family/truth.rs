@@ -1,4 +1,4 @@
-//! What a search for unknown terms should find in a rig, and what would be no error beside it.
+//! Truth of a rig for the search for unknown terms: the terms to find, and further correct ones.
 
 use super::RigPlan;
 use crate::plant::{Beyond, Character, FlowDelay, Port, Truth};
@@ -9,12 +9,12 @@ impl RigPlan {
         self.plant.beyond.iter().map(Beyond::truth).collect()
     }
 
-    /// Terms that are true of the rig though nobody hid them: of its flow, its delay and its nuisances, as far
-    /// as they are not of the bilinear class.
+    /// Further terms that are true of the rig: properties of its flow, delay and nuisances outside the
+    /// bilinear class.
     pub fn also_true(&self) -> Vec<Truth> {
         let delay = match self.plant.delay() {
             FlowDelay::Fixed { .. } => None,
-            // Of the mean friction over a while, which other means of the past resemble.
+            // A delay law depends on a mean of the friction, which other means of the past resemble.
             FlowDelay::StateDependent { .. } | FlowDelay::Clamped { .. } => Some(Truth::new(
                 Port::Delay,
                 &["mean y", "memory of y", "past y", "y"],
@@ -31,7 +31,7 @@ impl RigPlan {
             Character::RateOfFriction { .. } => Some(&["y"][..]),
         };
         let flow = flow.map(|coordinates| Truth::new(Port::Flow, coordinates));
-        // What of the past is lost where the jet arrives is a factor of the jet.
+        // A memory that is lost under the jet acts as a factor on the jet.
         let jet = match &self.plant.character {
             Character::Memory(terms) if terms.iter().any(|term| term.lost != 0.0) => {
                 Some(Truth::new(Port::Jet, &["past y"]))
@@ -75,7 +75,7 @@ mod tests {
         assert!(!has(Port::Jet, "pulse number"));
     }
 
-    /// On every family, by the weight that effects of the catalogue need as well.
+    /// On every family, with the same weight as effects of the catalogue.
     #[test]
     fn every_physics_beyond_the_catalogue_matters_in_some_rig() {
         for (seed, name) in (0..).zip(Beyond::NAMES) {

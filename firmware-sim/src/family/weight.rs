@@ -1,49 +1,50 @@
-//! Whether an effect matters: what no change of the flow imitates, against the noise.
+//! Detectability of an effect: its change of the readings that no change of the flow imitates, relative to
+//! the noise.
 
 use std::ops::RangeInclusive;
 
 use crate::plant::{BasePlant, FreeStream, PlantError, PlantSpec, Rig, SAMPLE_PERIOD_S};
 
-/// An effect should change the readings by this many standard errors …
+/// Required change of the readings, in standard errors.
 const TOTAL: f64 = 4.0;
 
-/// … by this many, after the flow's constants have done what they can: the leanest base is then left at
-/// √(1 + 1.2²) = 1.56 times the noise floor …
+/// Required change after refitting the flow's constants: the lowest-order base then has an error of √(1 +
+/// 1.2²) = 1.56 × the noise level.
 const OWN: f64 = 1.2;
 
-/// … and by this many, after the flow has been given a memory of any length too: without the effect, the
-/// best base is then left at √(1 + 0.6²) = 1.17 times the noise floor.
+/// Required change after adding a memory of any length as well: the best base without the effect then has √(1
+/// + 0.6²) = 1.17 × the noise level.
 const BEYOND_MEMORY: f64 = 0.6;
 
-/// Where readings have to stay (y), with room for noise inside the converter's −1 … 3: a rig with an effect that
-/// drives it out of there is not taken.
+/// Allowed range of readings (y), with a margin for noise inside the converter's −1 … 3: rigs outside are
+/// rejected.
 const POSSIBLE: RangeInclusive<f64> = -0.8..=2.8;
 
-/// How far the flow's constants are moved to see what they do, relative.
+/// Relative step of the flow's constants for their sensitivities.
 const STEP: f64 = 0.02;
 
-/// The memories that the flow is given, alone and times the jet: every 40 ms up to 0.48 s.
+/// Number of memories, alone and times the jet: every 40 ms up to 0.48 s.
 const MEMORIES: usize = 12;
 const BETWEEN_MEMORIES: usize = 40;
 
-/// Mean friction at which the delay is taken to place the memories (y).
+/// Mean friction at which the delay is evaluated to place the memories (y).
 const MIDDLE: f64 = 0.5;
 
-/// Weighs effects of one rig on one command.
+/// Weights of effects on one rig and command.
 pub(super) struct Weight {
     levels: Vec<f64>,
     stream: Option<FreeStream>,
     standard_error: f64,
     /// The readings without the effect.
     before: Vec<f64>,
-    /// What the zero and the flow's constants can do; orthogonal.
+    /// Sensitivities of the offset and of the flow's constants; orthogonal.
     constants: Vec<Vec<f64>>,
-    /// What memories can do beyond that; orthogonal.
+    /// Sensitivities of memories, orthogonal to these and each other.
     memories: Vec<Vec<f64>>,
 }
 
 impl Weight {
-    /// Samples that are enough for effects of the catalogue.
+    /// Samples used for effects of the catalogue.
     pub(super) const SAMPLES: usize = 5000;
 
     /// For effects that are added to `bare`.
@@ -71,7 +72,7 @@ impl Weight {
         }
         let constants = all.len();
         all.extend(weight.memories_of(&bare.base));
-        // Gram–Schmidt, twice as is enough.
+        // Gram–Schmidt, repeated once.
         for i in 0..all.len() {
             let (done, rest) = all.split_at_mut(i);
             for _ in 0..2 {
@@ -83,7 +84,7 @@ impl Weight {
         Ok(weight)
     }
 
-    /// At least 1 if what `with` has more than the bare plant matters.
+    /// Weight of the difference between `with` and the bare plant; at least 1 if it is detectable.
     pub(super) fn of(&self, with: &PlantSpec) -> Result<f64, PlantError> {
         let mut change = self.change(with)?;
         let mut readings = change.iter().zip(&self.before).map(|(d, y)| d + y);
@@ -99,14 +100,14 @@ impl Weight {
         Ok(least / self.standard_error)
     }
 
-    /// What a plant reads beyond the bare one.
+    /// Readings of a plant minus those of the bare one.
     fn change(&self, plant: &PlantSpec) -> Result<Vec<f64>, PlantError> {
         let mut run = Rig::new(plant, self.stream.clone())?.play(&self.levels);
         run.iter_mut().zip(&self.before).for_each(|(y, b)| *y -= b);
         Ok(run)
     }
 
-    /// What a little memory of each length adds, alone and times the jet: it drives the flow as the jet does.
+    /// Change by a small memory of each length, alone and times the jet; it drives the flow like the jet.
     fn memories_of(&self, base: &BasePlant) -> Vec<Vec<f64>> {
         let delay = (base.delay.at(MIDDLE) / SAMPLE_PERIOD_S).round() as usize;
         let past = |x: &[f64], k: usize, lag: usize| k.checked_sub(lag).map_or(0.0, |k| x[k]);
@@ -131,7 +132,7 @@ impl Weight {
     }
 }
 
-/// The flow with each of its constants a little larger.
+/// The flow with each of its constants slightly increased.
 fn moved(base: &BasePlant) -> Vec<BasePlant> {
     let more = 1.0 + STEP;
     vec![
@@ -158,7 +159,7 @@ fn rms(x: &[f64]) -> f64 {
     (x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64).sqrt()
 }
 
-/// Takes what lies along the orthogonal `directions` out of `x`.
+/// Projects `x` orthogonal to `directions`.
 fn take_away(directions: &[Vec<f64>], x: &mut [f64]) {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(p, q)| p * q).sum::<f64>();
     for direction in directions {
@@ -186,7 +187,7 @@ mod tests {
         let bare = PlantSpec::new(BasePlant::draw(&mut rng), &[]);
         let levels = &command.levels[..Weight::SAMPLES];
         let weight = Weight::new(&bare, levels, None, 0.01).unwrap();
-        // A gain of half as much again is loud, and a change of the constants.
+        // A gain increased by a half is a large change, but only of the constants.
         let mut louder = bare.clone();
         louder.base.gain *= 1.5;
         assert!(weight.of(&louder).unwrap() < 0.05);
@@ -196,11 +197,11 @@ mod tests {
             ..bare.clone()
         };
         assert!(weight.of(&with).unwrap() > 1.0);
-        // What runs away is none.
+        // A diverging plant has no weight.
         let mut away = bare.clone();
         away.base.gain *= 4.0;
         assert_eq!(weight.of(&away).unwrap(), 0.0);
-        // A memory that changes the readings by several standard errors is no effect.
+        // A memory that changes the readings by several standard errors counts as a flow, not as an effect.
         let with = PlantSpec {
             character: Character::Memory(vec![PastTerm::new(0.2, -0.06, 0.1)]),
             ..bare.clone()

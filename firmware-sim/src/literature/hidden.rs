@@ -1,7 +1,7 @@
-//! Physics of the rig that can be hidden in front of and behind a published flow.
+//! Hidden effects in front of and behind a published flow.
 //!
-//! Their equations are those of the catalogue's cards, in continuous time and written anew. Sizes are drawn so
-//! that each changes the reading by several times the noise.
+//! Their equations are those of the catalogue's cards, implemented independently in continuous time. Sizes
+//! are drawn so that each changes the reading by several times the noise.
 
 use super::STEP_S;
 use rand::RngExt;
@@ -95,13 +95,13 @@ const KINDS: [(Kind, &str, &[Range]); 10] = [
 ];
 
 impl Hidden {
-    /// Names of all that can be hidden.
+    /// Names of all effects that can be hidden.
     #[must_use]
     pub fn names() -> [&'static str; KINDS.len()] {
         KINDS.map(|(_, name, _)| name)
     }
 
-    /// The effect of that name with parameters drawn; `None` for an unknown name.
+    /// The effect of that name with random parameters; `None` for an unknown name.
     #[must_use]
     pub fn draw(name: &str, rng: &mut ChaCha8Rng) -> Option<Self> {
         let (kind, name, ranges) = KINDS.into_iter().find(|(_, own, _)| *own == name)?;
@@ -123,7 +123,7 @@ impl Hidden {
         })
     }
 
-    /// The same at the beginning of a record.
+    /// The same effect in its initial state.
     #[must_use]
     pub fn at_rest(&self) -> Self {
         let mut rested = self.clone();
@@ -141,7 +141,7 @@ impl Hidden {
         self.parameters.get(index).map_or(0.0, |(_, value)| *value)
     }
 
-    /// The jet strength behind the effect after a step with `jet` in front of it.
+    /// Jet strength after the effect, for `jet` before it; advances one step.
     pub fn jet(&mut self, jet: f64) -> f64 {
         let (one, two) = (self.parameter(0), self.parameter(1));
         match self.kind {
@@ -173,7 +173,8 @@ impl Hidden {
         }
     }
 
-    /// The signal behind the effect after a step: `command` is the level at the valve, `time_s` that in the record.
+    /// Reading after the effect; advances one step. `command` is the level at the valve, `time_s` the time in
+    /// the record.
     pub fn reading(&mut self, reading: f64, command: f64, time_s: f64) -> f64 {
         let (one, two) = (self.parameter(0), self.parameter(1));
         match self.kind {
@@ -205,7 +206,7 @@ mod tests {
             let (mut changed, mut plain, mut flow) = (0.0_f64, 0.0, 0.0);
             for k in 0..50_000 {
                 let u = f64::from(u8::from(k / 2000 % 2 == 1));
-                // A flow that follows in 20 ms, without the effect and with it.
+                // A flow with a time constant of 20 ms, without and with the effect.
                 plain += STEP_S / 0.02 * (u - plain);
                 flow += STEP_S / 0.02 * (hidden.jet(u) - flow);
                 let y = hidden.reading(flow, u, f64::from(k) * STEP_S);

@@ -1,14 +1,4 @@
-//! A global mode that shifts the mean flow by its own Reynolds stress; jets take growth from it.
-//!
-//! B. R. Noack, K. Afanasiev, M. Morzyński, G. Tadmor and F. Thiele, A hierarchy of low-dimensional models for the
-//! transient and post-transient cylinder wake, Journal of Fluid Mechanics 497 (2003), 335–363:
-//!
-//! u̇ = μ·u − v − u·w,  v̇ = μ·v + u − v·w,  ẇ = −w + u² + v²
-//!
-//! in units of the mode's 1/ω. The reading is the shift of the mean, w.
-//!
-//! From the publication: the equations; the limit cycle has the amplitude √μ and the shift w = μ. Ours: μ of
-//! 0.10–0.16 without jets, jets of full strength take half to two thirds of it after a delay, ω = 2π·14–20 Hz.
+//! A global mode that shifts the mean flow by its own Reynolds stress; jets reduce its growth rate.
 
 use super::{Flow, Published, STEP_S};
 use rand::RngExt;

@@ -35,20 +35,20 @@ pub const STEP_S: f64 = 1e-4;
 pub trait Flow {
     /// One step of [`STEP_S`] under jets of strength `jet` (0 closed, 1 open).
     fn step(&mut self, jet: f64);
-    /// The reading now: 0 without jets, 1 under steady jets.
+    /// Present reading: 0 without jets, 1 under steady jets.
     fn reading(&self) -> f64;
-    /// The coefficients that were drawn, by name and in SI units.
+    /// The random coefficients, by name and in SI units.
     fn coefficients(&self) -> Vec<(&'static str, f64)>;
 }
 
-/// A published model: its name and what is known of it.
+/// A published model with its reference.
 #[derive(Clone, Copy, Debug)]
 pub struct Published {
     /// Name on the command line and in tables.
     pub name: &'static str,
     /// Where it was published.
     pub reference: &'static str,
-    /// Effects of the catalogue that are part of its physics: no wrong names.
+    /// Effects of the catalogue that are part of its physics and therefore count as correct.
     pub also_right: &'static [&'static str],
     draw: fn(&mut ChaCha8Rng) -> Box<dyn Flow>,
 }
@@ -70,7 +70,7 @@ impl Published {
         PUBLISHED.into_iter().find(|model| model.name == name)
     }
 
-    /// The model at rest, its free coefficients drawn.
+    /// The model at rest with random free coefficients.
     #[must_use]
     pub fn draw(&self, rng: &mut ChaCha8Rng) -> Box<dyn Flow> {
         (self.draw)(rng)

@@ -42,7 +42,7 @@ pub struct ReattachingBubble {
     length: f64,
 }
 
-/// Friction at the film with the reattachment at `length`.
+/// Friction at the film for a reattachment length `length`.
 fn friction(length: f64) -> f64 {
     ((FILM - length) / WIDTH).tanh()
 }
@@ -97,7 +97,7 @@ impl Flow for ReattachingBubble {
 mod tests {
     use super::*;
 
-    /// Weak forcing at f·x_R/U = 0.12 is followed at 1/√2 of the static amplitude and 45° late.
+    /// Weak forcing at f·x_R/U = 0.12 gives 1/√2 of the static amplitude with a phase lag of 45°.
     #[test]
     fn the_bubble_follows_slow_forcing_up_to_the_published_strouhal_number() {
         let (passage, weak) = (0.06, 1e-3);

@@ -14,9 +14,9 @@ use thiserror::Error;
 /// Sampling period of the records (s).
 const SAMPLE_S: f64 = 1e-3;
 const STEPS_A_SAMPLE: usize = 10;
-/// Standard deviation of the zero from one day to the next (y).
+/// Standard deviation of the offset between days (y).
 const ZERO_OF_A_DAY: f64 = 0.01;
-/// Records of the first day; the others are of the second.
+/// Number of records of the first day; the others are of the second.
 const FIRST_DAY: usize = 4;
 
 /// No published flow or hidden effect of that name.
@@ -27,14 +27,15 @@ pub struct UnknownName {
     names: Vec<&'static str>,
 }
 
-/// Everything that determines a data set of a published flow, bit for bit.
+/// Specification of a data set of a published flow; determines it bit for bit.
 #[derive(Clone, Debug)]
 pub struct LiteraturePlan {
     /// The published model.
     pub model: Published,
-    /// What is hidden, from the jet to the sensor.
+    /// Hidden effects, from the jet to the sensor.
     pub hidden: Vec<Hidden>,
-    /// A 12-bit converter, a valve with a dead time, another zero each day. Without: white noise alone.
+    /// Whether there is a 12-bit converter, a valve dead time and a new offset each day; otherwise white
+    /// noise only.
     pub real_instruments: bool,
     /// Seed of coefficients, commands and noise.
     pub seed: u64,
@@ -42,7 +43,7 @@ pub struct LiteraturePlan {
     zeros: [f64; 2],
 }
 
-/// What random numbers are for; new uses go to the end.
+/// Random streams by purpose; new purposes are appended.
 #[derive(Clone, Copy)]
 enum Draws {
     Flow,
@@ -53,7 +54,7 @@ enum Draws {
 }
 
 impl LiteraturePlan {
-    /// The model `name` on a rig that hides `effects`.
+    /// The model `name` on a rig with hidden `effects`.
     ///
     /// # Errors
     /// [`UnknownName`] of a model or an effect.
@@ -99,7 +100,7 @@ impl LiteraturePlan {
         self.model.draw(&mut draws(self.seed, Draws::Flow))
     }
 
-    /// Names of what is hidden.
+    /// Names of the hidden effects.
     #[must_use]
     pub fn names(&self) -> Vec<&'static str> {
         self.hidden.iter().map(|hidden| hidden.name).collect()
@@ -121,7 +122,7 @@ impl LiteraturePlan {
         ]
     }
 
-    /// The readings without noise under a command.
+    /// Noise-free readings under a command.
     fn play(&self, levels: &[f64]) -> Vec<f64> {
         let mut flow = self.flow();
         let mut hidden: Vec<Hidden> = self.hidden.iter().map(Hidden::at_rest).collect();
@@ -190,7 +191,7 @@ impl LiteraturePlan {
         })
     }
 
-    /// The answer as TOML text; kept out of the data set.
+    /// The true effects as TOML text; not part of the data set.
     #[must_use]
     pub fn answer(&self) -> String {
         let list = |names: &[&str]| {
@@ -265,7 +266,7 @@ mod tests {
         let (ideal, real) = (clean(&draw(&[], false)), clean(&draw(&[], true)));
         assert_eq!(ideal[0][0], 0.0);
         assert_ne!(real[0][0], 0.0);
-        // Another zero the next day.
+        // The offset differs on the second day.
         assert!(real[0][0] == real[3][0] && real[4][0] != real[3][0]);
         let drifting = clean(&draw(&["thermal-drift"], false));
         assert!(drifting[0][9_000] > ideal[0][9_000] + 0.05);

@@ -31,7 +31,7 @@ const KEPT: f64 = 0.8;
 #[derive(Clone, Debug)]
 struct Line {
     impedance: f64,
-    /// Waves on their way to the reservoir and back.
+    /// Waves travelling to the reservoir and back.
     travelling: VecDeque<f64>,
     pressure: f64,
 }
@@ -47,7 +47,7 @@ impl Line {
     }
 
     fn step(&mut self, flow: f64) {
-        // A reservoir returns a wave with the other sign.
+        // A reservoir reflects a wave with opposite sign.
         let coming = -KEPT * self.travelling.pop_front().unwrap_or(0.0);
         self.pressure = 2.0 * coming - self.impedance * flow;
         self.travelling.push_back(coming - self.impedance * flow);
@@ -120,7 +120,7 @@ impl Flow for SuppliedValve {
         self.chamber += STEP_S / time * (target - self.chamber);
         self.delayed.push_back(self.chamber.max(0.0).sqrt());
         let j = self.delayed.pop_front().unwrap_or(0.0);
-        // Attaching as far as the jets hold it, separating otherwise.
+        // Attaching in proportion to the jet, separating otherwise.
         let time = self.separating_s + (self.attaching_s - self.separating_s) * j.min(1.0);
         self.friction += STEP_S / time * (j - self.friction);
     }
@@ -144,10 +144,10 @@ impl Flow for SuppliedValve {
 }
 
 impl SuppliedValve {
-    /// Jet strength in steady blowing: p = 1 − Z_eff·√p with what the damped line keeps of its impedance.
+    /// Jet strength in steady blowing: p = 1 − Z_eff·√p with the impedance of the damped line.
     fn steady(&self) -> f64 {
         let z = self.line.impedance * (1.0 - KEPT) / (1.0 + KEPT);
-        // √p solves √p² + z·√p − 1 = 0.
+        // √p is the root of √p² + z·√p − 1 = 0.
         (z * z / 4.0 + 1.0).sqrt() - z / 2.0
     }
 }

@@ -1,18 +1,4 @@
-//! Vorticity that is carried over the ramp, spread by turbulence and partly returned by the backflow.
-//!
-//! Transport equation of the mean vorticity with a constant turbulent diffusivity (G. K. Batchelor, An introduction
-//! to fluid dynamics, Cambridge 1967, section 5.2; H. Tennekes and J. L. Lumley, A first course in turbulence, MIT
-//! Press 1972, chapter 3):
-//!
-//! ∂ω/∂t + U·∂ω/∂x = D·∂²ω/∂x²,  0 ≤ x ≤ L;  ω(0, t) = j(t) − r·ω(L, t);  ∂ω/∂x = 0 at x = L
-//!
-//! The film stands at x_f and reads ω(x_f): delay, dispersion and memory come out of the equation. U = U₀·(1 + κ·ω̄),
-//! ω̄ the mean over the ramp.
-//!
-//! From the publication: the equation. Its step response is that of A. Ogata and R. B. Banks, A solution of the
-//! differential equation of longitudinal dispersion in porous media, US Geological Survey Professional Paper 411-A,
-//! 1961; the test compares with it. Ours: L/U₀ of 70–110 ms, U₀·L/D of 25–45, the film at 0.6·L, r up to 0.3,
-//! κ up to 0.25.
+//! Vorticity convected over the ramp, diffused by turbulence and partly returned by the backflow.
 
 use super::{Flow, Published, STEP_S};
 use rand::RngExt;

@@ -1,25 +1,25 @@
-//! The base plant: the flow every hidden effect is added to.
+//! The base plant: the flow to which hidden effects are added.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
-/// A property of the base plant that no rig can have.
+/// A base plant property outside its physical range.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error("the base plant's `{property}` is {value}; it must be {requirement}")]
 pub struct BasePlantError {
-    /// Which property.
+    /// Name of the property.
     pub property: &'static str,
     /// Its value.
     pub value: f64,
-    /// What is allowed.
+    /// Allowed range.
     pub requirement: &'static str,
 }
 
-/// How long the flow takes to notice the jet.
+/// Delay of the flow's response to the jet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FlowDelay {
-    /// The same transport delay always, in seconds (0–0.5).
+    /// A constant transport delay, s (0–0.5).
     Fixed {
         /// Transport delay (s).
         delay_s: f64,
@@ -31,19 +31,19 @@ pub enum FlowDelay {
         floor_s: f64,
         /// Extra delay of the fully separated flow, p1 (s).
         rise_s: f64,
-        /// How fast the extra delay vanishes with the mean friction, p2 (1/y).
+        /// Rate at which the extra delay decreases with the mean friction, p2 (1/y).
         rate: f64,
     },
-    /// h(ỹ) = floor + rise·max(1 − ỹ/level, 0): a straight line that ends on the floor.
+    /// h(ỹ) = floor + rise·max(1 − ỹ/level, 0): linear down to a minimum.
     Clamped {
         /// Delay of the attached flow (s).
         floor_s: f64,
         /// Extra delay of the fully separated flow (s).
         rise_s: f64,
-        /// Mean friction from which on nothing changes (y).
+        /// Mean friction above which the delay is constant (y).
         level: f64,
     },
-    /// Each rising edge of the command takes one time to arrive, each falling edge another.
+    /// Different delays of rising and falling edges.
     EdgeDependent {
         /// Delay of a rising edge (s).
         rise_s: f64,
@@ -53,8 +53,8 @@ pub enum FlowDelay {
 }
 
 impl FlowDelay {
-    /// The delay at mean friction `mean` (s), of both edges on average where they differ; reversed flow is
-    /// no more separated than none.
+    /// The delay at mean friction `mean` (s), the mean of both edges if they differ; negative friction counts
+    /// as 0.
     pub fn at(self, mean: f64) -> f64 {
         match self {
             Self::Fixed { delay_s } => delay_s,
@@ -105,8 +105,8 @@ impl FlowDelay {
     }
 }
 
-/// What a jet between off and on does to the *rate* of the flow. An on/off jet makes no difference
-/// between the three; jets of intermediate strength (a lagging valve, a drooping plenum) do.
+/// Response of the flow's *rate* to jets between off and on. For on/off jets all three are equal; jets of
+/// part strength (a lagging valve, a drooping plenum) distinguish them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum RateLaw {
     /// The rate is the attaching one while a jet of at least half strength arrives, otherwise the
@@ -130,7 +130,7 @@ pub struct BasePlant {
     pub attach_s: f64,
     /// Time constant of separation, without a jet (s, 0.001–10).
     pub separate_s: f64,
-    /// Friction the flow settles at under steady blowing (y).
+    /// Steady friction under steady blowing (y).
     pub gain: f64,
     /// Transport delay.
     pub delay: FlowDelay,
@@ -178,7 +178,7 @@ impl BasePlant {
     /// [`BasePlantError`] naming the first bad property.
     pub fn validate(&self) -> Result<(), BasePlantError> {
         let within = |property, value: f64, low: f64, high: f64, requirement| {
-            // Written so that NaN is refused too.
+            // Written so that NaN is rejected too.
             if value >= low && value <= high {
                 Ok(())
             } else {
@@ -221,7 +221,7 @@ impl BasePlant {
         }
     }
 
-    /// The same rig with a delay that does not depend on the flow: drawn from 20–60 ms.
+    /// The same rig with a constant delay, drawn from 20–60 ms.
     pub fn with_fixed_delay(mut self, rng: &mut ChaCha8Rng) -> Self {
         self.delay = FlowDelay::Fixed {
             delay_s: rng.random_range(0.020..0.060),
@@ -229,8 +229,8 @@ impl BasePlant {
         self
     }
 
-    /// The same rig with equal time constants: the linear base for commands of many levels, where
-    /// "attaching" and "separating" have no switch between them.
+    /// The same rig with equal time constants: the linear base for graded commands, for which attachment and
+    /// separation have no sharp boundary.
     pub fn with_one_time_constant(mut self) -> Self {
         self.separate_s = self.attach_s;
         self

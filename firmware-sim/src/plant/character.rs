@@ -1,24 +1,24 @@
-//! What the flow is beyond following the jet with one time constant each way.
+//! Flow dynamics beyond one time constant per direction.
 
 use super::base::BasePlantError;
 
-/// How a flow feels what it was a while ago.
+/// Dependence of a flow on its own past.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PastTerm {
-    /// How long ago (s, 0.005–1).
+    /// The lag (s, 0.005–1).
     pub delay_s: f64,
-    /// What the past friction adds to the level that the flow goes to (-).
+    /// Gain from the past friction to the level of the flow (-).
     pub gain: f64,
-    /// What is taken off again where the jet arrives (-).
+    /// Reduction of that gain under the jet (-).
     pub lost: f64,
-    /// The past is felt through a lag of this time constant (s); 0 for a sharp memory.
+    /// Smearing time constant of the past (s); 0 for a sharp memory.
     pub smear_s: f64,
-    /// The past is felt as limit·tanh(past/limit) (y); infinite for a memory in proportion.
+    /// Saturation of the past, limit·tanh(past/limit) (y); infinite for none.
     pub limit: f64,
 }
 
 impl PastTerm {
-    /// A sharp memory in proportion: inside the bilinear class for on/off jets.
+    /// A sharp linear memory: inside the bilinear class for on/off jets.
     pub fn new(delay_s: f64, gain: f64, lost: f64) -> Self {
         Self {
             delay_s,
@@ -29,7 +29,7 @@ impl PastTerm {
         }
     }
 
-    /// The past as it is felt (y).
+    /// The past after smearing and saturation (y).
     pub(crate) fn felt(&self, past: f64) -> f64 {
         if self.limit.is_finite() {
             self.limit * (past / self.limit).tanh()
@@ -39,7 +39,7 @@ impl PastTerm {
     }
 }
 
-/// The kind of flow. `level(j)` is what the arriving jet j drives the flow to, `rate(j)` how fast it follows.
+/// The dynamics of the flow. `level(j)` is the steady level under the jet j, `rate(j)` the relaxation rate.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Character {
     /// ṡ = rate·(level − s).
@@ -47,35 +47,35 @@ pub enum Character {
     FirstOrder,
     /// The level also has Σ (gain − lost·j)·s(t − delay).
     Memory(Vec<PastTerm>),
-    /// The flow is heavy: time·s̈ + ṡ = rate·(level − s).
+    /// Inertia: time·s̈ + ṡ = rate·(level − s).
     Inertia {
-        /// Time constant of the motion itself (s).
+        /// Time constant of the inertia (s).
         time_s: f64,
     },
-    /// A second lag follows the first: time·ṡ = x − s, ẋ = rate·(level − x).
+    /// A second lag in series: time·ṡ = x − s, ẋ = rate·(level − x).
     SecondLag {
         /// Time constant of the second lag (s).
         time_s: f64,
     },
-    /// A slow wake pulls back: level − pull·w, time·ẇ = s − w.
+    /// A slow wake: level − pull·w, time·ẇ = s − w.
     Wake {
         /// Time constant of the wake (s).
         time_s: f64,
-        /// How strongly it pulls (-).
+        /// Strength of the wake (-).
         pull: f64,
     },
-    /// The separation rate depends on the friction: rate·(1 + slope·s) where no jet arrives.
+    /// The separation rate depends on the friction: rate·(1 + slope·s) without a jet.
     RateOfFriction {
         /// Relative change of the rate per friction (1/y).
         slope: f64,
     },
 }
 
-/// The slowest that separation gets, relative to its rate at rest.
+/// Smallest separation rate, relative to that at rest.
 const SLOWEST: f64 = 0.1;
 
 impl Character {
-    /// Continuous states beside the friction.
+    /// Number of continuous states beside the friction.
     pub(crate) fn states(&self) -> usize {
         match self {
             Self::FirstOrder | Self::RateOfFriction { .. } => 0,
@@ -92,7 +92,7 @@ impl Character {
         }
     }
 
-    /// By what the steady level under blowing is larger than the friction that comes of it.
+    /// Steady level under blowing minus the resulting friction.
     pub fn overshoot(&self) -> f64 {
         match self {
             Self::Memory(terms) => 1.0 - terms.iter().map(|t| t.gain - t.lost).sum::<f64>(),
@@ -104,8 +104,8 @@ impl Character {
         }
     }
 
-    /// The factor of the separation rate at friction `s`. A flow that is driven below rest goes back at the
-    /// rate of rest: if it slowed down there, it would run away.
+    /// The factor of the separation rate at friction `s`. Below rest it is that at rest: a lower rate would
+    /// make the flow diverge.
     pub(crate) fn separation(&self, s: f64) -> f64 {
         match self {
             Self::RateOfFriction { slope } => (1.0 + slope * s.max(0.0)).max(SLOWEST),
@@ -113,7 +113,7 @@ impl Character {
         }
     }
 
-    /// Names and values of what the character has, for people and scoring scripts.
+    /// Names and values of the parameters, for users and scoring scripts.
     pub fn properties(&self) -> Vec<(String, f64)> {
         match self {
             Self::FirstOrder => Vec::new(),
@@ -155,7 +155,7 @@ impl Character {
     /// [`BasePlantError`] naming the first bad property.
     pub fn validate(&self) -> Result<(), BasePlantError> {
         let within = |property, value: f64, low: f64, high: f64, requirement| {
-            // Written so that NaN is refused too.
+            // Written so that NaN is rejected too.
             if value >= low && value <= high {
                 return Ok(());
             }

@@ -1,4 +1,4 @@
-//! A rig as TOML text, for people and scoring scripts.
+//! A rig as TOML text, for users and scoring scripts.
 
 use std::fmt::Write as _;
 

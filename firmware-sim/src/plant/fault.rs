@@ -1,4 +1,4 @@
-//! Misbehaviour of a rig that no effect of the catalogue describes.
+//! Faults of a rig outside the catalogue.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -18,7 +18,7 @@ pub enum Fault {
         /// When it works again (s from the record's start).
         to_s: f64,
     },
-    /// A valve that was open for long closes only half way and stays there before it shuts.
+    /// After a long opening the valve closes only half way and stays there before it closes.
     StickingValve {
         /// Shortest opening after which it sticks (s).
         after_open_s: f64,
@@ -41,7 +41,7 @@ impl Fault {
         }
     }
 
-    /// A visible fault of that name at random; `None` for an unknown name.
+    /// A random fault of that name; `None` for an unknown name.
     pub fn draw(name: &str, rng: &mut ChaCha8Rng) -> Option<Self> {
         match name {
             "missing-pulse" => Some(Self::MissingPulse {

@@ -1,11 +1,11 @@
-//! The separated flow: friction driven by the arriving jet, with the parts that act in it.
+//! The separated flow: friction driven by the arriving jet, with the effects that act on it.
 
 use super::base::{BasePlant, RateLaw};
 use super::character::Character;
 use super::part::{FlowPart, Piece, Resistance};
 use crate::waveform::{Cursor, Waveform};
 
-/// Friction, the states of the flow's character and the memory of each part; or their speeds.
+/// Friction, states of the flow's character and memory of each part; or their derivatives.
 type State = Vec<f64>;
 
 /// Friction s and the memories beside it.
@@ -19,12 +19,12 @@ pub(crate) struct Flow {
     parts: Vec<Box<dyn FlowPart>>,
     resistance: Resistance,
     state: State,
-    /// Where the integration works: a trial state and the four speeds.
+    /// Work space of the integration: a trial state and four derivatives.
     trial: State,
     speeds: [State; 4],
     jet: f64,
     time: f64,
-    /// The friction so far, where the character needs it, and where each of its terms reads.
+    /// The friction history, if the character needs it, with the read position of each term.
     past: Waveform,
     cursors: Vec<Cursor>,
 }
@@ -67,7 +67,7 @@ impl Flow {
         self.state[0]
     }
 
-    /// What the film feels: friction with what the parts superpose (y).
+    /// Input of the film: friction with superposed contributions (y).
     pub(crate) fn at_the_film(&self) -> f64 {
         let each = self.parts.iter();
         each.fold(self.state[0], |felt, part| {
@@ -75,7 +75,7 @@ impl Flow {
         })
     }
 
-    /// How fast everything changes at the trial state, `ahead` from now, while `j` arrives.
+    /// Derivative of the trial state, `ahead` from now, while `j` arrives.
     fn speed(&mut self, stage: usize, ahead: f64, j: f64) {
         let speed = &mut self.speeds[stage];
         let (s, rest) = (self.trial[0], &self.trial[1..]);
@@ -84,7 +84,7 @@ impl Flow {
         let (own_dot, memories_dot) = rest.split_at_mut(own.len());
         let extra = (self.parts.iter().zip(memories)).fold(0.0, |sum, (p, z)| sum + p.drive(s, *z));
 
-        // Where the flow goes without and with the jet, and what goes there.
+        // The level without and with the jet, and the quantity that follows it.
         let (mut off, mut on, mut follower) = (0.0, self.gain, s);
         match &self.character {
             Character::FirstOrder
@@ -111,8 +111,8 @@ impl Flow {
                 }
             }
         }
-        // Above full strength nothing separates: the share that does is negative there, and a rate that grows with the
-        // friction would drive the flow on.
+        // Above full strength the separating share would be negative, and a rate that grows with the friction
+        // would make the flow diverge: it is not applied.
         let separation = if j > 1.0 {
             1.0
         } else {
@@ -157,7 +157,7 @@ impl Flow {
         }
     }
 
-    /// Puts the trial state `dt` ahead along the speeds of a stage.
+    /// Sets the trial state to `dt` ahead along the derivative of a stage.
     fn try_ahead(&mut self, stage: usize, dt: f64) {
         let now = self.state.iter().zip(&self.speeds[stage]);
         for (trial, (x, speed)) in self.trial.iter_mut().zip(now) {
@@ -165,8 +165,8 @@ impl Flow {
         }
     }
 
-    /// Lets `dt` pass while the arriving jet goes in a straight line from `j0` to `j1`; returns the area
-    /// under the friction. Runge–Kutta of order 4.
+    /// Advances by `dt` while the arriving jet changes linearly from `j0` to `j1`; returns the integral of
+    /// the friction. Runge–Kutta of order 4.
     pub(crate) fn advance(&mut self, dt: f64, j0: f64, j1: f64) -> f64 {
         let jm = 0.5 * (j0 + j1);
         let before = self.state[0];
@@ -198,7 +198,7 @@ impl Flow {
         0.5 * dt * (before + self.state[0])
     }
 
-    /// The arriving jet jumps.
+    /// A jump of the arriving jet.
     pub(crate) fn jump(&mut self, jet: f64) {
         self.jet = jet;
         for part in &mut self.parts {
@@ -207,7 +207,7 @@ impl Flow {
     }
 }
 
-/// Speed that a push leaves against what resists; 0 while the flow sticks.
+/// Speed under a push against a resistance; 0 while sticking.
 fn resisted(push: f64, resistance: Resistance) -> f64 {
     let Resistance { dry, drag } = resistance;
     let free = push.abs() - dry;
@@ -241,7 +241,7 @@ pub(crate) mod bench {
         Flow::new(&base, &Character::FirstOrder, parts.collect())
     }
 
-    /// The friction after the jet has arrived at one level for a while.
+    /// The friction after a constant jet for some time.
     pub(crate) fn hold(flow: &mut Flow, jet: f64, seconds: f64) -> f64 {
         for _ in 0..(seconds / DT).round() as usize {
             flow.advance(DT, jet, jet);
@@ -277,7 +277,7 @@ mod tests {
         }
     }
 
-    /// ṡ = r·(g + k·s(t − T) − s), solved by steps.
+    /// ṡ = r·(g + k·s(t − T) − s), compared with the method of steps.
     #[test]
     fn memory_follows_its_solution_by_steps() {
         let (delay_s, gain, lost) = (0.15, -0.1, 0.2);
@@ -292,7 +292,7 @@ mod tests {
         let s = hold(&mut flow, 1.0, t);
         assert!((s - expected).abs() < 1e-7, "{s} {expected}");
         assert!((hold(&mut flow, 1.0, 5.0) - 1.0 / (1.0 - k)).abs() < 1e-9);
-        // Without the jet only the gain is left of it, and the flow comes to rest.
+        // Without the jet only the gain remains, and the flow returns to rest.
         let s = hold(&mut flow, 0.0, 0.1);
         let blown = 1.0 / (1.0 - k);
         let level = gain * blown;
@@ -325,7 +325,7 @@ mod tests {
         let t = 0.05_f64;
         let response = |a: f64, b: f64| 1.0 - (a * (-t / a).exp() - b * (-t / b).exp()) / (a - b);
         assert!((hold(&mut flow, 1.0, t) - response(0.04, 0.01)).abs() < 1e-9);
-        // time·s² + s + rate: the poles of the heavy flow.
+        // time·s² + s + rate: the poles of the flow with inertia.
         let time_s = 0.008;
         let mut flow = flow_of(Character::Inertia { time_s });
         let root = (1.0_f64 - 4.0 * time_s / 0.04).sqrt();

@@ -1,4 +1,4 @@
-//! What the tunnel does over a record: velocity and temperature of the free stream.
+//! Velocity and temperature of the free stream over a record.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -24,7 +24,7 @@ pub struct FreeStream {
 }
 
 impl FreeStream {
-    /// A wandering free stream: waves of 0.08–0.9 Hz, together ±5–12 %, over `samples` of 1 ms.
+    /// A varying free stream: waves of 0.08–0.9 Hz, together ±5–12 %, over `samples` of 1 ms.
     pub fn draw(rng: &mut ChaCha8Rng, samples: usize) -> Self {
         let size = rng.random_range(0.05..0.12) * MEAN_FREE_STREAM;
         let mut waves = [(0.0, 0.0, 0.0); 3];
@@ -36,7 +36,7 @@ impl FreeStream {
                 rng.random_range(0.0..std::f64::consts::TAU),
             );
         }
-        // From numbers of its own, so that streams without a temperature stay what they were.
+        // A separate random stream, so that rigs without a temperature are unchanged.
         let mut own = ChaCha8Rng::seed_from_u64(waves[0].2.to_bits());
         let warmth = [(2.5, 0.12, 0.30), (1.5, 0.35, 0.80)].map(|(size, low, high)| {
             (

@@ -1,28 +1,27 @@
-//! From the command to the jet: what the coil is told, through every part upstream of the transport delay.
+//! The path from command to jet: every part upstream of the transport delay.
 
 use super::fault::Fault;
 use super::part::{JetPart, Piece};
 use super::{LONGEST_DELAY_S, SHORTEST_PIECE_S};
 use crate::waveform::Waveform;
 
-/// The jet's own dynamics. Everything here is upstream of the transport delay and does not feel the
-/// flow, so it may run ahead of it.
+/// The jet's dynamics, upstream of the transport delay and independent of the flow, so that it may run ahead.
 #[derive(Debug, Clone)]
 pub(crate) struct Jet {
     parts: Vec<Box<dyn JetPart>>,
-    /// What goes into each part, and behind the last what comes out of it.
+    /// Input of each part, and output of the last one.
     signals: Vec<f64>,
     missing_every: Option<u32>,
     sticking: Option<(f64, f64)>,
 
-    /// What the coil is told.
+    /// The coil's command.
     command: f64,
     pulses: u32,
     opened_at: f64,
-    /// While the valve is jammed half open: until when.
+    /// End time of a jam at half opening, if any.
     stuck_until: Option<f64>,
     time: f64,
-    /// What leaves towards the flow.
+    /// The jet towards the flow.
     pub(crate) out: Waveform,
 }
 
@@ -54,7 +53,7 @@ impl Jet {
         jet
     }
 
-    /// The coil is told `level` now.
+    /// Sets the coil's command to `level` now.
     pub(crate) fn command(&mut self, level: f64) {
         if level == self.command {
             return;
@@ -81,7 +80,7 @@ impl Jet {
         self.jump(0, target);
     }
 
-    /// What goes into a part changes to `level` without taking time; so may what comes out of it.
+    /// The input of a part jumps to `level`; its output may jump too.
     fn jump(&mut self, part: usize, level: f64) {
         let mut signal = level;
         for (i, part) in self.parts.iter_mut().enumerate().skip(part) {
@@ -101,7 +100,7 @@ impl Jet {
         self.parts.iter().fold(jet, |sum, part| sum + part.shed())
     }
 
-    /// Lets time pass until `to`, in pieces no longer than the caller's sub-step.
+    /// Advances to time `to` in pieces no longer than the caller's sub-step.
     pub(crate) fn advance(&mut self, to: f64) {
         while to - self.time > SHORTEST_PIECE_S {
             let events = self.parts.iter().filter_map(|part| part.next_event());
@@ -124,7 +123,7 @@ impl Jet {
         }
     }
 
-    /// One piece of time in which nothing jumps.
+    /// A piece of time without jumps.
     fn piece(&mut self, dt: f64, end: f64) {
         self.time = end;
         let mut signal = self.signals[0];
@@ -155,7 +154,7 @@ pub(crate) mod bench {
         Jet::new(parts.collect(), &[])
     }
 
-    /// The jet at `until`, reached in sub-steps.
+    /// The jet at time `until`, computed in sub-steps.
     pub(crate) fn run(jet: &mut Jet, until: f64) -> f64 {
         while until - jet.time > SHORTEST_PIECE_S {
             jet.advance((jet.time + 5e-5).min(until));

@@ -38,13 +38,13 @@ pub const SUBSTEPS: u32 = 20;
 /// Length of a sub-step (s).
 pub const SUBSTEP_S: f64 = SAMPLE_PERIOD_S / SUBSTEPS as f64;
 
-/// How much of the past the jet remembers (s); every delay is far shorter.
+/// Length of the jet's history (s), much longer than any delay.
 const LONGEST_DELAY_S: f64 = 2.5;
 
-/// Time differences below this are the same instant (s).
+/// Time differences below this count as the same instant (s).
 const SHORTEST_PIECE_S: f64 = 1e-9;
 
-/// What a controller can be connected to: one command in, one reading out, every millisecond.
+/// A plant for a controller: one command in, one reading out, every millisecond.
 pub trait Plant {
     /// Holds the valve command for one sample period, then reads the sensor (y, with noise and
     /// converter where the plant has them).

@@ -1,56 +1,53 @@
-//! What an effect is while the plant runs: the hooks through which jet, flow and sensor call it.
-//!
-//! Every hook passes its signal through unless the part acts there. Rooms loop over their parts in the
-//! order of [`Place`] and know none of them by name.
+//! The runtime interface of effects in jet, flow and sensor.
 
 use std::fmt::Debug;
 
 use super::base::FlowDelay;
 use super::free_stream::FreeStream;
 
-/// Where an effect sits, in the order in which the signals run.
+/// Place of an effect, in signal order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Place {
-    /// The way from the jet's mouth to the sensor.
+    /// The transport from jet to sensor.
     Transport,
     /// The line from the coil to the valve.
     Line,
     /// The valve's moving part.
     Valve,
-    /// What an opening lets through.
+    /// The flow through an opening.
     Nozzle,
     /// The pressure behind the valve.
     Plenum,
     /// The stream into which the jet blows.
     FreeStream,
-    /// A second way to the flow.
+    /// A second path to the flow.
     Path,
-    /// What is shed when the jet changes.
+    /// Vortices shed when the jet changes.
     Shedding,
     /// The flow itself.
     Flow,
-    /// What the sensor can tell of the flow.
+    /// The sensor's input.
     Sense,
     /// From friction to voltage.
     Film,
-    /// Voltage that takes its time.
+    /// Lag of the voltage.
     FilmLag,
-    /// The sensor's zero.
+    /// The sensor's offset.
     Zero,
     /// The cable.
     Cable,
-    /// The range of the amplifier.
+    /// Saturation of the amplifier.
     Rails,
 }
 
-/// What a part may know of its surroundings when it is built.
+/// Surroundings of a part at its creation.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Surroundings<'a> {
-    /// What the tunnel does during the record; steady when `None`.
+    /// The free stream during the record; constant if `None`.
     pub(crate) free_stream: Option<&'a FreeStream>,
 }
 
-/// A running part, by the room it belongs to.
+/// A running part, by place.
 pub(crate) enum Part {
     /// It sets the transport delay.
     Delay(FlowDelay),
@@ -62,61 +59,61 @@ pub(crate) enum Part {
     Sensor(Box<dyn SensorPart>),
 }
 
-/// A straight piece of a signal.
+/// A linear piece of a signal.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Piece {
-    /// How long it takes (s).
+    /// Duration (s).
     pub(crate) dt: f64,
-    /// The signal at its beginning.
+    /// The signal at its start.
     pub(crate) from: f64,
     /// The signal at its end.
     pub(crate) to: f64,
 }
 
-/// A link of the chain from the coil to the jet. It does not feel the flow.
+/// A link of the chain from coil to jet, independent of the flow.
 pub(crate) trait JetPart: Debug + Send + Sync + BoxedJet {
-    /// What comes out at `t`, after what goes in has jumped between two levels without taking time.
+    /// Output at `t` after the input has jumped between two levels.
     fn jump(&mut self, t: f64, from: f64, to: f64) -> f64;
 
-    /// What comes out at `t`, the end of a piece.
+    /// Output at `t`, the end of a piece.
     fn advance(&mut self, t: f64, piece: &Piece) -> f64;
 
-    /// When it jumps by itself, if nothing else happens (s).
+    /// Time of its next spontaneous jump, if nothing else happens (s).
     fn next_event(&self) -> Option<f64> {
         None
     }
 
-    /// The time of [`next_event`](Self::next_event) has come; [`jump`](Self::jump) follows.
+    /// Called at the time of [`next_event`](Self::next_event); [`jump`](Self::jump) follows.
     fn event(&mut self) {}
 
-    /// What it adds to the jet behind the last link.
+    /// Contribution to the jet after the last link.
     fn shed(&self) -> f64 {
         0.0
     }
 }
 
-/// What slows the flow down: v + dry·sign(v) + drag·v·|v| = push.
+/// Resistance of the flow: v + dry·sign(v) + drag·v·|v| = push.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Resistance {
-    /// Does not depend on the speed (y/s).
+    /// Independent of the speed (y/s).
     pub(crate) dry: f64,
-    /// Grows with the square of the speed (s/y).
+    /// Proportional to the square of the speed (s/y).
     pub(crate) drag: f64,
 }
 
-/// Something in the flow. Each part has one continuous memory z, which is integrated with the flow.
+/// An effect in the flow, with one continuous state z that is integrated with the flow.
 pub(crate) trait FlowPart: Debug + Send + Sync + BoxedFlow {
-    /// What it adds to the level that the flow goes to, at friction `s` (y).
+    /// Contribution to the level of the flow at friction `s` (y).
     fn drive(&self, _s: f64, _z: f64) -> f64 {
         0.0
     }
 
-    /// ż at friction `s`, which moves at `s_dot`.
+    /// ż at friction `s` with derivative `s_dot`.
     fn memory_rate(&self, _s: f64, _s_dot: f64, _z: f64) -> f64 {
         0.0
     }
 
-    /// How it resists motion.
+    /// Its resistance to motion.
     fn resistance(&self) -> Resistance {
         Resistance::default()
     }
@@ -124,32 +121,32 @@ pub(crate) trait FlowPart: Debug + Send + Sync + BoxedFlow {
     /// The arriving jet jumps to `jet`.
     fn arrives(&mut self, _jet: f64) {}
 
-    /// A piece of the arriving jet has passed; the friction is `s` now.
+    /// A piece of the arriving jet has passed; the friction is now `s`.
     fn passed(&mut self, _jet: &Piece, _s: f64) {}
 
-    /// What it adds to the friction that the film feels while `jet` arrives (y).
+    /// Contribution to the film's input while `jet` arrives (y).
     fn at_the_film(&self, _jet: f64) -> f64 {
         0.0
     }
 }
 
-/// When a reading is taken, and under which command.
+/// Time and command of a reading.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Moment {
     /// Time since the start (s).
     pub(crate) t: f64,
-    /// What the valve is told.
+    /// The valve's command.
     pub(crate) command: f64,
 }
 
-/// A link of the chain from what the film feels to the reading.
+/// A link of the chain from the film's input to the reading.
 pub(crate) trait SensorPart: Debug + Send + Sync + BoxedSensor {
     /// Whether [`advance`](Self::advance) differs from [`jump`](Self::jump) to the end of the piece.
     fn takes_time(&self) -> bool {
         false
     }
 
-    /// What the film gives when what it feels has just jumped to `to`.
+    /// Output of the film after its input has jumped to `to`.
     fn jump(&mut self, to: f64) -> f64 {
         to
     }

@@ -1,5 +1,5 @@
-//! What the programs for Cortex-M boards share: a panic that does not link, logs,
-//! the measure of the stack, and the lockstep program's measurements.
+//! Shared code of the programs for Cortex-M boards: a panic handler that fails to link, logs, stack
+//! measurement, and the lockstep program's measurements.
 #![no_std]
 
 pub mod lockstep;
@@ -7,8 +7,8 @@ pub mod lockstep;
 mod log;
 pub mod stack;
 
-/// A panic must not be linked: this calls what does not exist. The linker then
-/// says which one is.
+/// Panic-freedom proof: the handler calls a missing symbol, so that a program with a panic does not link; the
+/// linker names it.
 #[cfg(target_os = "none")]
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {

@@ -1,12 +1,12 @@
-//! The lockstep cases with what they take on the board.
+//! The lockstep cases with their measured cost on the board.
 
 use crate::stack;
 use firmware::cases::Rigs;
 use firmware::link::lockstep::{Cases, Report};
 
-/// A clock that counts what a piece of work takes.
+/// A clock that measures the duration of a function.
 pub trait Stopwatch {
-    /// What `work` gives, and the ticks it took.
+    /// The result of `work`, and its duration in ticks.
     fn measure<R>(&mut self, work: impl FnOnce() -> R) -> (R, u32);
 }
 

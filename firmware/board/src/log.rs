@@ -1,8 +1,7 @@
-//! Where `defmt` frames go: to the probe (RTT) or to QEMU (semihosting).
+//! Output of `defmt` frames: to the probe (RTT) or to QEMU (semihosting).
 //!
-//! The usual transports panic where they are called wrongly, and a panic must
-//! not be linked here. Nothing here waits, either: a frame that finds no room
-//! is dropped whole.
+//! The usual transports panic on misuse, and panics must not be linked here. Nothing waits: a frame that does
+//! not fit is dropped as a whole.
 
 #[cfg(all(feature = "rtt", feature = "semihosting"))]
 compile_error!("logs go to one place: choose `rtt` or `semihosting`");

@@ -1,5 +1,5 @@
-//! How deep the stack has been: what is below it is painted at the start, and
-//! the paint that is gone was used.
+//! Measurement of the stack depth: the unused stack is painted at the start, and the overwritten part was
+//! used.
 
 use core::ptr::addr_of;
 
@@ -8,7 +8,7 @@ const PAINT: u32 = 0xA5A5_5A5A;
 const MARGIN: usize = 64;
 
 unsafe extern "C" {
-    /// The end of what has a place in memory, `.uninit` included.
+    /// End of static memory, `.uninit` included.
     static __sheap: u32;
     static _stack_start: u32;
 }

@@ -59,7 +59,7 @@ mod tests {
             };
             (0..2000).fold(0.0, |_, _| step(&model, &mut state, &input).measured)
         };
-        // Nothing drives the flow without a jet; b/(1 − a − c) is 1.
+        // Without a jet the flow has no drive; b/(1 − a − c) is 1.
         assert_eq!(last(2.0), 0.0);
         assert!((last(7.0) - 1.0_f32).abs() < 1e-5, "{}", last(7.0));
     }

@@ -14,8 +14,8 @@ pub const APB1: u32 = CORE / 2;
 const DIVIDE: u8 = 4;
 const MULTIPLY: u16 = 168;
 
-/// Turns crystal and PLL on and goes over to them. Waits for the crystal; a
-/// board without one stays here with its valve shut.
+/// Starts crystal and PLL and switches to them. Waits for the crystal; a board without one stays here with
+/// its valve closed.
 pub fn start(rcc: &RCC, flash: &FLASH) {
     rcc.cr()
         .modify(|_, w| w.hsebyp().set_bit().hseon().set_bit());
@@ -39,7 +39,7 @@ pub fn start(rcc: &RCC, flash: &FLASH) {
     while !rcc.cfgr().read().sws().is_pll() {}
 }
 
-/// Whether the independent watchdog restarted the board; forgets the reasons.
+/// Whether the independent watchdog restarted the board; clears the reset flags.
 pub fn restarted_by_watchdog(rcc: &RCC) -> bool {
     let by_watchdog = rcc.csr().read().wdgrstf().bit_is_set();
     rcc.csr().modify(|_, w| w.rmvf().set_bit());

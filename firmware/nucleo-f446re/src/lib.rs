@@ -1,5 +1,4 @@
-//! ST's Nucleo-F446RE: what the rig's programs need of it. Pins and levels are
-//! in `firmware/WIRING.md`.
+//! ST's Nucleo-F446RE: drivers for the rig's programs. Pins and levels are in `firmware/WIRING.md`.
 #![no_std]
 
 pub mod clocks;

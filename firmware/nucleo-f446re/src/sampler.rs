@@ -14,7 +14,7 @@ static READING: AtomicU32 = AtomicU32::new(0);
 static CHANNEL: AtomicU32 = AtomicU32::new(0);
 static PERIODS: AtomicU32 = AtomicU32::new(0);
 
-/// The readings, and the sample clock that they are.
+/// The converter, whose readings are the sample clock.
 pub struct Sampler {
     _pins: (PA0<Analog>, PA1<Analog>),
 }
@@ -95,8 +95,7 @@ impl Clock for Periods {
 fn ADC() {
     // SAFETY: this interrupt alone touches status and data after the start.
     let converter = unsafe { &*ADC1::ptr() };
-    // A reading that was overwritten is a period too, and the converter stands
-    // still until its flag is cleared.
+    // An overwritten reading also counts as a period, and the converter stops until its flag is cleared.
     let overwritten = converter.sr().read().ovr().bit_is_set();
     if overwritten {
         converter.sr().modify(|_, w| w.ovr().clear_bit());

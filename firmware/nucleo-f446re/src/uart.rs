@@ -12,23 +12,21 @@ use wire::Outbox;
 
 const BAUD: u32 = 115_200;
 
-/// Bytes that the line takes in a period have to wait for its end, and some more; at 10 ms 115 of them.
+/// Bytes received during one sample period must be buffered until its end: 115 at 10 ms, plus a margin.
 const WAITING: usize = if firmware::on_board::PERIOD_US > 10_000 {
     2048
 } else {
     256
 };
 
-/// Where the interrupt puts what was received while the loop was busy. It is
-/// handed over once, and only the interrupt has it then.
+/// The interrupt's end of the receive queue; handed over once.
 static RECEIVED: Mutex<Cell<Option<Producer<'static, u8>>>> = Mutex::new(Cell::new(None));
 
-/// The serial line. Nothing here waits: bytes go out one at a time, when there
-/// is room, from [`Uart::work`].
+/// The serial line. Nothing waits: bytes are sent one at a time by [`Uart::work`] when there is room.
 pub struct Uart {
     registers: USART2,
     received: Option<Consumer<'static, u8>>,
-    /// What is to be sent.
+    /// Bytes to send.
     pub outbox: Outbox,
 }
 
@@ -39,7 +37,7 @@ impl Uart {
         let _ = (tx.into_alternate::<7>(), rx.into_alternate::<7>());
         USART2::enable(rcc);
         USART2::reset(rcc);
-        // `None` if this were called twice: there is one line.
+        // `None` on a second call: there is one line.
         let queue = cortex_m::singleton!(: Queue<u8, WAITING> = Queue::new());
         let received = queue.map(|queue| {
             let (producer, consumer) = queue.split();
@@ -65,13 +63,13 @@ impl Uart {
         }
     }
 
-    /// A byte, if one has come.
+    /// A received byte, if any.
     #[inline]
     pub fn receive(&mut self) -> Option<u8> {
         self.received.as_mut()?.dequeue()
     }
 
-    /// Sends a byte if there is one and the line is free; call it often.
+    /// Sends a byte if there is one and the line is free; must be called often.
     #[inline]
     pub fn work(&mut self) {
         if self.registers.sr().read().txe().bit_is_set()
@@ -86,13 +84,13 @@ impl Uart {
 fn USART2() {
     // SAFETY: reading status and data of the receiver, which nothing else does.
     let registers = unsafe { &*USART2::ptr() };
-    // In this order the two clear an overrun, too.
+    // Reading in this order also clears an overrun.
     if registers.sr().read().rxne().bit_is_set() {
         let byte = registers.dr().read().dr().bits() as u8;
         critical_section::with(|section| {
             let slot = RECEIVED.borrow(section);
             if let Some(mut producer) = slot.take() {
-                // A byte that finds no room is lost, and its command not understood.
+                // A byte that does not fit is lost, and its command is not understood.
                 let _ = producer.enqueue(byte);
                 slot.set(Some(producer));
             }

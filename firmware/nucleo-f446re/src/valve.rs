@@ -7,14 +7,13 @@ use stm32f4xx_hal::pac::GPIOB;
 /// keeps them shut.
 pub type Valve = PB10<Output<PushPull>>;
 
-/// Low, then an output.
+/// Sets the pin low, then makes it an output.
 #[must_use]
 pub fn shut(pin: PB10) -> Valve {
     pin.into_push_pull_output_in_state(PinState::Low)
 }
 
-/// Shuts the valves whoever holds the pin, for exceptions: then the watchdog
-/// restarts the board.
+/// Closes the valves from an exception, whoever owns the pin; the watchdog then restarts the board.
 pub fn emergency() {
     // SAFETY: one write that clears one pin and leaves the others.
     unsafe { (*GPIOB::ptr()).bsrr().write(|w| w.br10().set_bit()) };

@@ -6,9 +6,9 @@ use cortex_m::peripheral::syst::SystClkSource;
 
 const FULL: u32 = 0x00FF_FFFF;
 
-/// Counts down 24 bits, again and again.
+/// A 24-bit down counter that reloads.
 pub struct Ticks {
-    /// Ticks between two readings with nothing between them.
+    /// Ticks of an empty measurement.
     overhead: u32,
     /// Count at which the last wait ended.
     due: u32,
@@ -26,19 +26,19 @@ impl Ticks {
             overhead: 0,
             due: SYST::get_current(),
         };
-        // The second measurement runs from warm code.
+        // The first measurement warms the code.
         ticks.measure(|| ());
         ticks.overhead = ticks.measure(|| ()).1;
         ticks
     }
 
-    /// Lets the first period begin now.
+    /// Starts the first period now.
     pub fn begin(&mut self) {
         self.due = SYST::get_current();
     }
 
-    /// Waits for the next multiple of `period` ticks since the last wait ended,
-    /// and says how many periods that were: more than 1 if it came too late.
+    /// Waits for the next multiple of `period` ticks since the last wait ended, and returns the number of
+    /// periods: more than 1 if it was late.
     pub fn wait(&mut self, period: u32) -> u32 {
         let mut periods = 0;
         loop {
@@ -53,7 +53,7 @@ impl Ticks {
     }
 }
 
-/// Whether the count has gone down to `due`; right for half its range.
+/// Whether the count has reached `due`; valid for half of its range.
 #[inline]
 fn is_past(due: u32) -> bool {
     SYST::get_current().wrapping_sub(due) & FULL >= FULL / 2

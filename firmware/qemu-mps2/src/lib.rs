@@ -1,5 +1,4 @@
-//! What QEMU's mps2-an386 has of the rig's board: a serial line, a clock that
-//! counts instructions, and a watchdog.
+//! Peripherals of QEMU's mps2-an386: a serial line, a clock that counts instructions, and a watchdog.
 #![no_std]
 
 pub mod clock;

@@ -4,24 +4,23 @@ use wire::Outbox;
 
 const SEND_FULL: u32 = 1;
 const RECEIVED: u32 = 2;
-/// What a byte takes at 115 200 baud, 8N1, µs · 11 520.
+/// Duration of a byte at 115 200 baud, 8N1, in µs · 11 520.
 const A_BYTE: u32 = 1_000_000;
 const BYTES_A_SECOND: u32 = 11_520;
 
 /// The serial line to operator and host.
 pub type Line = Uart<0x4000_4000>;
-/// The line to the rig behind the board: what on a real board are converter and pins.
+/// The line to the simulated rig, in place of converter and pins.
 pub type ToRig = Uart<0x4000_5000>;
 
-/// A serial line. One owner: each is made from a token that exists once.
+/// A serial line. Exclusive: each is made from a token that exists once.
 pub struct Uart<const BASE: usize> {
-    /// What may be sent at once, in µs · 11 520.
+    /// Transmission credit, in µs · 11 520.
     credit: u32,
 }
 
 impl Line {
-    /// Turns sender and receiver on. `_core` is consumed to show that there is
-    /// one owner.
+    /// Enables sender and receiver. `_core` is consumed to guarantee exclusive ownership.
     #[must_use]
     pub fn new(_core: cortex_m::peripheral::ITM) -> Self {
         Self::on()
@@ -29,8 +28,7 @@ impl Line {
 }
 
 impl ToRig {
-    /// Turns sender and receiver on. `_core` is consumed to show that there is
-    /// one owner.
+    /// Enables sender and receiver. `_core` is consumed to guarantee exclusive ownership.
     #[must_use]
     pub fn new(_core: cortex_m::peripheral::FPB) -> Self {
         Self::on()
@@ -52,7 +50,7 @@ impl<const BASE: usize> Uart<BASE> {
         Self { credit: 0 }
     }
 
-    /// A byte, if one has come.
+    /// A received byte, if any.
     #[inline]
     pub fn receive(&mut self) -> Option<u8> {
         // SAFETY: as in `on`.
@@ -69,7 +67,7 @@ impl<const BASE: usize> Uart<BASE> {
         self.wait_beside(|| {})
     }
 
-    /// Waits for a byte, and does something else meanwhile.
+    /// Waits for a byte and calls `meanwhile` repeatedly.
     #[inline]
     pub fn wait_beside(&mut self, mut meanwhile: impl FnMut()) -> u8 {
         loop {
@@ -80,7 +78,7 @@ impl<const BASE: usize> Uart<BASE> {
         }
     }
 
-    /// Sends all of `bytes`, and waits where the line is full.
+    /// Sends all of `bytes`; waits while the line is full.
     pub fn send(&mut self, bytes: &[u8]) {
         for byte in bytes {
             while !self.offer(*byte) {}
@@ -98,10 +96,10 @@ impl<const BASE: usize> Uart<BASE> {
         }
     }
 
-    /// Sends what a real line would have taken in `period` µs: QEMU's takes
-    /// everything at once. What the other end does not read stays in the outbox.
+    /// Sends as much as a real line would transmit in `period` µs; QEMU's line is infinitely fast. Unsent
+    /// bytes stay in the outbox.
     pub fn work(&mut self, outbox: &mut Outbox, period: u32) {
-        // What was not used is lost, but for what a line that is never idle needs.
+        // Unused credit expires, except one byte for a line that is never idle.
         self.credit = self.credit.min(A_BYTE) + period * BYTES_A_SECOND;
         while self.credit >= A_BYTE {
             // SAFETY: as in `on`.

@@ -1,4 +1,4 @@
-//! CMSDK APB watchdog: restarts the board when it is not fed.
+//! CMSDK APB watchdog: restarts the board if it is not fed.
 
 use core::mem::MaybeUninit;
 use core::ptr::{addr_of, addr_of_mut};
@@ -13,16 +13,16 @@ const KEY: u32 = 0x1ACC_E551;
 const COUNT_AND_RESET: u32 = 0b11;
 const RUNNING: u32 = 0xD06_D06;
 
-/// QEMU's board keeps no reason for a reset, but its RAM survives one.
+/// Mark in RAM that survives a restart, since QEMU's board does not store the reason of a reset.
 #[unsafe(link_section = ".uninit.watchdog")]
 static mut MARK: MaybeUninit<u32> = MaybeUninit::uninit();
 
-/// The watchdog. One owner: it is made from a token that exists once.
+/// The watchdog. Exclusive: made from a token that exists once.
 pub struct Watchdog(());
 
 impl Watchdog {
-    /// Starts it: after twice `ticks` (25 MHz) without food the board restarts.
-    /// `_core` is consumed to show that there is one owner.
+    /// Starts the watchdog: without feeding, the board restarts after twice `ticks` (25 MHz). `_core` is
+    /// consumed to guarantee exclusive ownership.
     #[must_use]
     pub fn start(_core: cortex_m::peripheral::TPIU, ticks: u32) -> Self {
         mark(RUNNING);
@@ -35,14 +35,14 @@ impl Watchdog {
         Self(())
     }
 
-    /// Lets it wait anew.
+    /// Feeds the watchdog.
     #[inline]
     pub fn feed(&mut self) {
         // SAFETY: as in `start`.
         unsafe { CLEAR.write_volatile(1) };
     }
 
-    /// Ticks left of the first half of its patience.
+    /// Ticks left of the first of two timeouts.
     #[must_use]
     pub fn left(&self) -> u32 {
         // SAFETY: reading a register.
@@ -50,7 +50,7 @@ impl Watchdog {
     }
 }
 
-/// Whether the watchdog restarted the board; forgets it.
+/// Whether the watchdog restarted the board; clears the mark.
 #[must_use]
 pub fn restarted() -> bool {
     // SAFETY: the word is in RAM, any bits are a u32, and nothing runs beside.

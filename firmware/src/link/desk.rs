@@ -15,20 +15,20 @@ use wire::Outbox;
 use wire::frame::Receiver;
 use wire::request::Request;
 
-/// Operator's and host's end of the loop.
+/// The loop's interface to operator and host.
 #[derive(Clone, Debug)]
 pub struct Desk {
     operator: Operator,
-    /// Sees the operator's `disarm` among frames.
+    /// Detects the operator's `disarm` among frames.
     emergency: Console,
     receiver: Receiver,
-    /// Samples since the last byte of frames; at the link's time there are none.
+    /// Samples since the last byte of a frame; after the link's timeout the line is the operator's.
     since_frames: u32,
     service: Service,
 }
 
 impl Desk {
-    /// Nobody there.
+    /// Initial state without a host.
     #[must_use]
     pub fn new(board: Board) -> Self {
         let service = Service::new(board);
@@ -41,13 +41,13 @@ impl Desk {
         }
     }
 
-    /// Before a sample: where the command that is played wants the valve.
+    /// Before a sample: sets the valve position of the command being played.
     #[inline]
     pub fn before<L: Law>(&mut self, controller: &mut Controller<L>, outbox: &mut Outbox) {
         self.service.before(controller, outbox);
     }
 
-    /// After a sample, before what has been received meanwhile: streams it, and looks whether the host is still there.
+    /// After a sample: streams it, and checks whether the host is still there.
     pub fn after<L: Law>(
         &mut self,
         tick: &Tick,
@@ -58,12 +58,12 @@ impl Desk {
         if self.frames_come() {
             self.since_frames += 1;
         } else if let Some(line) = self.operator.report(controller) {
-            // What finds no room is of the past by the time there is some.
+            // Dropped if there is no room: it would be outdated.
             let _ = outbox.offer(line.bytes());
         }
     }
 
-    /// Whether the line speaks frames now.
+    /// Whether the line currently carries frames.
     #[must_use]
     pub fn frames_come(&self) -> bool {
         self.since_frames < self.service.lost_after()
@@ -92,7 +92,7 @@ impl Desk {
                 let request = Request::read(content);
                 let reply = request.and_then(|r| self.service.serve(&r, controller, outbox));
                 if let Some(reply) = reply {
-                    // An answer that finds no room is asked for again.
+                    // If there is no room, the host asks again.
                     let _ = outbox.offer(reply.frame().bytes());
                 }
             }

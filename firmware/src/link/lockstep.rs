@@ -16,18 +16,18 @@
 use heapless::Vec;
 use wire::frame::{CONTENT, Frame, Receiver};
 
-/// Begins a case from rest.
+/// Starts a case from rest.
 pub const START: u8 = 1;
 /// Runs steps.
 pub const STEPS: u8 = 2;
-/// Asks for measurements.
+/// Requests the measurements.
 pub const REPORT: u8 = 3;
 /// A frame could not be understood.
 pub const DAMAGED: u8 = 0x7F;
 /// Most steps in a request.
 pub const BATCH: usize = 32;
 
-/// What was measured in a case.
+/// Measurements of a case.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Report {
     /// Steps made.
@@ -44,7 +44,7 @@ impl Report {
     /// Bytes on the wire.
     pub const SIZE: usize = 20;
 
-    /// For the wire.
+    /// In wire format.
     #[must_use]
     pub fn to_bytes(self) -> [u8; Self::SIZE] {
         let mut bytes = [0; Self::SIZE];
@@ -61,7 +61,7 @@ impl Report {
         bytes
     }
 
-    /// From the wire.
+    /// From wire format.
     #[must_use]
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let (steps, rest) = bytes.split_first_chunk::<4>()?;
@@ -77,14 +77,13 @@ impl Report {
     }
 }
 
-/// What the board can run in lockstep.
+/// The lockstep cases of a board.
 pub trait Cases {
-    /// Begins a case from rest; `false` if there is none of that number.
+    /// Starts a case from rest; `false` if the number is invalid.
     fn start(&mut self, case: u8) -> bool;
-    /// One step with the counts of sensor and measured channel: what was
-    /// predicted, and whether the valve is to be open.
+    /// One step with the counts of sensor and measured channel: the prediction, and the valve position.
     fn step(&mut self, counts: u16, channel: u16) -> (f32, bool);
-    /// What was measured since the start of the case.
+    /// Measurements since the start of the case.
     fn report(&mut self) -> Report;
 }
 
@@ -99,7 +98,7 @@ pub struct Server<C> {
 }
 
 impl<C: Cases> Server<C> {
-    /// Waits for requests.
+    /// Initial state.
     pub fn new(cases: C) -> Self {
         Self {
             cases,
@@ -110,7 +109,7 @@ impl<C: Cases> Server<C> {
         }
     }
 
-    /// Takes a byte; the bytes that are to be sent back, usually none.
+    /// Takes a byte; returns the bytes to send, usually none.
     pub fn receive(&mut self, byte: u8) -> &[u8] {
         let Some(result) = self.receiver.receive(byte) else {
             return &[];
@@ -120,7 +119,7 @@ impl<C: Cases> Server<C> {
             Some((*kind, u16::from_le_bytes([*low, *high]), rest))
         });
         let Some((kind, number, rest)) = request else {
-            // The last reply is kept: its request may be on its way again.
+            // The last reply is kept: its request may be repeated.
             return self.damaged.bytes();
         };
         if self.answered == Some((kind, number)) {
@@ -138,7 +137,7 @@ impl<C: Cases> Server<C> {
                     [low, high] => u16::from_le_bytes([*low, *high]),
                     _ => 0,
                 });
-                // The same for the whole batch: what is measured besides is slow.
+                // Constant over the batch, because channels are slow.
                 let channel = counts.next().unwrap_or(0);
                 for (i, counts) in counts.take(BATCH).enumerate() {
                     let (predicted, open) = self.cases.step(counts, channel);
@@ -184,7 +183,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// Counts what it is told, so that a step too many or too few shows.
+    /// Counts its inputs, so that a missing or repeated step is detected.
     struct Counter {
         sum: f32,
         steps: u32,
@@ -247,7 +246,7 @@ mod tests {
     #[test]
     fn a_lost_byte_is_reported_and_the_request_can_be_repeated() {
         let batch = [STEPS, 3, 0, 1, 0, 10, 0, 20, 0, 0, 1];
-        // The zero before a frame may be lost, the one after it not.
+        // The zero before a frame may be lost, but not the one after it.
         for lost in 1..Frame::new(&batch).bytes().len() - 1 {
             let mut server = Server::new(Counter { sum: 0.0, steps: 0 });
             let reply = ask(&mut server, &batch, Some(lost));

@@ -15,10 +15,10 @@ use wire::reply::{Answer, Info, PROTOCOL, Phase, Reply, Scale, Status, lost_afte
 use wire::request::{Ask, Request};
 use wire::samples::{self, Batch, FULL, Sample};
 
-/// No sample of the stream waits longer for its frame, ms.
+/// Longest waiting time of a sample before its frame is sent, ms.
 const STREAMED_MS: u32 = 100;
 
-/// What the board is, for [`Info`].
+/// Properties of the board, for [`Info`].
 #[derive(Clone, Copy, Debug)]
 pub struct Board {
     /// Sample period, µs.
@@ -27,13 +27,13 @@ pub struct Board {
     pub model: u32,
 }
 
-/// The host that has the board.
+/// The connected host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Session {
     name: u32,
-    /// Samples since it was heard.
+    /// Samples since its last message.
     silent: u32,
-    /// The last request that was carried out, and what came of it.
+    /// The last executed request, with its result.
     answered: Option<(u16, Done)>,
     streams: bool,
 }
@@ -45,13 +45,13 @@ struct Done {
     samples: u64,
 }
 
-/// The board's side of the dialogue.
+/// The board's side of the protocol.
 #[derive(Clone, Debug)]
 pub struct Service {
     board: Board,
-    /// Samples after which a silent host is lost.
+    /// Samples after which a silent host counts as lost.
     lost_after: u32,
-    /// Samples of a frame of the stream: as many as it takes, or fewer that are a tenth of a second.
+    /// Samples per frame of the stream: the largest number, limited to a tenth of a second.
     streamed: usize,
     session: Option<Session>,
     player: Player,
@@ -62,7 +62,7 @@ pub struct Service {
 }
 
 impl Service {
-    /// No host.
+    /// Initial state without a host.
     #[must_use]
     pub fn new(board: Board) -> Self {
         Self {
@@ -77,18 +77,18 @@ impl Service {
         }
     }
 
-    /// Samples after which a silent host is lost.
+    /// Samples after which a silent host counts as lost.
     #[must_use]
     pub fn lost_after(&self) -> u32 {
         self.lost_after
     }
 
-    /// Takes note of a damaged frame.
+    /// Counts a damaged frame.
     pub fn damaged(&mut self) {
         self.damaged = self.damaged.wrapping_add(1);
     }
 
-    /// Before a sample: where the command that is played wants the valve.
+    /// Before a sample: sets the valve position of the command being played.
     #[inline]
     pub fn before<L: Law>(&mut self, controller: &mut Controller<L>, outbox: &mut Outbox) {
         if controller.mode() == Mode::Playing {
@@ -99,7 +99,7 @@ impl Service {
         }
     }
 
-    /// After a sample: streams it, and looks whether the host is still there.
+    /// After a sample: streams it, and checks whether the host is still there.
     #[inline]
     pub fn after<L: Law>(
         &mut self,
@@ -128,7 +128,7 @@ impl Service {
 
     #[inline(never)]
     fn stream<L: Law>(&mut self, tick: &Tick, controller: &Controller<L>, outbox: &mut Outbox) {
-        // While the valve rests before a command nothing counts yet.
+        // During the rest before a command no sample counts.
         if tick.mode == Mode::Playing && self.player.waits() {
             return;
         }
@@ -149,14 +149,14 @@ impl Service {
         }
         self.batch.push(&sample, phase, controller.reference());
         if let Mode::Faulted(_) = tick.mode {
-            // What shut the valve is told at once.
+            // A closed valve is reported immediately.
             self.end_stream(phase, outbox);
         } else if self.batch.is_full() || self.batch.count() >= self.streamed {
             self.batch.end(false, |bytes| outbox.offer(bytes));
         }
     }
 
-    /// Sends what is left and that it was the last.
+    /// Sends the remaining samples, marked as the last.
     #[inline(never)]
     fn end_stream(&mut self, phase: Phase, outbox: &mut Outbox) {
         if let Some(session) = &mut self.session
@@ -168,7 +168,7 @@ impl Service {
         }
     }
 
-    /// Shuts the valve; a command that is played ends, and its stream.
+    /// Closes the valve; ends a command being played and its stream.
     #[inline(never)]
     pub fn disarm<L: Law>(&mut self, controller: &mut Controller<L>, outbox: &mut Outbox) {
         let played = controller.mode() == Mode::Playing;
@@ -178,7 +178,7 @@ impl Service {
         }
     }
 
-    /// Carries a request out; what to answer, if anything.
+    /// Executes a request; returns the answer, if any.
     #[inline(never)]
     pub fn serve<L: Law>(
         &mut self,
@@ -201,7 +201,7 @@ impl Service {
                 });
             }
             Ask::Alive => return None,
-            // Everybody may shut the valve.
+            // Any host may disarm.
             Ask::Load { .. } | Ask::Play { .. } | Ask::Stream | Ask::Arm
                 if self.session.is_some() && !known =>
             {
@@ -236,7 +236,7 @@ impl Service {
     ) -> Done {
         let result = match request.ask {
             Ask::Hello | Ask::Alive => Ok(()),
-            // What is being played stays as it was checked.
+            // A command must not change while it is played.
             Ask::Load { .. } if controller.mode() == Mode::Playing => not_disarmed(controller),
             Ask::Load { at, runs } => self.player.load(at, runs.iter()),
             Ask::Play {
@@ -268,7 +268,7 @@ impl Service {
             samples: controller.samples(),
         };
         let session = match &mut self.session {
-            // Somebody else's disarm.
+            // A disarm by another host.
             Some(session) if session.name != request.session => return done,
             Some(session) => session,
             none => none.insert(Session {
@@ -339,7 +339,7 @@ fn not_disarmed<L: Law>(controller: &Controller<L>) -> Result<(), Refusal> {
     ))
 }
 
-/// Checksum of what the board was told of the rig.
+/// Checksum of the rig's constants.
 fn rig_checksum(info: &Info) -> u32 {
     [
         info.sensor.zero.to_bits(),
@@ -375,7 +375,7 @@ const fn number(text: &str) -> u8 {
     value
 }
 
-/// The mode for the wire.
+/// The mode in wire format.
 fn phase(mode: Mode) -> Phase {
     match mode {
         Mode::Disarmed => Phase::Disarmed,
@@ -388,10 +388,10 @@ fn phase(mode: Mode) -> Phase {
     }
 }
 
-/// A reading as the converter gave it; no number is full scale.
+/// A reading in converter counts; a non-finite one becomes full scale.
 fn twelve_bits(counts: f32) -> u16 {
     if counts.is_finite() {
-        // Saturates below 0.
+        // Negative values saturate at 0.
         (counts as u16).min(FULL)
     } else {
         FULL

@@ -2,21 +2,21 @@
 
 use super::Residuals;
 
-/// Correlation coefficients at lags that ascend in equal steps, with the band that holds 95 % of them if the hypothesis
-/// (white residuals; residuals independent of the command) is true.
+/// Correlation coefficients at equally spaced lags, with the 95 % band under the null hypothesis (white
+/// residuals; residuals independent of the command).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Correlation {
     /// Lag, s, and correlation coefficient, −1 to 1.
     pub points: Vec<(f64, f64)>,
     /// Half width of the 95 % band.
     pub band: f64,
-    /// Share of the lags (lag 0 of the autocorrelation excepted) outside the band, 0 to 1.
+    /// Share of the lags (except lag 0 of the autocorrelation) outside the band, 0 to 1.
     pub outside: f64,
 }
 
-/// Samples that are used at most; more change no digit that is drawn.
+/// Largest number of samples used; more make no visible difference.
 const MOST_SAMPLES: usize = 100_000;
-/// Lags at most.
+/// Largest number of lags.
 const MOST_LAGS: usize = 250;
 /// 97.5 % quantile of the normal distribution.
 const QUANTILE: f64 = 1.96;
@@ -86,7 +86,7 @@ fn judged(points: Vec<(f64, f64)>, band: f64, skip_zero: bool) -> Correlation {
     }
 }
 
-/// Takes the mean over all records off each.
+/// Subtracts the mean over all records.
 fn centre(records: &mut [Vec<f64>]) {
     let n: usize = records.iter().map(Vec::len).sum();
     let mean = records.iter().flatten().sum::<f64>() / n.max(1) as f64;
@@ -106,7 +106,7 @@ fn product(a: &[Vec<f64>], b: &[Vec<f64>], lag: usize) -> f64 {
 mod tests {
     use super::*;
 
-    /// Numbers that are white enough, the same on every machine.
+    /// Approximately white numbers, equal on every machine.
     fn white(seed: u64, n: usize) -> Vec<f64> {
         let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
         let mut uniform = || {

@@ -27,7 +27,7 @@ pub struct Residuals {
 }
 
 impl Residuals {
-    /// The residuals of `runs`, one free run for each of `records`; runs of another length are passed over.
+    /// The residuals of `runs`, one free run for each of `records`; runs of another length are ignored.
     #[must_use]
     pub fn of(records: &[Record], runs: &[Vec<f64>]) -> Self {
         let validate = records.iter().any(|r| r.role == Use::Validate);

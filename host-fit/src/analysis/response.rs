@@ -20,7 +20,7 @@ pub struct Pole {
     pub command: u8,
     /// Modulus per sample; below 1 for a stable model.
     pub modulus: f64,
-    /// Time in which its motion falls to 1/e, s.
+    /// Time in which its mode decays to 1/e, s.
     pub time_constant_s: f64,
     /// Frequency of its oscillation, Hz; 0 for a real pole.
     pub hz: f64,
@@ -28,7 +28,7 @@ pub struct Pole {
     pub damping: f64,
 }
 
-/// Time constants that a response is drawn for.
+/// Length of a response in time constants.
 const REACH: f64 = 6.0;
 /// Longest response, samples.
 const LONGEST: usize = 20_000;
@@ -65,8 +65,8 @@ pub fn step_response(model: &Model) -> Option<StepResponse> {
     })
 }
 
-/// The `most` slowest poles with the command at 0 and at 1, one of each conjugate pair. Effects are not in them: they are
-/// poles of the bilinear recursion alone. None where the recursion is too long for an eigenvalue iteration.
+/// The `most` slowest poles with the command at 0 and at 1, one of each conjugate pair; poles of the bilinear
+/// recursion without effects. None if the recursion is too long for an eigenvalue iteration.
 #[must_use]
 pub fn poles(model: &Model, most: usize) -> Vec<Pole> {
     let at = |command: u8| {

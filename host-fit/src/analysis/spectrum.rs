@@ -9,11 +9,11 @@ use std::f64::consts::TAU;
 pub struct Spectrum {
     /// Frequencies, Hz.
     pub hz: Vec<f64>,
-    /// Of the residual y − ŷ.
+    /// Spectrum of the residual y − ŷ.
     pub residual: Vec<f64>,
-    /// Of the measured output about its mean.
+    /// Spectrum of the measured output about its mean.
     pub output: Vec<f64>,
-    /// Of white noise with the standard error `y_sd`; none without it.
+    /// Spectrum of white noise with the standard error `y_sd`; none without it.
     pub noise: Option<f64>,
 }
 
@@ -58,7 +58,7 @@ pub fn spectrum(residuals: &Residuals) -> Spectrum {
             }
         }
         let scale = 2.0 * residuals.period_s / (weight * f64::max(segments, 1.0));
-        // The mean is no frequency.
+        // The mean (frequency 0) is left out.
         sum.into_iter().skip(1).map(|s| s * scale).collect()
     };
     let finest = 1.0 / (length as f64 * residuals.period_s);

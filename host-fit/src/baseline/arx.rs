@@ -7,7 +7,7 @@ use crate::data::Record;
 use crate::linalg::Cholesky;
 use serde::Serialize;
 
-/// Delays that are tried at first, beside those near a known dead time.
+/// Delays that are tried first, beside those near a known dead time.
 const DELAYS: usize = 24;
 
 /// An ARX(2,2) model: y_k = a₁·y_{k−1} + a₂·y_{k−2} + b₁·u_{k−nk} + b₂·u_{k−nk−1} + c.
@@ -19,11 +19,11 @@ pub struct Arx {
     pub b: [f64; 2],
     /// c, in y.
     pub c: f64,
-    /// nk, samples; 0 means that y_k answers u_k, 1 that it answers u_{k−1}.
+    /// nk, samples; 0 if y_k depends on u_k, 1 if it depends on u_{k−1}.
     pub delay: usize,
 }
 
-/// A complex number's logarithm: rate and angle a sample of a pole.
+/// Complex logarithm of a pole: decay rate and angle per sample.
 fn logarithms(a: [f64; 2]) -> Option<[(f64, f64); 2]> {
     let [a1, a2] = a;
     let inside = a1 * a1 / 4.0 + a2;
@@ -63,7 +63,7 @@ impl Arx {
         numbers.iter().all(|number| number.is_finite()) && self.largest_pole() < 1.0
     }
 
-    /// The free run over `u`, before which it was `first`, begun as `y` begins.
+    /// The free run over `u`, with `first` before it and the initial state estimated from `y`.
     fn run(&self, u: &[f64], first: f64, y: &[f64]) -> Vec<f64> {
         let at = |k: usize, lag: usize| {
             let index = k.checked_sub(lag);
@@ -87,7 +87,7 @@ impl Arx {
         InitialState::new(self.free(u.len()), u.len(), fastest).added_to(&out, y)
     }
 
-    /// What a unit in each of the two values before the record does.
+    /// Free responses to a unit in each of the two values before the record.
     fn free(&self, samples: usize) -> Vec<Vec<f64>> {
         let column = |mut last: f64, mut before: f64| {
             let mut out = Vec::new();
@@ -98,7 +98,7 @@ impl Arx {
             }
             out
         };
-        // Both alike, and their difference: nearly orthogonal where samples are dense.
+        // Sum and difference: nearly orthogonal at a high sampling rate.
         vec![column(1.0, 1.0), column(0.5, -0.5)]
     }
 
@@ -109,7 +109,7 @@ impl Arx {
         run.iter().all(|y| y.is_finite()).then_some(run)
     }
 
-    /// The same model of y and u as they were before they were scaled.
+    /// The same model in the unscaled units of y and u.
     fn unscaled(&self, scaling: &Scaling) -> Self {
         let per_u = scaling.y_scale / scaling.u_scale;
         let b = self.b.map(|b| b * per_u);
@@ -140,7 +140,8 @@ fn least_squares(series: &[Series], delay: usize) -> Option<Arx> {
         for (k, y) in stretch.y.windows(3).enumerate().skip(judged) {
             let &[before, last, now] = y else { continue };
             let (new, old) = (at(k + 2, delay), at(k + 2, delay + 1));
-            // Differences, as neighbouring samples are nearly equal; y against the last y for the same reason.
+            // Differences, because neighbouring samples are nearly equal; y relative to the last y for the
+            // same reason.
             let row = [last, last - before, new, new - old, 1.0, now - last];
             for i in 0..N {
                 for j in 0..=i {
@@ -194,8 +195,8 @@ pub(super) fn of_delay(series: &[Series], scaling: &Scaling, delay: usize) -> Op
     Some(least_squares(series, delay)?.unscaled(scaling))
 }
 
-/// The stable ARX(2,2) whose free run over the scaled records has the least error, over the delays; `near` are dead
-/// times, in samples, to look at closely. `None` if no delay gives a stable one.
+/// The stable ARX(2,2) with the least free-run error on the scaled records over all delays; `near` are dead
+/// times, in samples, around which every delay is tried. `None` if no delay gives a stable one.
 pub(super) fn fit(
     series: &[Series],
     scaling: &Scaling,
@@ -223,7 +224,7 @@ pub(super) fn fit(
     delays.dedup();
     let less = |a: &(f64, Arx), b: &(f64, Arx)| a.0.total_cmp(&b.0);
     let mut best = delays.into_iter().filter_map(cost).min_by(less)?;
-    // Downhill from sample to sample.
+    // Descends from sample to sample.
     for _ in 0..longest_delay.min(40) {
         let here = best.1.delay;
         let beside = [

@@ -1,4 +1,4 @@
-//! The initial state of a free run, from the beginning of the record.
+//! The initial state of a free run, estimated from the start of the record.
 
 use crate::linalg::dot;
 use std::ops::Range;
@@ -16,7 +16,7 @@ const LONGEST: f64 = 0.25;
 /// from where commands before the record are answered.
 #[derive(Clone, Debug)]
 pub(super) struct InitialState {
-    /// Orthonormal over the beginning.
+    /// Free responses, orthonormal over the start of the record.
     columns: Vec<Vec<f64>>,
     beginning: Range<usize>,
 }
@@ -44,7 +44,7 @@ impl InitialState {
         known: Range<usize>,
     ) -> Self {
         let mut beginning = FEWEST.max((SHARE * samples as f64) as usize);
-        // Doubled, so that it does not change with every change of the time constant.
+        // Doubled, so that it does not vary with small changes of the time constant.
         while (beginning as f64) < (LONGEST * samples as f64).min(2.0 * fastest) {
             beginning *= 2;
         }
@@ -74,7 +74,7 @@ impl InitialState {
         inner(&a[from..both], &b[from..both])
     }
 
-    /// Takes out of `values` what the initial state explains that fits their beginning best.
+    /// Subtracts from `values` the free response that fits their start best.
     pub(super) fn remove_from(&self, values: &mut [f64]) {
         let share = |column: &Vec<f64>| self.over_the_beginning(column, values);
         let shares: Vec<f64> = self.columns.iter().map(share).collect();
@@ -85,7 +85,7 @@ impl InitialState {
         }
     }
 
-    /// `run` with the initial state that brings its beginning nearest to `y`.
+    /// `run` plus the free response that fits the start of `y` best.
     pub(super) fn added_to(&self, run: &[f64], y: &[f64]) -> Vec<f64> {
         let mut errors: Vec<f64> = y.iter().zip(run).map(|(y, run)| y - run).collect();
         self.remove_from(&mut errors);
@@ -108,7 +108,7 @@ mod tests {
         let initial = InitialState::new(free, 300, 10.0);
         let run = initial.added_to(&[0.0; 300], &y);
         assert!(run.iter().zip(&y).all(|(run, y)| (run - y).abs() < 1e-9));
-        // Of what comes after the beginning nothing is used.
+        // Later samples do not influence the estimate.
         let mut late = y.clone();
         late[100..].iter_mut().for_each(|y| *y = 7.0);
         let other = initial.added_to(&[0.0; 300], &late);

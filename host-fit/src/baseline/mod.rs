@@ -1,18 +1,4 @@
-//! Baselines: what three usual linear models reach on the same records, beside every model of ours.
-//!
-//! | baseline | equation |
-//! |---|---|
-//! | first order with dead time (FOPDT) | T·y′ + y = level + gain·u(t − θ) |
-//! | second order with dead time (SOPDT) | y″/ω² + 2ζ·y′/ω + y = level + gain·u(t − θ) |
-//! | ARX(2,2) | y_k = a₁·y_{k−1} + a₂·y_{k−2} + b₁·u_{k−nk} + b₂·u_{k−nk−1} + c |
-//!
-//! The first two are fitted to the simulation error (free run), ARX by plain least squares with the delay nk of least
-//! simulation error. u before a record is what the record states, or its first value. The initial state of a record is
-//! a nuisance: it comes from the beginning of the record, while fitting as in every free run.
-//!
-//! Time constants and dead time start from a scan on thinned-out records and descend on all samples; level, gain and
-//! initial states are solved for in closed form at each step (variable projection: Golub and Pereyra, SIAM J. Numer.
-//! Anal. 10, 1973).
+//! Baselines: three standard linear models fitted to the same records, for comparison.
 
 mod arx;
 mod initial;
@@ -57,7 +43,7 @@ pub struct BaselineFits {
 }
 
 impl Baselines {
-    /// Fits all three to `learning`. None of them exists where u or y never changes, or no record has 8 samples.
+    /// Fits all three to `learning`. All are none if u or y is constant, or no record has 8 samples.
     #[must_use]
     pub fn fit(learning: &[&Record]) -> Self {
         let long: Vec<&Record> = learning
@@ -129,7 +115,7 @@ impl Baselines {
 }
 
 impl BaselineFits {
-    /// The largest of the three, and the name of its baseline.
+    /// The highest FIT and the name of its baseline.
     #[must_use]
     pub fn best(&self) -> Option<(&'static str, f64)> {
         let all = [

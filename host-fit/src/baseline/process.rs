@@ -14,7 +14,7 @@ const SLOWEST: f64 = 30.0;
 /// Starts from which a descent is made.
 const DESCENTS: usize = 3;
 
-/// A time constant that a sampled response does not show, samples.
+/// Time constants below this are not visible in a sampled response, samples.
 const NO_TIME: f64 = 0.05;
 
 /// T·y′ + y = level + gain·u(t − dead time).
@@ -26,7 +26,8 @@ pub struct FirstOrder {
     pub level: f64,
     /// T, s.
     pub time_constant_s: f64,
-    /// Dead time, s, ≥ 0, beside the one sample that a sampled command takes: 0 means that y_{k+1} answers u_k.
+    /// Dead time, s, ≥ 0, in addition to the one sample of a sampled command: 0 means that y_{k+1} depends on
+    /// u_k.
     pub dead_time_s: f64,
 }
 
@@ -63,7 +64,7 @@ pub struct Recursion {
 impl Recursion {
     fn of(shape: Shape, dead_time: f64, level: f64, gain: f64) -> Self {
         let (a, mut b, delay) = Response::new(shape, dead_time).recursion();
-        // A dead time of whole samples has an input less.
+        // A whole-sample dead time has one input fewer.
         while b.len() > 1 && b.last() == Some(&0.0) {
             b.pop();
         }
@@ -86,7 +87,7 @@ pub(super) fn fit(series: &[Series], longest_dead_time: usize) -> (Option<Fitted
     };
     let starts = starts(series, longest_dead_time);
     let first = refiner.best(&starts.first, DESCENTS);
-    // A second order holds the first order as a limit, and is at least as good.
+    // A second order contains the first order as a limit, and fits at least as well.
     let mut limits = Vec::new();
     if let Some(Fitted { at, .. }) = first
         && let Shape::First { time_constant } = at.shape
@@ -116,7 +117,7 @@ fn static_part(fitted: &Fitted, scaling: &Scaling) -> (f64, f64) {
 /// The free run of a process over a record.
 fn run(shape: Shape, dead_time: f64, level: f64, gain: f64, record: &Record) -> Option<Vec<f64>> {
     let response = Response::new(shape, dead_time);
-    // Around the mean, so that a response that fades does not fade into denormal numbers.
+    // Computed about the mean, to avoid denormal numbers in a decaying response.
     let mean = record.u.iter().sum::<f64>() / record.len().max(1) as f64;
     let around: Vec<f64> = record.u.iter().map(|u| u - mean).collect();
     let before = command_before(record) - mean;
@@ -152,7 +153,7 @@ impl FirstOrder {
         (Shape::First { time_constant }, self.dead_time_s / period_s)
     }
 
-    /// The free run over a record, begun as its y begins; `None` if it does not stay finite.
+    /// The free run over a record with the initial state estimated from y; `None` if it does not stay finite.
     #[must_use]
     pub fn simulate(&self, record: &Record) -> Option<Vec<f64>> {
         let (shape, dead_time) = self.sampled(record.sample_period_s);
@@ -193,7 +194,7 @@ impl SecondOrder {
         (shape, self.dead_time_s / period_s)
     }
 
-    /// The free run over a record, begun as its y begins; `None` if it does not stay finite.
+    /// The free run over a record with the initial state estimated from y; `None` if it does not stay finite.
     #[must_use]
     pub fn simulate(&self, record: &Record) -> Option<Vec<f64>> {
         let (shape, dead_time) = self.sampled(record.sample_period_s);

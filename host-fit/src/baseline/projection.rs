@@ -16,7 +16,7 @@ pub(super) struct Gram {
     y_y: f64,
 }
 
-/// What level and gain give.
+/// Level and gain with the remaining cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Projection {
     /// Sum of squared errors.
@@ -25,7 +25,7 @@ pub(super) struct Projection {
     pub(super) gain: f64,
 }
 
-/// The columns 1 and y of a stretch without what an initial state explains of them.
+/// The columns 1 and y of an interval after projection on the orthogonal complement of the free responses.
 #[derive(Clone, Debug)]
 pub(super) struct Stretch {
     initial: InitialState,
@@ -37,7 +37,7 @@ pub(super) struct Stretch {
 }
 
 impl Stretch {
-    /// Of the judged samples `y` of a process.
+    /// For the scored samples `y` of a process.
     pub(super) fn new(response: &Response, y: &[f64]) -> Self {
         let free = response.free(y.len());
         let initial = InitialState::new(free, y.len(), response.fastest());

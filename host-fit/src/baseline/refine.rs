@@ -1,5 +1,5 @@
-//! Time constants and dead time from a start to the least squares of the free run: Gauss–Newton steps, damped, on the
-//! errors that level, gain and initial states leave.
+//! Damped Gauss–Newton refinement of time constants and dead time on the free-run error, with level, gain and
+//! initial states eliminated.
 
 use super::projection::{Projection, project};
 use super::response::{Response, Shape};
@@ -23,12 +23,12 @@ pub(super) struct Fitted {
     pub(super) projection: Projection,
 }
 
-/// Records to fit on, and the bounds of a sensible process.
+/// Records to fit, and bounds of the process.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Refiner<'a> {
     pub(super) series: &'a [Series],
     pub(super) longest_dead_time: f64,
-    /// Of a time constant, samples.
+    /// Largest time constant, samples.
     pub(super) slowest: f64,
 }
 
@@ -152,8 +152,8 @@ impl Refiner<'_> {
         false
     }
 
-    /// The best of several descents. The cost has kinks where the dead time passes a sample, at which a descent can
-    /// end too early: neighbouring dead times are tried, and the descent goes on from a better one.
+    /// The best of several descents. The cost has kinks where the dead time passes a sample, at which a
+    /// descent may stop too early: neighbouring dead times are tried as new starts.
     pub(super) fn best(&self, starts: &[Start], descents: usize) -> Option<Fitted> {
         let by_cost = |a: &Fitted, b: &Fitted| a.projection.cost.total_cmp(&b.projection.cost);
         let mut judged: Vec<Fitted> = starts.iter().map(|start| self.judge(*start)).collect();

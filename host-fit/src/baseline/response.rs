@@ -100,12 +100,13 @@ impl Response {
         }
     }
 
-    /// Its fastest time, samples: what an initial slope takes to fade, or a radian of a swing.
+    /// Its fastest time scale, samples: the decay time of an initial slope, or the time of one radian of an
+    /// oscillation.
     pub(super) fn fastest(&self) -> f64 {
         self.fastest
     }
 
-    /// The response to `u`, in steady state at `first`, the command before it, when the record begins.
+    /// The response to `u`, starting in steady state at `first`, the command before it.
     pub(super) fn forced(&self, u: &[f64], first: f64) -> Vec<f64> {
         let at = |k: usize, lag: usize| {
             let index = k.checked_sub(lag);
@@ -166,7 +167,7 @@ impl Response {
 impl Shape {
     fn fastest(self) -> f64 {
         match self {
-            // Its state is a value alone, which a few samples tell.
+            // The only state is a value, which a few samples determine.
             Self::First { .. } => 0.0,
             Self::Second { frequency, damping } => {
                 1.0 / (frequency * (damping + (damping * damping - 1.0).max(0.0).sqrt()).max(1.0))

@@ -18,7 +18,7 @@ pub(super) struct Series {
     pub(super) y: Vec<f64>,
     /// The command before the first sample.
     pub(super) before: f64,
-    /// Samples at the front that are run for the sake of their commands and not judged.
+    /// Unscored samples at the front.
     pub(super) lead: usize,
 }
 
@@ -27,12 +27,12 @@ fn mean_and_scale(values: impl Iterator<Item = f64> + Clone) -> Option<(f64, f64
     let mean = values.clone().map(|v| v / count).sum::<f64>();
     let variance = values.map(|v| (v - mean).powi(2) / count).sum::<f64>();
     let scale = variance.sqrt();
-    // Rounding of a constant is no scatter.
+    // Rounding errors of a constant are no variation.
     (scale.is_finite() && scale > 1e-12 * mean.abs() && scale > 0.0).then_some((mean, scale))
 }
 
 impl Scaling {
-    /// `None` where u or y never changes.
+    /// `None` if u or y is constant.
     pub(super) fn of(records: &[&Record]) -> Option<Self> {
         let (u_mean, u_scale) = mean_and_scale(records.iter().flat_map(|r| r.u.iter().copied()))?;
         let (y_mean, y_scale) = mean_and_scale(records.iter().flat_map(|r| r.y.iter().copied()))?;
@@ -91,7 +91,7 @@ impl Series {
         }
     }
 
-    /// The stretch of `samples` in which u varies most, behind as much of what came before it as there is, up to `lead`.
+    /// The interval of `samples` with the largest variation of u, with up to `lead` samples before it.
     pub(super) fn liveliest(&self, samples: usize, lead: usize) -> Self {
         if self.len() <= samples {
             return self.clone();

@@ -1,14 +1,14 @@
-//! Where the fits begin: a scan over time constants and dead times on thinned-out records, on every time scale
-//! between the sample and the record.
+//! Starting points of the fits: a scan over time constants and dead times on decimated records, on every time
+//! scale between sample and record.
 
 use super::arx;
 use super::projection::{Gram, Stretch};
 use super::response::{Response, Shape};
 use super::series::Series;
 
-/// Thinned samples of a scan, all records together.
+/// Decimated samples per scan, all records together.
 const BUDGET: usize = 4000;
-/// Most records that a scan looks at.
+/// Largest number of records in a scan.
 const RECORDS: usize = 20;
 /// Dead times of a scan, thinned samples.
 const DEAD_TIMES: usize = 150;

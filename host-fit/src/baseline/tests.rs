@@ -187,8 +187,8 @@ fn scale_level_and_clock_change_nothing_but_the_numbers() {
     near(other.gain, 2.5 / 3.0 * first.gain, 1e-3);
 }
 
-/// A record cut where a command is on its way: what it is told of the command before is used, and samples that only
-/// lead up are not judged.
+/// A record cut while a command is in the dead time: the stated command before the record is used, and the
+/// lead is not scored.
 #[test]
 fn the_command_before_a_record_and_its_lead_are_used() {
     let u: Vec<f64> = (0..600)
@@ -216,7 +216,7 @@ fn the_command_before_a_record_and_its_lead_are_used() {
         "{right} {}",
         fit(&part)
     );
-    // Wrong where nobody looks.
+    // Wrong values in unscored samples have no influence.
     let mut spoilt = whole.clone();
     spoilt.y[..90].iter_mut().for_each(|y| *y = -50.0);
     spoilt.lead = 90;
@@ -287,7 +287,7 @@ fn read(path: &Path) -> Record {
     set.records.into_iter().next().expect("one record")
 }
 
-/// FIT in percent of what was fitted to `learned`, on the records `judged`.
+/// FIT in percent on the records `judged`, after fitting to `learned`.
 fn fits(learned: &[&Record], judged: &[&Record]) -> (Baselines, BaselineFits) {
     let found = Baselines::fit(learned);
     let fits = found.fit_percent(&all(judged));
@@ -339,7 +339,7 @@ fn records_of_strangers_have_the_published_fits() {
     near(at_21.dead_time_s, at_0.dead_time_s, 1e-2);
 }
 
-/// Free-run FIT of ARX(2,2) with nk = 1, fitted to one record and judged on another.
+/// Free-run FIT of ARX(2,2) with nk = 1, estimated on one record and validated on another.
 fn arx_of_delay_one(train: &Record, test: &Record) -> Option<f64> {
     let scaling = Scaling::of(&[train])?;
     let arx = arx::of_delay(&[scaling.scaled(train)], &scaling, 1)?;

@@ -16,22 +16,22 @@ pub(crate) struct Args {
     /// Raw recordings; each repeats one command sequence.
     #[arg(required = true, value_name = "RAW.csv")]
     recordings: Vec<PathBuf>,
-    /// Length of one repeat of the command sequence, in seconds.
+    /// Length of one repeat of the command sequence, s.
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     period: f64,
     /// Folder for the data set (dataset.toml and one CSV per recording).
     #[arg(long, value_name = "DIR", value_hint = clap::ValueHint::DirPath)]
     out: PathBuf,
-    /// Time after the first row at which the first period starts; best while the flow is at rest.
+    /// Time after the first row at which the first period starts, s; best while the flow is at rest.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = not_negative)]
     start: f64,
     /// Align repeats on the command's rising edges, or on whole periods of the recording's clock.
     #[arg(long, value_enum, default_value_t = Alignment::Edges)]
     align: Alignment,
-    /// Samples by which an edge may be off between repeats.
+    /// Largest difference of an edge between repeats, samples.
     #[arg(long, value_name = "SAMPLES", default_value_t = 1)]
     edge_jitter: usize,
-    /// Name of a recording (file name without .csv) to hold out for validation; repeatable.
+    /// Name of a recording (file name without .csv) that becomes a validation record; repeatable.
     #[arg(long, value_name = "NAME")]
     validate: Vec<String>,
     /// Title of the data set.

@@ -28,15 +28,15 @@ pub(crate) struct Args {
     /// The language.
     #[arg(long, value_enum, default_value_t = Lang::Rust)]
     lang: Lang,
-    /// The numbers of C: single (float) or double.
+    /// Precision of the numbers in C.
     #[arg(long, value_enum, default_value_t = Numbers::Single)]
     precision: Numbers,
-    /// Refuse what the boards of this project cannot run: a model without a law, with more
-    /// than one measured channel, or too large.
+    /// Refuse a model that the boards of this project cannot run: without a law, with more than one measured
+    /// channel, or too large.
     #[arg(long)]
     board: bool,
-    /// The rig that it is for: one that contradicts the model is refused, and its constants are
-    /// written beside the output, as `rig.rs`.
+    /// Rig file. A rig that contradicts the model is refused; its constants are written beside the output as
+    /// `rig.rs`.
     #[arg(long, value_name = "rig.toml")]
     rig: Option<PathBuf>,
 }
@@ -56,7 +56,7 @@ enum Numbers {
 }
 
 impl Args {
-    /// The file to write and its language. A function of MATLAB is called as its file is.
+    /// The output file and its language. A MATLAB function must have the name of its file.
     fn target(&self) -> (PathBuf, Language) {
         let usual = match self.lang {
             Lang::Rust => "identified.rs",

@@ -65,7 +65,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
 }
 
 impl Args {
-    /// The pictures, if they are asked for.
+    /// Draws the pictures, if requested.
     fn draw(
         &self,
         model: &Model,
@@ -85,7 +85,7 @@ impl Args {
         Ok(())
     }
 
-    /// The page, if it is asked for.
+    /// Writes the page, if requested.
     fn write(&self, page: impl FnOnce() -> String) -> anyhow::Result<()> {
         if let Some(path) = &self.report {
             write_atomic(path, |out| out.write_all(page().as_bytes()))?;
@@ -94,7 +94,7 @@ impl Args {
     }
 }
 
-/// Files by their names without ending, or as they were given where two have the same.
+/// Names of the files without ending; whole paths where two would be equal.
 fn labels(paths: &[PathBuf]) -> Vec<String> {
     let stem = |path: &PathBuf| {
         path.file_stem()
@@ -113,7 +113,7 @@ fn labels(paths: &[PathBuf]) -> Vec<String> {
     paths.iter().zip(&short).map(label).collect()
 }
 
-/// A record's name with only what every file system takes.
+/// A record's name reduced to characters that every file system accepts.
 fn file_name(name: &str) -> String {
     let plain = |c: char| {
         if c.is_ascii_alphanumeric() || c == '-' || c == '_' {

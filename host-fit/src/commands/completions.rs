@@ -26,14 +26,15 @@ pub(crate) fn run(args: &Args, mut command: clap::Command, console: Console) -> 
     generate(args.shell, &mut command, "host-fit", &mut script);
     let mut script = String::from_utf8(script)?;
     if args.shell == Shell::Bash {
-        // clap_complete 4.6.11 calls a program with a hyphen by two names, and then finds no options of its commands.
+        // clap_complete 4.6.11 spells a program name with a hyphen in two ways and then does not find its
+        // options.
         script = script.replace("host__subcmd__fit__", "host__fit__");
     }
     if console.json {
         let shell = args.shell.to_string();
         return console.document(&serde_json::json!({ "shell": shell, "script": script }));
     }
-    // As it is: a script has characters that a terminal is not shown.
+    // Printed without escaping: scripts contain characters that are otherwise hidden from a terminal.
     let mut out = io::stdout().lock();
     match out.write_all(script.as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),

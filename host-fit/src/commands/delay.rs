@@ -12,9 +12,10 @@ use super::time_span::TimeSpan;
 
 /// Measure the delay of the response to every edge of the command, and fit the law h = p0 + p1·exp(−p2·ỹ).
 ///
-/// One plant of first or second order with a dead time is fitted to whole records; where it describes them, the delay of
-/// an edge is its place on that trajectory. Otherwise the start of each response is located alone. The law is
-/// fitted to the identify records, and kept where it is a delay on all of them and better than a constant.
+/// One plant of first or second order with dead time is fitted to all records. If it fits, the delay of an
+/// edge is its shift on that trajectory; otherwise the start of each response is located by itself. The law
+/// is fitted to the identify records. It is rejected if it is not a valid delay on all records or not better
+/// than a constant.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Folder with dataset.toml, or one CSV file.
@@ -26,8 +27,9 @@ pub(crate) struct Args {
     /// Longest delay to search: samples (250) or a time (0.25s) [default: what the records can show].
     #[arg(long, value_name = "TIME")]
     max_delay: Option<TimeSpan>,
-    /// Stretch of y on either side of the start of a response where each edge is measured alone: samples (30) or a
-    /// time (0.03s) [default: three response times, or half the time between edges if that is less].
+    /// Length of y on either side of the start of a response where each edge is measured by itself: samples
+    /// (30) or a time (0.03s) [default: three response times, or half the time between edges if that is
+    /// less].
     #[arg(long, value_name = "TIME")]
     reach: Option<TimeSpan>,
     /// Seed of the permutation tests.

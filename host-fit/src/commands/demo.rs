@@ -1,4 +1,5 @@
-//! `host-fit demo`: the whole way on bundled and simulated data, from recordings to constants and a loop.
+//! `host-fit demo`: the complete workflow on bundled and simulated data, from recordings to constants and
+//! closed loop.
 
 use anyhow::Context;
 use std::path::{Path, PathBuf};
@@ -67,16 +68,16 @@ const FILES: [(&str, &str); 16] = [
     bundled!("hidden-ramp", "random-b.csv"),
 ];
 
-/// What really made the hidden set; only the loop is run on it.
+/// The true effects of the hidden set; used only to simulate the closed loop.
 const ANSWER: &str = include_str!("../../data/hidden-ramp/answer.toml");
-/// What no effect of the catalogue does, hidden in a rig of this seed, and the folder of its recordings.
+/// Hidden effect outside the catalogue, seed of its rig, and folder of its recordings.
 const BEYOND: (&str, u64, &str) = ("tiring-jet", 4, "tiring-ramp");
 /// Friction to hold in the loop (y), about 0.8 of steady blowing.
 const TARGET: f64 = 0.7;
 /// Shortest on and off times of the valve, samples.
 const TIMES: HoldTimes = HoldTimes { on: 10, off: 10 };
 
-/// A few lags are enough to show the way, and quick.
+/// A small structure, for speed.
 fn request(delay: DelayKind) -> IdentifyRequest {
     IdentifyRequest {
         delay: Some(delay),
@@ -101,7 +102,8 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
 
     let mut report = Report::new(
         "Demo",
-        "From recordings to a model, to the effect that it lacks, to a law for the board: four parts, each with its answer first",
+        "From recordings to a model, its missing effect and a control law: four parts, each with its answer \
+        first",
     );
     let fits = real_input(&data, out, console, &mut report)?;
     let (model, words) = hidden_effect(&data, out, console, &mut report)?;
@@ -159,7 +161,7 @@ fn real_input(
     for ((kind, name, file), fit) in kinds.into_iter().zip(&mut fits) {
         let found = steps::identify(&set, &request(kind), &console.show_progress())?;
         found.model.save(&out.join(file))?;
-        // A law that does no better than a constant delay is not kept.
+        // A law no better than a constant delay is not used.
         let is_constant = matches!(found.model.delay, Delay::Fixed { .. });
         let name = match (kind, is_constant) {
             (DelayKind::StateDependent, true) => "constant: no law is better",
@@ -199,7 +201,7 @@ fn real_input(
     Ok(fits)
 }
 
-/// From a model that lacks something to one that does not.
+/// From a model with a missing effect to a complete one.
 fn hidden_effect(
     data: &Path,
     out: &Path,
@@ -238,7 +240,7 @@ fn hidden_effect(
     Ok((finding.model, words))
 }
 
-/// The answer without its notes, which stand in the report.
+/// The answer without its notes, which are in the report.
 fn short_form(answer: &Answer) -> String {
     let short = Answer {
         notes: Vec::new(),
@@ -247,13 +249,13 @@ fn short_form(answer: &Answer) -> String {
     short.words()
 }
 
-/// Lines set in, below a heading.
+/// Indented lines below a heading.
 fn indented(text: &str) -> String {
     let lines = text.lines().map(|line| format!("   {line}"));
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// Recordings of a rig whose physics no catalogue has, and the term that is found in them, in words.
+/// Records a rig with an effect outside the catalogue; returns the discovered term in words.
 fn beyond_the_catalogue(
     data: &Path,
     out: &Path,
@@ -275,9 +277,9 @@ fn beyond_the_catalogue(
     let mut found = found;
     let model = shell_word(&out.join("beyond-before.toml"));
     found.answer = found.answer.with_files(&model, &shell_word(&folder));
-    console.say("\n3. a ramp with physics that no catalogue has: discover")?;
+    console.say("\n3. a ramp with an effect outside the catalogue: discover")?;
     console.say(&indented(&short_form(&found.answer)))?;
-    report.section("3. A ramp with physics that no catalogue has: discover");
+    report.section("3. A ramp with an effect outside the catalogue: discover");
     let records = given.targets(&set.records);
     let worst = discovery_lead(report, &records, &found);
     report.fold("Details of part 3: formula, trace, residual tests, every record");
@@ -302,7 +304,7 @@ struct LoopRow {
     air: f64,
 }
 
-/// The plant that made the hidden set, drawn again from what its answer records.
+/// The plant of the hidden set, rebuilt from the recorded answer.
 fn hidden_plant() -> anyhow::Result<PlantSpec> {
     #[derive(serde::Deserialize)]
     struct Answer {
@@ -318,9 +320,8 @@ fn hidden_plant() -> anyhow::Result<PlantSpec> {
     Ok(HiddenSetPlan::draw(&names, &[], answer.seed)?.plant)
 }
 
-/// Steady blowing, a plain relay and the designed law on the plant that made the
-/// hidden set. The law runs in single precision as its generated constants do on
-/// the board: the golden run in `identified.rs` is of this code.
+/// Steady blowing, a plain relay and the designed law on the plant of the hidden set. The law runs in single
+/// precision, as on the board; the golden run in `identified.rs` comes from this code.
 fn the_loop(
     design: &Design,
     console: Console,

@@ -34,18 +34,18 @@ pub(crate) struct Args {
     /// File for the model with its law.
     #[arg(short, long, value_name = "FILE.toml")]
     output: PathBuf,
-    /// What the law is for.
+    /// Goal of the law.
     #[arg(long, value_enum, default_value_t = Goal::Track)]
     goal: Goal,
     /// Level of y to hold, as measured, offset included (needed for `--goal track`).
     #[arg(long, value_name = "Y", allow_negative_numbers = true)]
     target: Option<f64>,
-    /// Shortest time the valve stays open, in seconds (`0.02`, `20ms`) or samples of the model (`2samples`); seconds are
-    /// rounded up to whole samples. Shorter than what `rig.toml` measured, or without it than the shortest between two
-    /// switches in the records, is refused [default: that time; 10 ms where neither is known].
+    /// Shortest time the valve stays open, in seconds (`0.02`, `20ms`) or samples of the model (`2samples`);
+    /// seconds are rounded up to whole samples. Times shorter than measured in `rig.toml`, or without it
+    /// shorter than in the records, are refused [default: that time; 10 ms where neither is known].
     #[arg(long, value_name = "S", value_parser = valve_time)]
     min_on: Option<TimeSpan>,
-    /// Shortest time the valve stays closed, likewise.
+    /// Shortest time the valve stays closed, in the same form.
     #[arg(long, value_name = "S", value_parser = valve_time)]
     min_off: Option<TimeSpan>,
     /// Switches per second that the valve can give in the long run (tracking).
@@ -60,28 +60,27 @@ pub(crate) struct Args {
     /// Switch at the rate that takes the least air on the model, not as fast as the valve can (tracking).
     #[arg(long)]
     least_air: bool,
-    /// What steady blowing costs, in y: mean friction minus price times duty is maximised.
+    /// Price of steady blowing, in y: mean friction minus price times duty is maximised (maximising).
     #[arg(long, value_name = "Y", default_value_t = 0.0, value_parser = not_negative)]
     air_price: f64,
     /// Most pulses in a period (maximising).
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=4))]
     pulses: u8,
-    /// Horizon over which free on/off commands are searched as well, in seconds (`2`, `500ms`) or samples
+    /// Horizon of an additional search over free on/off commands, in seconds (`2`, `500ms`) or samples
     /// (`2000samples`) (maximising).
     #[arg(long, value_name = "S", value_parser = some_time)]
     horizon: Option<TimeSpan>,
-    /// The rig, as `record --calibrate` measured it: the law weighs its sensor's noise and keeps its valve's shortest
-    /// times.
+    /// Rig file from `record --calibrate`: its sensor noise and its valve's shortest times are used.
     #[arg(long, value_name = "rig.toml")]
     rig: Option<PathBuf>,
-    /// Picture of the loop; by default beside the model file, ending in `-loop.svg`. That of the margin stands beside the
-    /// model file, ending in `-margin.svg`.
+    /// Picture of the closed loop; by default beside the model file, ending in `-loop.svg`. The picture of
+    /// the robustness margin is written beside the model file, ending in `-margin.svg`.
     #[arg(long, value_name = "FILE.svg")]
     picture: Option<PathBuf>,
     /// The run on the model through a noisy sensor as CSV (t, reference, friction, y, u).
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
-    /// Write a report page: the law, the loop, every trial.
+    /// Write a report page: the law, the closed loop, every trial.
     #[arg(long, value_name = "out.html")]
     report: Option<PathBuf>,
     /// Write the law even if it loses attachment on a plant that is consistent with the records; the file says on which.
@@ -105,10 +104,10 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Shortest times of a valve that nothing is said of, s.
+/// Default shortest times of the valve, s.
 const USUAL_VALVE_S: f64 = 0.010;
 
-/// A time of this command: a number without a unit is seconds, as it has always been here.
+/// A time option of this command: a number without a unit is in seconds.
 fn valve_time(text: &str) -> Result<TimeSpan, String> {
     if let Ok(seconds) = not_negative(text) {
         return Ok(TimeSpan::Seconds(seconds));
@@ -135,11 +134,11 @@ fn some_time(text: &str) -> Result<TimeSpan, String> {
     }
 }
 
-/// The time in seconds; one that is shorter than a sample, but not 0, is refused.
+/// The time in seconds; refused if it is shorter than a sample but not 0.
 fn at_period(option: &str, time: TimeSpan, period_s: f64) -> anyhow::Result<f64> {
     match time {
         TimeSpan::Samples(samples) => Ok(f64::from(samples) * period_s),
-        // A thousandth is the rounding of what was printed.
+        // A tolerance of 1/1000 for rounded printed values.
         TimeSpan::Seconds(seconds) if seconds > 0.0 && seconds < 0.999 * period_s => bail!(
             "{option} {seconds} s is shorter than a sample of this model, {period_s} s (key `sample_period_s`), and the \
              loop cannot switch within one: give {option} {period_s} or more, or {option} 0 if the valve follows every \
@@ -152,16 +151,16 @@ fn at_period(option: &str, time: TimeSpan, period_s: f64) -> anyhow::Result<f64>
 /// The shortest time of a valve in one position.
 struct ShortestTime<'a> {
     option: &'a str,
-    /// What is asked for.
+    /// The requested time.
     asked: Option<TimeSpan>,
     /// What `rig.toml` measured, s.
     measured: Option<f64>,
-    /// The shortest between two switches in the records, s.
+    /// The shortest time between two switches in the records, s.
     recorded: Option<f64>,
 }
 
 impl ShortestTime<'_> {
-    /// The time in seconds: no shorter than was measured, or without a measurement than was recorded.
+    /// The time in seconds. Refused if shorter than the measured or, without a measurement, the recorded one.
     fn seconds(&self, period_s: f64) -> anyhow::Result<f64> {
         let Self { option, .. } = self;
         let known = self.measured.or(self.recorded);
@@ -169,18 +168,16 @@ impl ShortestTime<'_> {
             return Ok(known.unwrap_or(USUAL_VALVE_S));
         };
         let asked = at_period(option, asked, period_s)?;
-        // Half a sample for what rounding does.
+        // Half a sample of tolerance for rounding.
         match known {
             Some(known) if asked < known - 0.5 * period_s => {
                 let known = (known * 1e6).round() * 1e-6;
                 let reason = if self.measured.is_some() {
-                    format!(
-                        "the rig answers nothing shorter than {known} s, as rig.toml measured it"
-                    )
+                    format!("the rig's shortest effective pulse is {known} s (rig.toml)")
                 } else {
                     format!(
-                        "the shortest time between two switches in the records of the model is {known} s, and how the flow answers \
-                         shorter ones is not known; record shorter ones, or measure the valve (`record --calibrate`, then `--rig rig.toml`)"
+                        "the shortest time between two switches in the records of the model is {known} s, and \
+                        the response to shorter ones is unknown; record shorter ones, or measure the valve (`record --calibrate`, then `--rig rig.toml`)"
                     )
                 };
                 bail!(
@@ -215,7 +212,7 @@ impl Args {
         let horizon_s = horizon_s.transpose()?;
         Ok(match self.goal {
             Goal::Track => DesignRequest::Track(TrackRequest {
-                // Asked for before.
+                // Checked before.
                 target: self.target.unwrap_or(f64::NAN),
                 min_on_s,
                 min_off_s,
@@ -239,8 +236,8 @@ impl Args {
         })
     }
 
-    /// The law, tried in the loop; the records of `set` say which flows are possible. What no loop can be made of is
-    /// refused before anything is read or run.
+    /// The law with its trials in closed loop; the records of `set` determine the possible plants. Impossible
+    /// requests are refused before anything is read or run.
     pub(super) fn tried(&self, model: &Model, set: Option<&DataSet>) -> anyhow::Result<Tried> {
         check_period(model)?;
         if self.tracks() && self.target.is_none() {
@@ -265,14 +262,14 @@ impl Args {
                 Vec::new()
             }
         };
-        // A law is worth having also where the simulator has no plant to stress it on.
+        // A law is returned even if the simulator has no plant for stress trials.
         let stress = match Plants::of(model, self.seed) {
             Ok(plants) => {
                 notes.extend(plants.left_out);
                 plants.stress
             }
             Err(error) => {
-                notes.push(format!("the law was not stressed on plants: {error:#}"));
+                notes.push(format!("no stress trials were made: {error:#}"));
                 Vec::new()
             }
         };
@@ -293,7 +290,7 @@ impl Args {
         })
     }
 
-    /// What the law is for, in a few words.
+    /// The goal in a few words.
     pub(super) fn goal_words(&self) -> String {
         match (self.goal, self.target) {
             (Goal::Track, Some(target)) => format!("law: hold {target}"),
@@ -302,12 +299,12 @@ impl Args {
         }
     }
 
-    /// Whether the law is to hold the friction at a value.
+    /// Whether the goal is tracking.
     pub(super) fn tracks(&self) -> bool {
         self.goal == Goal::Track
     }
 
-    /// Whether a law goes into the file even if a deciding trial loses attachment.
+    /// Whether a law is written although a deciding trial loses attachment.
     pub(super) fn force(&self) -> bool {
         self.force
     }

@@ -28,7 +28,7 @@ pub(crate) struct Args {
     /// Write the command (columns t, u) that would distinguish models that fit these records equally well.
     #[arg(long, value_name = "command.csv")]
     experiment: Option<PathBuf>,
-    /// Most effects that are added one after the other.
+    /// Largest number of effects to add.
     #[arg(long, value_name = "COUNT", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=12))]
     most_effects: u32,
     /// Seed of the random signs of the significance test.

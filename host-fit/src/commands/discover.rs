@@ -1,4 +1,4 @@
-//! `host-fit discover`: a term that no catalogue has.
+//! `host-fit discover`: a missing term outside the catalogue.
 
 use std::path::{Path, PathBuf};
 
@@ -13,10 +13,10 @@ use super::effect_names::EffectName;
 use super::load::ModelAndData;
 use super::{Console, page};
 
-/// Find a missing term that no catalogue has: where it acts, what it depends on, its curve and a formula.
+/// Find a missing term outside the catalogue: where it acts, what it depends on, its curve and a formula.
 ///
-/// Curves over every coordinate at every place (jet, delay, flow, sensor) are fitted together with the model. A term is
-/// reported if the validation error falls significantly and by more than additional lags achieve.
+/// Curves over every coordinate at every place (jet, delay, flow, sensor) are fitted together with the model.
+/// A term is reported if the validation error falls significantly and by more than additional lags achieve.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -36,7 +36,7 @@ pub(crate) struct Args {
     /// Write the command (columns t, u) that would distinguish models that fit these records equally well.
     #[arg(long, value_name = "command.csv")]
     experiment: Option<PathBuf>,
-    /// Most terms.
+    /// Largest number of terms to find.
     #[arg(long, value_name = "COUNT", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=6))]
     terms: u32,
     /// Leave this effect of the catalogue out of the comparison (repeatable).
@@ -50,7 +50,7 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// Makes the effects of the user's own known to `model`; what to look for in it.
+    /// Adds the user's own effects to `model` and returns the options of the search.
     pub(super) fn prepare(&self, model: &mut Model) -> anyhow::Result<Options> {
         self.effect_files.define(model)?;
         for name in &self.without {

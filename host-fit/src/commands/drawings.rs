@@ -64,7 +64,7 @@ pub(crate) fn ladder_picture(diagnosis: &Diagnosis, set: &DataSet) -> String {
     })
 }
 
-/// The experiment that tells models apart: its command, and what each of them expects of it.
+/// The discriminating experiment: its command and the prediction of each model.
 pub(crate) fn experiment_picture(separation: &Separation) -> String {
     let experiment = &separation.experiment;
     let named = separation.effects.len() == separation.models.len();
@@ -73,7 +73,7 @@ pub(crate) fn experiment_picture(separation: &Separation) -> String {
         let y = model
             .run_free(&Signals::commanded(model, &experiment.u))
             .ok()?;
-        // What stands for an effect may be a lag, which is none of a model's effects.
+        // An alternative to an effect may be a lag, which is not among a model's effects.
         let label = match separation.effects.get(index).filter(|_| named) {
             Some(effect) => effect.clone(),
             None => model.effect_names().join(" + "),
@@ -102,7 +102,7 @@ pub(crate) fn experiment_picture(separation: &Separation) -> String {
     let most = (0..experiment.u.len()).max_by(|a, b| apart(a).total_cmp(&apart(b)));
     let most_s = most.unwrap_or_default() as f64 * experiment.sample_period_s;
     closed_loop(&ClosedLoop {
-        title: "What each of the models expects, where they differ most",
+        title: "Prediction of each model, where they differ most",
         y_label: "friction gain y",
         air_label: "",
         sample_period_s: experiment.sample_period_s,
@@ -112,7 +112,7 @@ pub(crate) fn experiment_picture(separation: &Separation) -> String {
     })
 }
 
-/// The law beside something simpler on the plant.
+/// The law and its reference on the same plant.
 pub(crate) fn proof_picture(proof: &Proof, tracks: bool) -> String {
     let runs = [
         (proof.compared_name, &proof.compared),
@@ -132,7 +132,7 @@ pub(crate) fn proof_picture(proof: &Proof, tracks: bool) -> String {
     })
 }
 
-/// The errors of the model that a law bears, two at a time.
+/// The tolerated errors of the model, two at a time.
 pub(crate) fn margin_picture(margin: &Margin) -> String {
     let percent = |contour: &[[f64; 2]]| -> Vec<[f64; 2]> {
         contour
@@ -159,7 +159,7 @@ pub(crate) fn margin_picture(margin: &Margin) -> String {
         })
         .collect();
     regions(&Regions {
-        title: "How far the flow may be from the model",
+        title: "Robustness margin: how far the plant may differ from the model",
         inside: "attachment kept, rms error within twice that on the model",
         centre: "the model",
         regions: &each,
@@ -173,9 +173,9 @@ pub(crate) struct LoopPicture<'a> {
     pub(crate) air: bool,
     /// y; empty for none.
     pub(crate) reference: &'a [f64],
-    /// Labels and runs.
+    /// Names of the controllers with their runs.
     pub(crate) runs: &'a [(&'a str, &'a Trace)],
-    /// How much is shown.
+    /// Duration shown, s.
     pub(crate) seconds: f64,
 }
 

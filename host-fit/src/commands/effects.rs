@@ -8,7 +8,7 @@ use super::Console;
 use super::effect_names::EffectName;
 use super::words::{Words, effect_table};
 
-/// Base terms that are lags of the recursion and have no card.
+/// Base terms that are lags of the recursion and have no card in the catalogue.
 const FLOW_TERMS: &str = "flow-lag         flow   a second lag in series: T2·q̇ = u − q drives the recursion instead of u\n\
                           flow-memory      flow   a later lag of y: adds a·y(t − T) to the recursion";
 

@@ -1,4 +1,4 @@
-//! `host-fit extend`: adds effects, refits everything, shows what it gained.
+//! `host-fit extend`: adds effects, refits everything, and shows the gain.
 
 use std::path::{Path, PathBuf};
 
@@ -51,7 +51,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     extension.model.save(&args.output)?;
     let mut written: Vec<&Path> = vec![&args.output];
     if let Some(path) = &args.report {
-        // A model that diverges is no reason to show nothing of the one that does not.
+        // A given model that diverges does not prevent showing the new one.
         let before = steps::compare(&model, &set).ok();
         let after = steps::compare(&extension.model, &set)?;
         let page = page::extension(&set, &extension, (&model, before.as_ref()), &after);

@@ -37,7 +37,7 @@ pub(crate) struct Args {
     request: Request,
 }
 
-/// What to identify and how: the options of the command.
+/// Options of an identification.
 #[derive(Debug, Clone, clap::Args)]
 struct Request {
     /// Input delays: constant, eq. (3), or falling with the averaged output, eq. (4) [default: the one
@@ -162,7 +162,7 @@ const LAGS: RangeInclusive<u32> = 1..=20_000;
 fn longest_lag(text: &str) -> Result<TimeSpan, String> {
     match text.parse().map_err(|error: NotATime| error.to_string())? {
         TimeSpan::Samples(samples) if !LAGS.contains(&samples) => Err(format!(
-            "{samples} samples are not within {} to {}",
+            "{samples} samples are outside {} to {}",
             LAGS.start(),
             LAGS.end()
         )),
@@ -171,7 +171,7 @@ fn longest_lag(text: &str) -> Result<TimeSpan, String> {
 }
 
 impl Request {
-    /// The request as the library has it, for records with a sample every `period_s`; reads the effect files.
+    /// The request for the library, for records with this sample period; reads the effect files.
     fn library(&self, period_s: f64) -> anyhow::Result<IdentifyRequest> {
         let max_lag = self.max_lag.map(|lag| {
             let lag = lag.samples_within(period_s, "--max-lag", LAGS)?;
@@ -212,7 +212,8 @@ impl Request {
 }
 
 impl Args {
-    /// What to identify and how, from records with a sample every `period_s`; reads the effect files.
+    /// Structure and options of the identification, for records with this sample period; reads the effect
+    /// files.
     pub(super) fn request(&self, period_s: f64) -> anyhow::Result<IdentifyRequest> {
         self.request.library(period_s)
     }

@@ -28,19 +28,19 @@ pub(crate) struct Args {
     /// Replace a data set that is in the folder already.
     #[arg(long)]
     force: bool,
-    /// Take the mapping of a data set that was imported before; other options change it.
+    /// Use the mapping of a data set that was imported before; further options override it.
     #[arg(long, value_name = "DATASET")]
     like: Option<PathBuf>,
     /// Variable that is the time.
     #[arg(long, value_name = "NAME")]
     t: Option<String>,
-    /// Seconds in one unit of the time [default: as the header says, otherwise 1].
+    /// Seconds per unit of the time [default: from the header, otherwise 1].
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     t_scale: Option<f64>,
     /// Sampling period, where the file has no time (or to check it).
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     period: Option<f64>,
-    /// Take the rows as --period apart, whatever the file's time says.
+    /// Use --period as the spacing of the rows and ignore the file's time.
     #[arg(long, requires = "period")]
     ignore_time: bool,
     /// Variable that is the command.
@@ -73,10 +73,11 @@ pub(crate) struct Args {
     /// Keep nothing beside t, u and y.
     #[arg(long, conflicts_with = "channel")]
     no_channels: bool,
-    /// Name of a file (without its ending) to hold out for validation; repeatable.
+    /// Name of a file (without its ending) that becomes a validation record; repeatable.
     #[arg(long, value_name = "NAME")]
     validate: Vec<String>,
-    /// Hold out what comes from this time of each record on; the samples before it lead up to it.
+    /// Split each record at this time, s: the samples after it are a validation record, the samples before it
+    /// its lead-in.
     #[arg(long, value_name = "SECONDS")]
     hold_out_from: Option<f64>,
     /// The input has levels between off and on.

@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 static ASKED: AtomicBool = AtomicBool::new(false);
 static WATCHING: Once = Once::new();
 
-/// Whether the user has pressed Ctrl-C; from the first call on it is watched.
+/// Whether the user has pressed Ctrl-C; the handler is installed by the first call.
 pub(crate) fn watch() -> &'static AtomicBool {
     WATCHING.call_once(|| {
-        // Without a handler Ctrl-C ends the program, which is what it does anyway.
+        // Without a handler Ctrl-C ends the program, which is acceptable.
         let _ = ctrlc::set_handler(|| {
             if ASKED.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);

@@ -66,7 +66,7 @@ impl Console {
     ) -> anyhow::Result<()> {
         #[derive(Serialize)]
         struct Document<'a, T> {
-            /// As text: JSON has no other names, and a file that was written is not refused for its name.
+            /// As text: JSON strings must be UTF-8, and a file is not refused for its name.
             #[serde(flatten)]
             files: BTreeMap<&'a str, Cow<'a, str>>,
             #[serde(flatten)]
@@ -113,21 +113,21 @@ impl Console {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        // The ticks come from a thread of their own.
+        // Ticks need a thread of their own.
         if threads::are_given() {
             bar.enable_steady_tick(Duration::from_millis(200));
         }
         bar
     }
 
-    /// Shows on standard error what a step is at; Ctrl-C asks it for the best that it has.
+    /// Shows the progress of a step on standard error; Ctrl-C makes it return its best result so far.
     pub(crate) fn watch(self) -> Watch {
         let mut watch = self.show_progress();
         watch.interrupt = interrupt::watch();
         watch
     }
 
-    /// The same of a step that has nothing to hand over before its end: Ctrl-C ends the program.
+    /// The same for a step without intermediate results: Ctrl-C ends the program.
     pub(crate) fn show_progress(self) -> Watch {
         static NEVER: AtomicBool = AtomicBool::new(false);
         Watch {
@@ -138,7 +138,7 @@ impl Console {
     }
 }
 
-/// The user, watching a step.
+/// Progress display of a step.
 pub(crate) struct Watch {
     console: Console,
     bar: ProgressBar,
@@ -169,7 +169,7 @@ impl Onlooker for Watch {
         if io::stderr().is_terminal() {
             self.bar.suspend(|| eprintln!("{text}"));
         } else {
-            // A reader that has gone away will not miss it.
+            // A closed pipe is no error.
             let _ = self.console.say(&text);
         }
     }
@@ -185,7 +185,7 @@ impl Drop for Watch {
     }
 }
 
-/// One paragraph, whatever the causes wrote; a cause that the message itself names is not said again.
+/// The message as one paragraph; causes that the message already contains are not repeated.
 pub(crate) fn paragraph(error: &anyhow::Error) -> String {
     let mut text = error.to_string();
     for cause in error.chain().skip(1).map(ToString::to_string) {
@@ -196,12 +196,12 @@ pub(crate) fn paragraph(error: &anyhow::Error) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Prints a text and a line end. Names in it come from files that anybody may have written.
+/// Prints a text and a line end, with control characters escaped: names in it come from files.
 fn print(text: &str) -> anyhow::Result<()> {
     write_out(&visible(text))
 }
 
-/// Writes a text and a line end; a reader that has gone away (`| head`) is no error.
+/// Writes a text and a line end; a closed pipe (`| head`) is no error.
 fn write_out(text: &str) -> anyhow::Result<()> {
     let mut out = io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {

@@ -175,7 +175,8 @@ pub(crate) fn finding(
     report.html()
 }
 
-/// The first screen of a diagnosis: answer, falling error, the worst stretch before and after.
+/// The first screen of a diagnosis: answer, error by step, the two seconds with the largest error before and
+/// after.
 pub(crate) fn finding_lead(
     report: &mut Report,
     given: &Model,
@@ -191,7 +192,7 @@ pub(crate) fn finding_lead(
     lead(report, &found.answer, falling, &records, &runs)
 }
 
-/// What the final model of a diagnosis is called.
+/// The label of a diagnosis' final model.
 fn after_label(found: &Finding) -> &'static str {
     match found.diagnosis.missing.is_empty() {
         true => "as diagnosed",
@@ -199,7 +200,7 @@ fn after_label(found: &Finding) -> &'static str {
     }
 }
 
-/// Everything else of a diagnosis, in sections.
+/// The remaining sections of a diagnosis.
 pub(crate) fn finding_details(
     report: &mut Report,
     given: &Model,
@@ -213,7 +214,7 @@ pub(crate) fn finding_details(
         return;
     };
     report_failures(report, failures);
-    // The bars are of the model as given.
+    // The bars belong to the given model.
     let records = given.targets(&set.records);
     let before = found.runs_before.as_deref().unwrap_or(runs);
     let samples = failures.samples(&records, before, given.longest_delay());
@@ -253,7 +254,8 @@ pub(crate) fn discovery(given: &Model, set: &DataSet, found: &Terms, command: &s
     report.html()
 }
 
-/// The first screen of a discovery: answer, curve of the first term, the worst stretch before and after.
+/// The first screen of a discovery: answer, curve of the first term, the two seconds with the largest error
+/// before and after.
 pub(crate) fn discovery_lead(
     report: &mut Report,
     records: &[Record],
@@ -277,7 +279,7 @@ fn discovery_runs(found: &Terms) -> Vec<(&str, &[Vec<f64>])> {
     runs
 }
 
-/// Everything else of a discovery, in sections.
+/// The remaining sections of a discovery.
 pub(crate) fn discovery_details(
     report: &mut Report,
     given: &Model,
@@ -319,7 +321,8 @@ pub(crate) fn discovery_details(
     report_scores(report, &found.scores);
 }
 
-/// The first screen of a page: the answer with a picture beside it, and the stretch where the first of `runs` errs most.
+/// The first screen of a page: the answer with a picture, and the interval with the largest error of the
+/// first of `runs`.
 pub(crate) fn lead(
     report: &mut Report,
     answer: &Answer,
@@ -343,7 +346,7 @@ pub(crate) fn lead(
     worst
 }
 
-/// The page of a law for `model` that was tried in the loop.
+/// The page of a law for `model` with its trials.
 pub(super) fn law(model: &Model, tried: &Tried, tracks: bool, command: &str) -> String {
     let mut report = Report::new("Control law", &describe(model));
     report.columns();
@@ -374,10 +377,10 @@ pub(super) fn law(model: &Model, tried: &Tried, tracks: bool, command: &str) -> 
     report.html()
 }
 
-/// Records whose trace is drawn.
+/// Number of records whose trace is drawn.
 const TRACED_RECORDS: usize = 3;
 
-/// What is missing at the likeliest place, record by record.
+/// The reconstructed signal at the most probable place, record by record.
 fn report_trace(report: &mut Report, trace: &Trace) {
     let likeliest = TRACED.iter().enumerate().max_by(|a, b| {
         let odds = |entry: &Entry| trace.odds.get(entry.place().word()).copied().unwrap_or(0.0);
@@ -437,7 +440,7 @@ pub(super) fn term_picture(term: &FoundTerm) -> String {
     curve(&CurvePlot {
         title: "",
         x_label: &format!("{} ({})", term.coordinate, term.coordinate_unit),
-        // Of what is in the heading: an axis is short.
+        // Shortened, since the heading has the full name and the axis is short.
         y_label: &format!(
             "{} ({})",
             term.changes.split(" of ").next().unwrap_or_default(),
@@ -460,7 +463,8 @@ fn title(set: &DataSet) -> &str {
     set.title.as_deref().unwrap_or("data set")
 }
 
-/// Measurement and free runs, record by record; with `lit`, the bars of [`report_failures`] light up their samples in them.
+/// Measurement and free runs, record by record; with `lit`, a click on a bar of [`report_failures`] marks its
+/// samples.
 pub(crate) fn report_runs(
     report: &mut Report,
     records: &[Record],
@@ -476,8 +480,8 @@ pub(crate) fn report_runs(
     report.living(&living);
 }
 
-/// Measurement and free runs of a diagnosis, record by record: the model as given, the one that it ends in, and, once they are
-/// switched on, the steps of the ladder between them.
+/// Measurement and free runs of a diagnosis, record by record: the given model, the final one and, switched
+/// off at first, the steps between them.
 pub(crate) fn report_climb(
     report: &mut Report,
     records: &[Record],
@@ -500,7 +504,7 @@ pub(crate) fn report_climb(
     let mut runs: Vec<(&str, &[Vec<f64>])> = Vec::new();
     let before = found.runs_before.as_deref();
     runs.extend(before.map(|before| ("as given", before)));
-    // Before the steps between, so that a model has the same colour in every picture.
+    // Added before the intermediate steps, so that a model has the same colour in every picture.
     let after = found.runs.as_deref();
     runs.extend(after.map(|after| (after_label(found), after)));
     let first = runs.len();
@@ -515,7 +519,8 @@ pub(crate) fn report_climb(
     report.living(&living);
 }
 
-/// How many steps of a ladder a page can carry as curves: it is to weigh less than 5 MB, and six lines can be distinguished.
+/// Largest number of intermediate steps on a page: it must stay below 5 MB and with six distinguishable
+/// lines.
 fn most_steps(records: &[Record]) -> usize {
     const SAMPLES: usize = 320_000;
     let samples: usize = records.iter().map(Record::len).sum();
@@ -590,8 +595,8 @@ fn report_candidates(report: &mut Report, found: &Finding) {
             "Each effect alone, refitted with everything else.",
         );
         report.table(
-            "p is family-wise: it is corrected for all candidates. 5 % level: the fall that one \
-             search of twenty reaches on noise. Screened only: the first-order estimate was too small to refit.",
+            "p is family-wise: it is corrected for all candidates. 5 % level: the reduction that noise alone \
+            exceeds in 5 % of searches. Screened only: the first-order estimate was too small to refit.",
             &[
                 Column::Text("effect"),
                 Column::Text("outcome"),
@@ -653,7 +658,7 @@ pub(super) fn ranking_picture(diagnosis: &Diagnosis) -> String {
     })
 }
 
-/// What a page was made from.
+/// The section with tool, data and command.
 pub(crate) fn provenance(report: &mut Report, set: &DataSet, seed: u64, command: &str) {
     report.provenance("tool", concat!("host-fit ", env!("CARGO_PKG_VERSION")));
     report.provenance("command", command);
@@ -662,7 +667,7 @@ pub(crate) fn provenance(report: &mut Report, set: &DataSet, seed: u64, command:
     report.provenance("records", &set.records.len().to_string());
 }
 
-/// What the user wrote, as it could be written again.
+/// The user's command line, quoted for a shell.
 pub(super) fn command_line() -> String {
     let words = std::env::args_os().skip(1);
     let words = words.map(|word| quoted(&word.to_string_lossy()));

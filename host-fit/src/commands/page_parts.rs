@@ -1,4 +1,4 @@
-//! Parts that several pages have: the answer, the worst stretch, the standard checks.
+//! Parts that several pages share: the answer, the interval of largest error, the standard residual tests.
 
 use host_fit::analysis::{Residuals, correlations, poles, spectrum, step_response};
 use host_fit::data::{Record, Use};
@@ -25,17 +25,17 @@ pub(crate) struct Run<'a> {
     pub(crate) runs: &'a [Vec<f64>],
 }
 
-/// Where in the records a run errs most.
+/// The interval in which a run has its largest error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stretch {
     /// Index of the record.
     pub(crate) record: usize,
-    /// From and to, s since the record's start.
+    /// Start and end, s since the start of the record.
     pub(crate) from: f64,
     pub(crate) to: f64,
 }
 
-/// How long a stretch is shown: two seconds or four periods of the command, at least a hundred samples.
+/// Length of the interval: two seconds or four periods of the command, at least a hundred samples.
 fn stretch_samples(record: &Record) -> usize {
     let rising = record.u.windows(2).enumerate();
     let rising: Vec<usize> = rising
@@ -50,7 +50,8 @@ fn stretch_samples(record: &Record) -> usize {
     least.min(record.len())
 }
 
-/// The stretch of the validation records (of all records where none is marked `validate`) with the largest error of `runs`.
+/// The interval of the validation records (of all records if there are none) with the largest error of
+/// `runs`.
 pub(crate) fn worst_stretch(records: &[Record], runs: &[Vec<f64>]) -> Option<Stretch> {
     let validate = records.iter().any(|r| r.role == Use::Validate);
     let judged = records.iter().zip(runs).enumerate();
@@ -86,7 +87,7 @@ pub(crate) fn worst_stretch(records: &[Record], runs: &[Vec<f64>]) -> Option<Str
     worst.map(|(_, stretch)| stretch)
 }
 
-/// The picture of a stretch: measurement and runs, with what each run errs there.
+/// The picture of an interval: measurement and runs, with the error of each there.
 pub(crate) fn stretch_picture(
     report: &mut Report,
     records: &[Record],

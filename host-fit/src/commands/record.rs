@@ -1,5 +1,4 @@
-//! `host-fit record`: has the board play commands and writes what it sampled; or
-//! measures the rig.
+//! `host-fit record`: plays commands on the board and records the samples, or calibrates the rig.
 
 use std::path::PathBuf;
 
@@ -15,11 +14,11 @@ use super::words::Words;
 use super::{Console, interrupt};
 use crate::rig_port::PortArgs;
 
-/// Play commands with the board and record every sample: raw recordings that `average` reads.
+/// Play commands with the board and record every sample: raw recordings for `average`.
 ///
-/// The valve is shut at the end, on any fault, and when the link breaks. Repeats of which a sample was lost, or in
-/// which the link broke, are played again: what is written came whole, each repeat from rest. With `--calibrate` the
-/// rig is measured instead: rig.toml, for `--rig` and for the next build of the firmware.
+/// The valve is closed at the end, on any fault, and when the link breaks. Repeats with a lost sample are
+/// played again, so that every written repeat is complete and starts from rest. With `--calibrate` the rig is
+/// measured instead; rig.toml is for `--rig` and for the next build of the firmware.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
@@ -31,33 +30,32 @@ pub(crate) struct Args {
         required_unless_present = "calibrate"
     )]
     command: Vec<PathBuf>,
-    /// How often each command is played.
+    /// Number of repeats of each command.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     repeats: u32,
-    /// How long the valve has been shut at least when a repeat begins, in seconds: the flow must have come to rest.
+    /// Rest before each repeat with the valve closed, s: the flow must have settled.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.5, value_parser = not_negative)]
     rest: f64,
     /// Folder for the recordings; with `--calibrate` the rig file.
     #[arg(short, long, value_name = "DIR|rig.toml")]
     output: PathBuf,
-    /// The rig: what counts stand for. Without it the board's own constants count.
+    /// Rig file with the scale of the readings. Without it the board's own constants are used.
     #[arg(long, value_name = "rig.toml", conflicts_with = "calibrate")]
     rig: Option<PathBuf>,
-    /// Measure the rig: zero, steady blowing, noise, rails, the valve's shortest times.
+    /// Calibrate the rig: zero, steady blowing, noise, converter limits, the valve's shortest times.
     #[arg(long)]
     calibrate: bool,
-    /// With `--calibrate`: the measured channel, which the board cannot know: its name, unit, counts of 0 and units
-    /// per count.
+    /// With `--calibrate`: name, unit, zero in counts and units per count of the measured channel.
     #[arg(long, value_name = "NAME,UNIT,ZERO,PER_COUNT", requires = "calibrate", value_parser = said)]
     channel: Option<ChannelSaid>,
-    /// With `--calibrate`: how long steady flow is waited for, in seconds [default: 4, or 1000 samples where that is
-    /// longer].
+    /// With `--calibrate`: settling time of the flow, s [default: 4, or 1000 samples where that is longer].
     #[arg(long, value_name = "SECONDS", value_parser = positive, requires = "calibrate")]
     steady: Option<f64>,
-    /// With `--calibrate`: pulses of each length that is tried; fewer see short ones less surely.
+    /// With `--calibrate`: pulses per length that is tried; fewer make the detection of short ones less
+    /// reliable.
     #[arg(long, value_name = "COUNT", default_value_t = 24, value_parser = clap::value_parser!(u32).range(3..=10_000), requires = "calibrate")]
     pulses: u32,
-    /// Take note of a latched fault, or disarm the law, first.
+    /// Acknowledge a latched fault, or disarm the law, first.
     #[arg(long)]
     disarm: bool,
 }
@@ -89,15 +87,15 @@ impl Words for Recorded {
     fn words(&self) -> String {
         let each = self.recordings.iter().map(|r| {
             let mut text = format!(
-                "{}: {} whole repeats of {} s, in {}",
+                "{}: {} complete repeats of {} s, {}",
                 r.file.display(),
                 r.repeats,
                 r.period_s,
-                if r.parts == 1 { "one go".into() } else { format!("{} goes", r.parts) },
+                if r.parts == 1 { "without interruption".into() } else { format!("in {} parts", r.parts) },
             );
             if r.lost_samples > 0 {
                 text.push_str(&format!(
-                    "; {} samples were lost ({} of them found no room on the board) and their repeats played again",
+                    "; {} samples were lost ({} of them for lack of memory on the board); their repeats were played again",
                     r.lost_samples, r.left_out_samples
                 ));
             }
@@ -121,7 +119,7 @@ impl Words for Recorded {
     }
 }
 
-/// A rig that was measured.
+/// A calibrated rig.
 #[derive(Serialize)]
 struct Measured(RigFile);
 
@@ -136,8 +134,8 @@ impl Words for Measured {
             .map(|n| n * rig.sensor.per_count.abs());
         format!(
             "sensor: {} counts is y = 0, {:.1} is y = 1; noise {:.4} shut, {:.4} open (y)\n\
-             valve: the flow answers {on} samples open and {off} shut\n\
-             residual's envelope: {} (y)",
+             valve: shortest effective pulse {on} samples open, {off} samples shut\n\
+             alarm limit of the residual: {} (y)",
             rig.sensor.zero_counts,
             rig.sensor.zero_counts + 1.0 / rig.sensor.per_count,
             noise[0],
@@ -238,7 +236,7 @@ fn calibrate(
         &mut |what, now| {
             bar.set_message(format!("{what}: {} counts", now.newest.counts));
             if interrupt.load(std::sync::atomic::Ordering::Relaxed) {
-                // The board shuts the valve when its host is silent.
+                // The board closes the valve by itself when its host is silent.
                 std::process::exit(130);
             }
         },

@@ -47,10 +47,11 @@ pub(crate) fn rust(rig: &RigFile) -> String {
     text
 }
 
-/// Says whether `rig` was measured at the period of `model`: its noise is of averages over so many samples.
+/// Checks that `rig` was measured at the sample period of `model`: its noise refers to averages over a number
+/// of samples.
 ///
 /// # Errors
-/// Both periods, the key of both files, and what to do.
+/// Both periods, the key of both files, and the remedy.
 pub(crate) fn same_period(rig: &RigFile, model: &Model) -> Result<(), String> {
     if model.is_sampled_at(rig.sample_period_s) {
         return Ok(());
@@ -62,10 +63,10 @@ pub(crate) fn same_period(rig: &RigFile, model: &Model) -> Result<(), String> {
     ))
 }
 
-/// Says whether `model` can run at `rig`.
+/// Checks that `model` can run on `rig`.
 ///
 /// # Errors
-/// What contradicts what, with the keys of both files and what to do.
+/// The contradiction with the keys of both files, and the remedy.
 pub(crate) fn fits(rig: &RigFile, model: &Model) -> Result<(), String> {
     same_period(rig, model)?;
     let sensor = &rig.sensor;
@@ -73,18 +74,21 @@ pub(crate) fn fits(rig: &RigFile, model: &Model) -> Result<(), String> {
     let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
     let inside = |y: f64| low < y && y < high;
     let [least, most] = model.training.y_range;
-    // A model without records says nothing of its range.
+    // A model without records has no range to check.
     if least < most && !(inside(least) && inside(most)) {
         return Err(format!(
-            "`sensor` and the model's training range: y from {least:.3} to {most:.3} was seen, and this rig shows {low:.3} to \
-             {high:.3} between its rails; the model is of another rig or another divider: calibrate anew, or identify here"
+            "`sensor` and the model's training range: y from {least:.3} to {most:.3} was recorded, but this \
+            rig's converter covers {low:.3} to \
+             {high:.3}; the model belongs to another rig or divider: calibrate again, or identify on this \
+             rig"
         ));
     }
     if let Some(Law::Track(track)) = &model.law
         && !inside(track.reference)
     {
         return Err(format!(
-            "`sensor` and `law.reference`: y* = {} is outside of what this rig shows, {low:.3} to {high:.3}; design for another",
+            "`sensor` and `law.reference`: y* = {} is outside the range of this rig's converter, {low:.3} to \
+            {high:.3}; design for another target",
             track.reference
         ));
     }

@@ -5,10 +5,10 @@ use host_fit::steps::rulebooks;
 use super::Console;
 use super::words::Words;
 
-/// List the thresholds by which the tool decides, with their meaning and where they were calibrated.
+/// List the thresholds by which the tool decides, with their meaning and origin.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Only the rules of this room, for example `residual`.
+    /// Only this group of rules, for example `residual`.
     #[arg(value_name = "ROOM")]
     room: Option<String>,
 }
@@ -20,7 +20,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     if let Some(room) = &args.room {
         anyhow::ensure!(
             rooms.contains(&room.as_str()),
-            "there is no room `{}` with rules; the rooms are: {}",
+            "there is no group `{}` of rules; the groups are: {}",
             room.escape_debug(),
             rooms.join(", ")
         );

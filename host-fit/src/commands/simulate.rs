@@ -1,4 +1,4 @@
-//! `host-fit simulate`: a model's free run over a command of the user's.
+//! `host-fit simulate`: free run of a model over a given command.
 
 use std::path::PathBuf;
 
@@ -15,8 +15,8 @@ pub(crate) struct Args {
     /// The model.
     #[arg(value_name = "model.toml")]
     model: PathBuf,
-    /// Command sequence: columns t and u, and the channels that the model's effects need. A column y is only needed
-    /// by models that start from measurements.
+    /// Command sequence: columns t and u, and the channels that the model's effects need. A column y is
+    /// needed only if the model starts from measurements.
     #[arg(value_name = "INPUT.csv")]
     input: PathBuf,
     /// File for the free run: columns t, u, y.

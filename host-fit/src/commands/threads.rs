@@ -1,5 +1,4 @@
-//! Whether the machine gives threads. Libraries that start their own end the program where it does not, so it is found
-//! out before they are asked.
+//! Checks whether the machine provides threads, before libraries that would abort without them are used.
 
 use std::sync::OnceLock;
 use std::sync::mpsc::channel;
@@ -7,7 +6,7 @@ use std::thread::{self, Builder};
 
 static GIVEN: OnceLock<bool> = OnceLock::new();
 
-/// Whether as many threads as there are processors, and a few for the line and the page, can be had at once.
+/// Whether as many threads as processors, plus a few for the serial line and the page, can be created.
 pub(crate) fn are_given() -> bool {
     *GIVEN.get_or_init(|| {
         const BESIDE: usize = 4;
@@ -31,19 +30,19 @@ pub(crate) fn are_given() -> bool {
     })
 }
 
-/// Has everything run on the calling thread where there are no others; the results are the same, later.
+/// Runs everything on the calling thread if there are no others; the results are the same.
 pub(crate) fn or_one() {
     if !are_given() {
         let one = rayon::ThreadPoolBuilder::new().num_threads(1);
-        // Refused only where there is a pool already, and this is the first.
+        // Fails only if a pool exists already; this is the first.
         let _ = one.use_current_thread().build_global();
     }
 }
 
-/// Refuses what cannot do without threads.
+/// Rejects commands that need threads.
 ///
 /// # Errors
-/// What to do.
+/// The remedy.
 pub(crate) fn needed(what: &str) -> anyhow::Result<()> {
     match are_given() {
         true => Ok(()),

@@ -1,13 +1,13 @@
-//! A time on the command line: so many samples, or seconds.
+//! A time on the command line, in samples or seconds.
 
 use std::fmt;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
-/// A time as an option takes it: `300` is 300 samples, `0.3s` (also `300ms`, `5min`) is a time of the clock.
+/// A time option: `300` is 300 samples, `0.3s` (also `300ms`, `5min`) is in units of time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum TimeSpan {
-    /// So many sampling periods.
+    /// A number of sampling periods.
     Samples(u32),
     /// Seconds, finite and at least 0.
     Seconds(f64),
@@ -42,7 +42,8 @@ impl TimeSpan {
         }
     }
 
-    /// [`samples`](Self::samples), refused outside `range`; the message names `option`, both bounds and the period.
+    /// [`samples`](Self::samples), rejected outside `range`; the message names `option`, both bounds and the
+    /// period.
     pub(crate) fn samples_within(
         self,
         period_s: f64,
@@ -71,7 +72,7 @@ impl fmt::Display for TimeSpan {
     }
 }
 
-/// A text that is no time.
+/// A text that is not a time.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "`{0}` is no time: give samples as a whole number (300), or a time with its unit (0.3s, 300ms, 5min)"

@@ -1,4 +1,4 @@
-//! A designed law and what came of trying it in the loop.
+//! A designed law with its trials in closed loop.
 
 use host_fit::design::{Margin, Proof};
 use host_fit::picture::significant;
@@ -7,24 +7,24 @@ use serde::Serialize;
 
 use super::words::Words;
 
-/// A law and how it did in the loop.
+/// A law with its trials.
 #[derive(Serialize)]
 pub(super) struct Tried {
     #[serde(flatten)]
     pub(super) design: Design,
     #[serde(flatten)]
     pub(super) proof: Proof,
-    /// How wrong the model may be; none for pulses.
+    /// The robustness margin; none for pulses.
     pub(super) margin: Option<Margin>,
-    /// Which other targets pass, where this one does not.
+    /// Other targets that pass, if this one does not.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) targets: Vec<TargetVerdict>,
-    /// What the trials are without, one sentence each.
+    /// Trials that were not possible, one sentence each.
     pub(super) not_tried: Vec<String>,
 }
 
 impl Tried {
-    /// Why the law must not be written; `switch` is what writes it all the same.
+    /// Why the law must not be written; `switch` is the option that overrides this.
     pub(super) fn refused(&self, switch: &str) -> Option<String> {
         let lost = self.design.law.lost();
         (!lost.is_empty()).then(|| {
@@ -37,7 +37,7 @@ impl Tried {
         })
     }
 
-    /// What to do about a refusal.
+    /// What to do after a rejection.
     fn next_step(&self) -> String {
         let passing: Vec<String> = self
             .targets
@@ -55,12 +55,12 @@ impl Tried {
         }
     }
 
-    /// The answer: whether the law keeps attachment, in which trials, within which margin.
+    /// The answer: whether the law keeps attachment, in which trials, with which margin.
     pub(super) fn answer(&self) -> Answer {
         let verdict = self.verdict();
         let mut lines = verdict.lines();
         let evidence = lines.next().unwrap_or_default();
-        // Of a law that holds a level: how it does on the model without noise.
+        // For a tracking law: its errors on the model without noise.
         let tracks = matches!(self.design.outcome, DesignOutcome::Track(_));
         let model = self.proof.cases.first().filter(|_| tracks);
         let settles = model.is_none_or(|case| case.figures.settling_s.is_some());
@@ -94,7 +94,7 @@ impl Tried {
         answer
     }
 
-    /// What the trials come to, in two sentences.
+    /// The result of the trials in two sentences.
     pub(super) fn verdict(&self) -> String {
         let decide = self.proof.cases.iter().filter(|case| case.group.decides());
         let (decide, lost) = (decide.count(), self.proof.lost());
@@ -125,7 +125,7 @@ fn capitalised(text: &str) -> String {
     first.unwrap_or_default() + letters.as_str()
 }
 
-/// The first of many names, and how many more there are.
+/// The first names of a list, and the number of the others.
 fn few(names: &[String]) -> String {
     const SHOWN: usize = 4;
     let mut text = names[..names.len().min(SHOWN)].join("; ");

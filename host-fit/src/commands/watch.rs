@@ -1,4 +1,4 @@
-//! `host-fit watch`: the closed loop live, logged, and its model judged.
+//! `host-fit watch`: monitors the closed loop, logs it and checks the model.
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -15,46 +15,47 @@ use super::words::Words;
 use super::{Console, interrupt};
 use crate::rig_port::PortArgs;
 
-/// Watch the law at work: a live line, a log that `compare` and `diagnose` read, and whether the model still fits.
+/// Monitor the law in operation: live values, a log for `compare` and `diagnose`, and a check that the model
+/// still fits.
 ///
-/// The residual (reading minus the model, which runs free beside the loop) is averaged over blocks, and each block
-/// judged against the first ones; the chance of any false alarm on a day of 8 hours is set by --false-alarms. The log begins
-/// at rest, and ends where a sample was lost: a record needs its whole history.
+/// The residual (reading minus the model's free run) is averaged over blocks, and each block is compared with
+/// the first ones; the probability of any false alarm in 8 hours is --false-alarms. The log starts at rest
+/// and ends at the first lost sample, because a free run needs the whole history.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
     port: PortArgs,
-    /// Let the law switch the valve after a second of rest, and close it at the end; without this option the loop is only
-    /// observed.
+    /// Let the law switch the valve after a second of rest, and close it at the end; without this option the
+    /// loop is only observed.
     #[arg(long)]
     arm: bool,
-    /// How long, in seconds; until Ctrl-C if not given.
+    /// Duration, s; until Ctrl-C if not given.
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     seconds: Option<f64>,
     /// Folder for the log, a data set.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Longest log, in seconds.
+    /// Longest log, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = positive)]
     log: f64,
-    /// Length of a block, in seconds; several correlation times of the noise.
+    /// Length of a block, s; several correlation times of the noise.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = block)]
     block: f64,
-    /// Blocks of the baseline.
+    /// Number of blocks of the baseline.
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(3..=10_000))]
     learn: u32,
-    /// Chance of a false alarm on a day of 8 hours.
+    /// Probability of a false alarm in 8 hours.
     #[arg(long, value_name = "CHANCE", default_value_t = 0.01, value_parser = positive)]
     false_alarms: f64,
-    /// The rig: what counts stand for. Without it the board's own constants count.
+    /// Rig file with the scale of the readings. Without it the board's own constants are used.
     #[arg(long, value_name = "rig.toml")]
     rig: Option<PathBuf>,
-    /// Take note of a latched fault, or disarm the law, first.
+    /// Acknowledge a latched fault, or disarm the law, first.
     #[arg(long)]
     disarm: bool,
 }
 
-/// A block of at most a day, of which the false alarms are stated.
+/// A block length of at most a day, for which the false-alarm rate is valid.
 fn block(text: &str) -> Result<f64, String> {
     match positive(text)? {
         seconds if (1e-6..=DAY_S).contains(&seconds) => Ok(seconds),
@@ -91,13 +92,11 @@ impl Words for Watched {
 fn judged(verdict: &Verdict) -> String {
     match verdict {
         Verdict::Learning { blocks_left } => {
-            format!(
-                "the model is not judged yet: {blocks_left} blocks are missing that say what is usual"
-            )
+            format!("the model is not checked yet: the baseline needs {blocks_left} more blocks")
         }
         Verdict::True { largest, threshold } => format!(
-            "the model is as true as it was: no block was further off than {largest:.1} standard deviations ({threshold:.1} \
-             would be an alarm)"
+            "the model still fits: the largest deviation of a block is {largest:.1} standard deviations \
+            (alarm at {threshold:.1})"
         ),
         Verdict::Stopped {
             at_s,
@@ -106,8 +105,8 @@ fn judged(verdict: &Verdict) -> String {
             distance,
             threshold,
         } => format!(
-            "THE MODEL HAS STOPPED BEING TRUE at {at_s:.1} s: the residual went from {usual:.4} to {residual:.4}, {:.1} \
-             standard deviations ({threshold:.1} are an alarm); `compare` and `diagnose` read the log",
+            "MODEL NO LONGER FITS at {at_s:.1} s: the residual went from {usual:.4} to {residual:.4}, {:.1} \
+             standard deviations (alarm at {threshold:.1}); check the log with `compare` and `diagnose`",
             distance.abs()
         ),
     }
@@ -148,7 +147,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
             let state = match now.verdict {
                 Verdict::Learning { .. } => "learning",
                 Verdict::True { .. } => "true",
-                Verdict::Stopped { .. } => "STOPPED BEING TRUE",
+                Verdict::Stopped { .. } => "NO LONGER FITS",
             };
             bar.set_message(format!(
                 "{:8.1} s  {}  y {:6.3}{}{}  valve {}  lost {}  model: {state}",
@@ -168,7 +167,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let written: Vec<_> = written.iter().map(PathBuf::as_path).collect();
     console.show(&watched, &[], &written)?;
     console.say(&format!(
-        "chance of a false alarm in {} h: {}",
+        "probability of a false alarm in {} h: {}",
         DAY_S / 3600.0,
         plan.test.false_alarms_per_day
     ))?;

@@ -1,13 +1,14 @@
-//! Where the records of a study begin to count: as the preparation says, and no sooner than what they show is answered.
+//! The first sample of each record that a delay study uses: as the preparation determined, and not before the
+//! response to commands of the record.
 
 use crate::data::{DataSet, Record, Use};
 use crate::preparation::Preparation;
 
-/// A record with what is known of its beginning.
+/// A record and the start of its usable part.
 pub(super) struct Begun {
-    /// From its first sample that answers nothing from before it.
+    /// The record from the first sample that no earlier command influences.
     pub(super) whole: Record,
-    /// The same where an edge before its first sample was only inferred: what answers that does not count.
+    /// The same where an edge before the first sample was inferred: the response to it is excluded.
     shown: Option<Record>,
 }
 
@@ -22,11 +23,11 @@ impl Begun {
             .collect()
     }
 
-    /// `answers` is how long a command before the record is answered at most, samples.
+    /// `answers` is the longest response time to a command before the record, samples.
     fn of(record: &Record, prepared: &Record, answers: usize) -> Self {
         let whole = Record {
             u_before: prepared.u_before,
-            // What is slower is the free state of a plant.
+            // Slower responses are part of the plant's free initial state.
             followed: first_of(&prepared.followed, answers),
             ..record.clone()
         };
@@ -45,7 +46,8 @@ impl Begun {
         self.whole.role == Use::Identify
     }
 
-    /// What a plant is fitted to: an edge that is a few samples off makes a dead time of that and another time constant.
+    /// The part for fitting a plant: an edge time that is wrong by a few samples would bias the dead time and
+    /// a time constant.
     pub(super) fn sure(&self) -> &Record {
         self.shown.as_ref().unwrap_or(&self.whole)
     }

@@ -30,7 +30,7 @@ pub struct DeadTime {
 }
 
 impl DeadTime {
-    /// The mean of some edges of one direction or both; `common` is what they share: order, settings and clock.
+    /// Mean of several edges; `common` is the error that they share: order, settings and clock.
     pub(crate) fn of_edges(edges: &[(f64, f64)], common: f64) -> Option<Self> {
         let n = edges.len();
         if n == 0 {
@@ -42,7 +42,7 @@ impl DeadTime {
         let scatter = spread.sd / (n as f64).sqrt();
         let upper = 0.5 + 0.5 * RULES.confidence;
         let normal = Normal::standard().inverse_cdf(upper);
-        // One edge has no scatter, but its own error.
+        // A single edge has no scatter; its own error is used.
         let student = match n {
             1 => normal,
             _ => StudentsT::new(0.0, 1.0, n as f64 - 1.0).map_or(normal, |t| t.inverse_cdf(upper)),
@@ -68,7 +68,7 @@ impl DeadTime {
     }
 }
 
-/// A share of the law of h.
+/// One component of the mixture for h.
 #[derive(Debug, Clone, Copy)]
 struct Component {
     log_weight: f64,
@@ -92,7 +92,7 @@ pub(crate) fn widened_variance(at: &Evaluation) -> f64 {
     } else {
         0.0
     };
-    // Data without noise still have rounding.
+    // Data without noise still have rounding errors.
     at.rss / free * (1.0 + rho) / (1.0 - rho) + f64::MIN_POSITIVE
 }
 
@@ -163,7 +163,7 @@ pub(crate) fn dead_time(
             }
         }
     }
-    // The value is that of the order that the data ask for (BIC); the interval is that of all orders.
+    // The value comes from the order chosen by BIC, the interval from all orders.
     let samples: usize = best.at.residuals.iter().map(Vec::len).sum();
     let residual = best.at.rss / samples.max(1) as f64;
     let independent = (samples as f64 * residual / noise).max(2.0);
@@ -180,7 +180,8 @@ pub(crate) fn dead_time(
     Some((estimate, usize::from(better)))
 }
 
-/// Mean, spread and interval of a mixture of normal laws, each widened by the standard error of the clock.
+/// Mean, standard deviation and interval of a mixture of normal distributions, each widened by the standard
+/// error of the clock.
 fn mixture(components: &[Component], max_delay: f64, clock: f64) -> Option<DeadTime> {
     let largest = components
         .iter()
@@ -231,7 +232,7 @@ fn mixture(components: &[Component], max_delay: f64, clock: f64) -> Option<DeadT
     })
 }
 
-/// The share of a standard normal law below `z`.
+/// Standard normal distribution function.
 fn normal_share(z: f64) -> f64 {
     0.5 * statrs::function::erf::erfc(-z / std::f64::consts::SQRT_2)
 }

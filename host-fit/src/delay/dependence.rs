@@ -1,4 +1,4 @@
-//! What the delays of the edges depend on: the averaged output, the direction of the edge, both or nothing.
+//! Dependence of the edge delays on the averaged output, on the direction of the edge, on both or on neither.
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -10,14 +10,14 @@ use super::rules::RULES;
 use super::spread::{Spread, spread};
 use super::verdict::DelayVerdict;
 
-/// The three questions put to the points.
+/// The three tests on the points.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Tests {
     pub(super) law: Option<f64>,
     pub(super) law_within: Option<f64>,
     pub(super) direction: Option<f64>,
     pub(super) offset: Option<f64>,
-    /// Change of the delay over the range of ỹ by the law, and by the law beside an offset, samples.
+    /// Change of the delay over the range of ỹ by the law, and by the law with a direction offset, samples.
     change: f64,
     change_within: f64,
 }
@@ -45,7 +45,7 @@ impl Tests {
         let Some(law) = self.law else {
             return DelayVerdict::TooFewEdges;
         };
-        // What is below one sample is rounded away in a model, and within the bias of any measured delay.
+        // A change below one sample is rounded away in a model and within the bias of a measured delay.
         let counts = |p: Option<f64>, size: f64| {
             p.is_some_and(|p| p < RULES.significant) && size.abs() >= RULES.relevant
         };
@@ -106,7 +106,7 @@ fn direction_says_more(points: &[DelayPoint], noticeable: f64) -> bool {
         && n * (rss_direction / law.rss).ln() + (2.0 - 3.0) * n.ln() < -RULES.clearly_better
 }
 
-/// Is there an offset between rising and falling edges beside the law? p of its t test, and the offset in samples.
+/// Offset between rising and falling edges beside the law: p of its t test, and the offset in samples.
 fn direction_test(points: &[DelayPoint]) -> Option<(f64, f64)> {
     let (_, up, down) = by_direction(points);
     if up.count < RULES.tested_each || down.count < RULES.tested_each {
@@ -121,8 +121,9 @@ fn direction_test(points: &[DelayPoint]) -> Option<(f64, f64)> {
     Some((p, with.linear.get(2).copied()?))
 }
 
-/// Probability that a law fits as well as it does when the delays are dealt out to the ỹ at random; `within`: only among
-/// edges of one direction, whose means are taken off first. Exact whatever the noise, and for any number of rates tried.
+/// Permutation test: probability that a law fits as well when the delays are randomly reassigned to the ỹ.
+/// With `within`, only among edges of one direction, whose means are removed first. Exact for any noise and
+/// any number of rates tried.
 fn permutation_test(points: &[DelayPoint], within: bool, seed: u64) -> Option<f64> {
     let groups: Vec<Vec<usize>> = if within {
         [true, false]
@@ -214,7 +215,8 @@ pub(super) fn words(
     };
     match verdict {
         DelayVerdict::TooFewEdges => format!(
-            "{} edge(s) of the identify records could be measured; at least {} are needed to say whether the delay depends on the flow. Use a fixed delay, or record more switching.",
+            "{} edge(s) of the identify records could be measured; at least {} are needed to test whether \
+            the delay depends on y. Use a fixed delay, or record more switching.",
             all.count, RULES.tested_edges
         ),
         DelayVerdict::Fixed => format!(
@@ -223,7 +225,8 @@ pub(super) fn words(
                 Some(reason) if tests.law.is_some_and(|p| p < RULES.significant) =>
                     reason.to_owned(),
                 _ => format!(
-                    "over the range of the averaged output the delay changes by {:.1} samples (p {}), no more than chance or rounding",
+                    "over the range of the averaged output the delay changes by {:.1} samples (p {}), not \
+                    significant, or below one sample",
                     tests.change.abs(),
                     p(tests.law)
                 ),
@@ -233,7 +236,8 @@ pub(super) fn words(
             all.sd
         ),
         DelayVerdict::EdgeDependent => format!(
-            "The law is not supported by these data: what differs is the direction of the edge, {:.1} samples after rising against {:.1} after falling edges, and beyond that the averaged output explains nothing (p {}). Try the effect `edge-dependent-delay`.",
+            "The law is not supported by these data: the delay depends on the direction of the edge ({:.1} \
+            samples after rising, {:.1} after falling edges) and not on the averaged output (p {}). Try the effect `edge-dependent-delay`.",
             up.mean,
             down.mean,
             p(tests.law_within)

@@ -5,7 +5,7 @@ use super::study::DelayStudy;
 use crate::data::Use;
 use crate::picture::{DelayEdge, DelayLawPlot, LawPoint, MeasuredDelay, delay_law};
 
-/// Points of the curve.
+/// Number of points of the curve.
 const POINTS: usize = 200;
 
 /// Draws the measured delays of the identify records over ỹ, with the law and its confidence band. Returns SVG.

@@ -12,8 +12,8 @@ pub struct Edge {
     pub rising: bool,
 }
 
-/// Places (in `switching.changes`) and edges of the changes that count: of an on/off command all, of a graded one those
-/// of at least the rule's share of its `range`.
+/// Indices (in `switching.changes`) and edges of the changes that count: all of an on/off command; of a
+/// graded one those of at least the rule's share of its `range`.
 pub(crate) fn edges(switching: &Switching, range: f64) -> Vec<(usize, Edge)> {
     let least = RULES.smallest_edge * range;
     let mut last = 0.0;

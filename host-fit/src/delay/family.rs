@@ -1,4 +1,4 @@
-//! Dead times of plants that are known, made by a simulator of these tests' own, and of records like strangers bring.
+//! Dead times of simulated plants with known parameters, on records with typical user defects.
 
 use super::{DelayMethod, DelayOptions, DelayStudy, study_delays};
 use crate::data::{DataSet, Record, Use};
@@ -150,8 +150,8 @@ fn level_scale_and_sign_of_y_and_of_u_change_nothing() {
     }
 }
 
-/// What answers a command that the record does not show moves no edge that it does: cut at rest, and 3, 9 and 18 samples
-/// behind an edge.
+/// A record may be cut anywhere (at rest, or 3, 9 and 18 samples after an edge): responses to commands before
+/// it do not bias its own edges.
 #[test]
 fn a_record_may_be_cut_anywhere() {
     let (delay, at) = (20.0, 500);
@@ -229,7 +229,7 @@ fn a_rig_sampled_at_ten_milliseconds_is_measured_at_nearly_every_edge() {
                 u.extend(std::iter::repeat_n(level, rng.random_range(8..18)));
             }
             u.truncate(1200);
-            // h = 3 + 2·exp(−4·y) samples, rates that differ, a gain that sags while blowing.
+            // h = 3 + 2·exp(−4·y) samples, different rates, and a gain that decreases during blowing.
             let steps = 20;
             let (mut value, mut store): (f64, f64) = (0.0, 1.0);
             let y = (0..u.len())

@@ -9,7 +9,7 @@ use super::edge::Edge;
 use super::rules::RULES;
 use super::spread::mean;
 
-/// When a response is expected after an edge of one direction, samples.
+/// Expected arrival of a response to edges of one direction, samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Arrival {
     /// Middle of the front.
@@ -18,7 +18,7 @@ pub(crate) struct Arrival {
     pub(crate) onset: usize,
 }
 
-/// What is known before an edge is looked at.
+/// Prior knowledge for locating single edges.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Expectation {
     rising: Arrival,
@@ -60,14 +60,14 @@ impl Expectation {
     }
 }
 
-/// Where responses arrive on the whole. `None` if there is no edge.
+/// Expected arrival times over all edges. `None` if there is no edge.
 pub(crate) fn expect(
     series: &[(&[f64], Vec<Edge>)],
     levels: &[Vec<f64>],
     max_delay: usize,
     reach: usize,
 ) -> Option<Expectation> {
-    // No edge may count for more than twice the usual one.
+    // No edge counts more than twice the median.
     let mut sizes: Vec<f64> = Vec::new();
     for ((_, edges), levels) in series.iter().zip(levels) {
         for edge in edges {
@@ -139,11 +139,11 @@ pub(crate) fn own_front(levels: &[f64], edge: Edge, expected: &Expectation) -> u
         .map_or(centre, |(k, _)| k)
 }
 
-/// The first peak (within `half_width` to either side) that is nearly as high as the highest.
+/// The earliest peak (within `half_width` to either side) that is nearly as high as the highest.
 ///
-/// In periodic records a peak returns with the period: the soonest is meant. Only where a ringing flow swings back as
-/// fast as it responds is the soonest peak the wrong one; the first edge of each record, which starts from rest, then
-/// votes clearly (`at_rest`) for a later one.
+/// In periodic records the peak recurs with the period, and the earliest is the right one. Where a lightly
+/// damped flow swings back as fast as it responds, the earliest peak may be wrong; the first edge of each
+/// record, which starts from rest, then decides (`at_rest`).
 fn soonest_peak(votes: &[f64], at_rest: &[f64], half_width: usize) -> Option<usize> {
     let highest = votes.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let peaks: Vec<usize> = (0..votes.len())
@@ -166,9 +166,10 @@ fn soonest_peak(votes: &[f64], at_rest: &[f64], half_width: usize) -> Option<usi
         .or(Some(soonest))
 }
 
-/// +1 if y lies above its level at rest on the whole, −1 if below. y at rest is y before the first edge, or 0.
+/// +1 if y is mostly above its level at rest, −1 if below. The level at rest is y before the first edge, or
+/// 0.
 ///
-/// The fronts alone do not tell: a square wave of 50 % and its inverse half a period later look alike.
+/// The fronts alone are ambiguous: a square wave of 50 % duty equals its inverse half a period later.
 fn gain_sign(series: &[(&[f64], Vec<Edge>)]) -> f64 {
     let mut sum = 0.0;
     for (y, edges) in series {

@@ -11,7 +11,7 @@ use super::rules::RULES;
 use super::verdict::DelayVerdict;
 use crate::linalg;
 
-/// One point of the law: averaged output (1) at the response, delay in samples.
+/// A point of the law: averaged output (1) at the response, delay in samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DelayPoint {
     /// ỹ when the response starts.
@@ -106,8 +106,8 @@ impl DelayLawFit {
         (self.at(low) - self.at(high), variance.max(0.0).sqrt())
     }
 
-    /// Why the law is not to be used although it was fitted, if there is a reason. `data` are the smallest and the
-    /// largest ỹ of all samples, `longest` is the longest delay that was looked for.
+    /// Why a fitted law must not be used, if there is a reason. `data` are the smallest and largest ỹ of all
+    /// samples, `longest` is the longest delay that was searched.
     pub(crate) fn objection(
         &self,
         verdict: DelayVerdict,
@@ -121,12 +121,13 @@ impl DelayLawFit {
         let range = format!("ỹ from {:.3} to {:.3}", self.range.0, self.range.1);
         if least.is_nan() || least < 0.0 {
             return Some(format!(
-                "it is {least:.1} samples at an ỹ of these data, and a delay cannot be below 0"
+                "it is {least:.1} samples at a ỹ within these data, and a delay cannot be negative"
             ));
         }
         if most > longest {
             return Some(format!(
-                "it is {most:.3e} samples at an ỹ of these data, and delays up to {longest:.0} were looked for"
+                "it is {most:.3e} samples at a ỹ within these data, and delays were searched up to \
+                {longest:.0}"
             ));
         }
         let error = self.quantile * standard_error;
@@ -135,17 +136,17 @@ impl DelayLawFit {
             return Some(if standard_error.is_finite() {
                 format!("it changes by {change:.1} ± {standard_error:.1} samples over {range}")
             } else {
-                format!("its change of {change:.1} samples over {range} is not determined")
+                format!("its change of {change:.1} samples over {range} is not identifiable")
             });
         }
         match verdict {
             DelayVerdict::StateDependent | DelayVerdict::EdgeAndStateDependent => None,
             DelayVerdict::Fixed => Some(format!(
-                "a constant describes the delays as well over {range} (permutation test)"
+                "a constant delay fits equally well over {range} (permutation test)"
             )),
-            DelayVerdict::EdgeDependent => Some(
-                "one delay for each direction of the edge describes the delays as well".to_owned(),
-            ),
+            DelayVerdict::EdgeDependent => {
+                Some("one delay per edge direction fits equally well".to_owned())
+            }
             DelayVerdict::TooFewEdges => Some(format!(
                 "{} edges are too few to test it against a constant",
                 self.edges
@@ -160,7 +161,7 @@ fn gradient(p1: f64, p2: f64, mean_output: f64) -> [f64; 3] {
     [1.0, e, -p1 * p2 * mean_output * e]
 }
 
-/// A least-squares fit at one value of p2.
+/// Least-squares fit at a fixed p2.
 #[derive(Debug, Clone)]
 pub(crate) struct AtRate {
     /// p0, p1 and, if a further column was given, its coefficient.
@@ -269,7 +270,7 @@ pub(crate) fn best_rate(
     Some((rate, rss(rate)?))
 }
 
-/// Indices of the points that a robust (Huber) fit leaves far outside.
+/// Indices of the outliers of a robust (Huber) fit.
 fn outliers(points: &[DelayPoint]) -> Vec<usize> {
     let mut weights = vec![1.0; points.len()];
     let mut found = Vec::new();
@@ -341,7 +342,7 @@ pub fn fit_delay_law(points: &[DelayPoint]) -> Option<DelayLawFit> {
             }
         }
     }
-    // A direction that the data say nothing about has an infinite error, not none.
+    // An undetermined direction has an infinite error.
     let mut covariance = [[f64::INFINITY; 3]; 3];
     for (axis, row) in covariance.iter_mut().enumerate() {
         let unit: Vec<f64> = (0..3).map(|i| f64::from(u8::from(i == axis))).collect();

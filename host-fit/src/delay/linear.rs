@@ -11,13 +11,13 @@ use super::spread::mean;
 use crate::data::Record;
 use crate::linalg::{dot, solve_symmetric};
 
-/// Samples that the grid search is allowed; longer records are decimated.
+/// Most samples for the grid search; longer records are decimated.
 const COARSE_SAMPLES: usize = 2_000;
 /// Sums of time constants that the grid search tries, in steps of this factor.
 const COARSE_STEP: f64 = 1.5;
-/// Ratios b that the grid search tries: first order, and nearly equal time constants.
+/// Ratios b of the grid search: first order, and nearly equal time constants.
 const COARSE_RATIOS: [f64; 2] = [0.0, 0.2];
-/// Valleys of the grid, one after the other along the time constants, that are followed down.
+/// Number of grid minima, over the time constants, that are refined.
 const COARSE_STARTS: usize = 3;
 /// Largest ratio: damping ratio 0.2.
 const LARGEST_RATIO: f64 = 6.0;
@@ -26,14 +26,14 @@ const STARTS: [f64; 3] = [0.02, 0.1, 0.25];
 /// Steps of Levenberg–Marquardt.
 const STEPS: usize = 40;
 
-/// One record, ready for fits.
+/// One record prepared for fits.
 #[derive(Debug, Clone)]
 pub(crate) struct Series {
     /// y less its mean; 0 before `from`.
     pub(crate) y: Vec<f64>,
     /// The changes of u.
     pub(crate) switching: Switching,
-    /// The first sample that counts: earlier ones answer commands that the record does not show.
+    /// The first used sample: earlier ones respond to commands before the record.
     pub(crate) from: usize,
 }
 
@@ -52,12 +52,12 @@ impl Series {
         }
     }
 
-    /// Sets what does not count to 0.
+    /// Sets unused samples to 0.
     fn counted(&self, values: &mut [f64]) {
         values.iter_mut().take(self.from).for_each(|v| *v = 0.0);
     }
 
-    /// Means of `factor` samples each in place of samples; each stands for the middle of its block.
+    /// Decimated by means over `factor` samples, each at the middle of its block.
     pub(crate) fn thinned(&self, factor: usize) -> Self {
         if factor <= 1 {
             return self.clone();
@@ -74,7 +74,7 @@ impl Series {
         }
     }
 
-    /// Every `factor`-th sample; unlike [`thinned`](Self::thinned) this blurs nothing.
+    /// Every `factor`-th sample; no smoothing, unlike [`thinned`](Self::thinned).
     pub(crate) fn picked(&self, factor: usize) -> Self {
         let factor = factor.max(1);
         let mut switching = self.switching.clone();
@@ -88,13 +88,13 @@ impl Series {
         }
     }
 
-    /// The response of a plant from rest with gain 1, where it counts, into `out`.
+    /// The response of a plant from rest with gain 1 on the used samples, written into `out`.
     fn respond(&self, plant: &Plant, out: &mut [f64]) {
         plant.respond(&self.switching, out);
         self.counted(out);
     }
 
-    /// What a plant with a gain leaves of y; level and initial state are the record's own.
+    /// Residual of y for a plant with a gain; level and initial state of the record are eliminated.
     pub(crate) fn residual(&self, plant: &Plant, gain: f64) -> Vec<f64> {
         let mut residual = self.y.clone();
         let mut response = vec![0.0; residual.len()];
@@ -107,14 +107,14 @@ impl Series {
         residual
     }
 
-    /// An orthonormal basis of what y does without the command: a level and the free courses.
+    /// Orthonormal basis of the output without command: a constant and the free responses.
     fn basis(&self, plant: &Plant) -> Vec<Vec<f64>> {
         let n = self.y.len();
         let mut basis: Vec<Vec<f64>> = Vec::with_capacity(3);
         for mut column in std::iter::once(vec![1.0; n]).chain(plant.free(&self.switching, n)) {
             self.counted(&mut column);
             let before = dot(&column, &column);
-            // Twice: once leaves rounding errors.
+            // Repeated once to remove rounding errors.
             for _ in 0..2 {
                 remove(&basis, &mut column);
             }
@@ -128,13 +128,13 @@ impl Series {
         basis
     }
 
-    /// Takes level and free courses out of `values`, which are as long as the record.
+    /// Projects level and free responses out of `values` (one per sample of the record).
     pub(crate) fn without_nuisance(&self, plant: &Plant, values: &mut [f64]) {
         remove(&self.basis(plant), values);
     }
 }
 
-/// Takes out of `column` what an orthonormal basis holds.
+/// Projects an orthonormal basis out of `column`.
 fn remove(basis: &[Vec<f64>], column: &mut [f64]) {
     for b in basis {
         let share = dot(b, column);
@@ -182,7 +182,7 @@ fn eliminate(series: &[Series], plant: &Plant) -> Eliminated {
     }
 }
 
-/// The best gain and what it leaves. `None` where the command says nothing.
+/// The best gain and the remaining sum of squares. `None` if the command has no influence.
 fn gain_and_rss(
     series: &[Series],
     parts: &Eliminated,
@@ -227,8 +227,8 @@ pub(crate) fn evaluate(series: &[Series], plant: Plant) -> Option<Evaluation> {
     })
 }
 
-/// First-order and second-order linear plants from a grid over decimated records: the deepest valleys along the time
-/// constants. A free initial state makes more than one: it bends y like a response does.
+/// Initial linear plants of first and second order from a grid over decimated records: the deepest minima
+/// along the time constants. There may be several, because a free initial state can imitate a response.
 pub(crate) fn coarse(series: &[Series], max_delay: f64, spacing: usize) -> Vec<Plant> {
     let samples: usize = series.iter().map(|s| s.y.len()).sum();
     let factor = samples
@@ -241,12 +241,13 @@ pub(crate) fn coarse(series: &[Series], max_delay: f64, spacing: usize) -> Vec<P
     let mut starts = Vec::new();
     let mut responses = Vec::new();
     for ratio in COARSE_RATIOS {
-        // The best of each time constant.
+        // The best plant for each time constant.
         let mut floor: Vec<(f64, Plant)> = Vec::new();
-        // Over a long range of delays the shortest time constants would take too many steps, and tell no more.
+        // For a long range of delays the shortest time constants would need too many steps, without better
+        // resolution.
         let mut sum = (last / 300.0).max(1.0);
         while sum < 4.0 * longest {
-            // A linear plant's free course does not depend on the dead time.
+            // A linear plant's free response does not depend on the dead time.
             let parts = eliminate(&thinned, &Plant::linear(0.0, sum, ratio));
             // The response hardly changes within a quarter of its time constant.
             let step = (sum / 4.0).floor().clamp(1.0, (last / 16.0).max(1.0));
@@ -313,12 +314,13 @@ impl Free {
     }
 }
 
-/// What Levenberg–Marquardt ends with.
+/// Result of Levenberg–Marquardt.
 #[derive(Debug, Clone)]
 pub(crate) struct Refined {
     /// The fit.
     pub(crate) at: Evaluation,
-    /// (JᵀJ)⁻¹ over h, ln S, b where it was free, and the differences; the variance of h is `[0]` times that of the residual.
+    /// (JᵀJ)⁻¹ over h, ln S, b where it was free, and the differences; the variance of h is element `[0]`
+    /// times the residual variance.
     pub(crate) inverse: Option<Vec<f64>>,
 }
 
@@ -427,7 +429,8 @@ fn invert(gram: &[f64], size: usize) -> Option<Vec<f64>> {
     Some(inverse)
 }
 
-/// The best first-order plant, and the best second-order one where that is better, from the `starts` of [`coarse`]. Empty where the command says nothing.
+/// The best first-order plant, and the best second-order one if it is better, from the `starts` of
+/// [`coarse`]. Empty if the command has no influence.
 pub(crate) fn fit(series: &[Series], starts: &[Plant], max_delay: f64) -> Vec<Refined> {
     let (of_first, of_second): (Vec<&Plant>, Vec<&Plant>) =
         starts.iter().partition(|p| p.is_first_order());
@@ -441,7 +444,7 @@ pub(crate) fn fit(series: &[Series], starts: &[Plant], max_delay: f64) -> Vec<Re
     };
     let around = STARTS.into_iter().map(|ratio| {
         let plant = first.at.plant;
-        // The second time constant is about b·S; the dead time gives it.
+        // The second time constant is about b·S; it is taken from the dead time.
         let second = ratio * plant.mean_sum();
         Plant::linear(
             (plant.mean_delay() - second).max(0.0),

@@ -13,7 +13,7 @@ use super::pooled::Pooled;
 use super::rules::RULES;
 use super::spread::mean;
 
-/// Edges that the time constants are searched on.
+/// Most edges used to estimate the time constants.
 const SHAPE_EDGES: usize = 60;
 /// Fewest samples on either side of an arrival.
 const LEAST_SIDE: f64 = 2.0;
@@ -29,7 +29,7 @@ pub(crate) struct EdgeDelayed {
     pub(crate) standard_error: f64,
 }
 
-/// The best point of a sampled valley, in steps, and its curvature (per squared step), by a parabola.
+/// Minimum of a sampled curve by a parabola, in steps, with its curvature (per squared step).
 fn valley(values: &[f64]) -> Option<(f64, f64)> {
     let (best, middle) = values
         .iter()
@@ -60,7 +60,7 @@ pub(crate) fn by_trajectory(
         .collect()
 }
 
-/// The shift of one response of `size` that explains the residual around it best.
+/// The shift of one response of `size` that explains the surrounding residual best.
 fn shifted(
     series: &Series,
     pooled: &Pooled,
@@ -139,7 +139,7 @@ fn shifted(
         .collect();
     let (place, curvature) = match valley(&profile) {
         Some(found) => found,
-        // At a dead time of 0 the valley has one side only.
+        // At a dead time of 0 the minimum has one side only.
         None if profile
             .first()
             .is_some_and(|first| delay <= half && profile.iter().all(|value| value >= first)) =>
@@ -156,7 +156,7 @@ fn shifted(
     })
 }
 
-/// An edge with the stretch of its record between the neighbouring responses.
+/// An edge with the part of its record between the neighbouring responses.
 #[derive(Debug, Clone)]
 struct Window<'a> {
     y: &'a [f64],
@@ -165,7 +165,7 @@ struct Window<'a> {
     change: Change,
     /// Change of the command.
     size: f64,
-    /// First and last arrival that is tried, samples of the record.
+    /// First and last arrival that are tried, samples of the record.
     first: f64,
     last: f64,
 }
@@ -175,7 +175,7 @@ struct Window<'a> {
 struct Measured {
     arrival: f64,
     rss: f64,
-    /// Of `rss`, per squared sample of arrival.
+    /// Curvature of `rss` per squared sample of arrival.
     curvature: f64,
     free: f64,
 }
@@ -225,7 +225,7 @@ impl<'a> Window<'a> {
         })
     }
 
-    /// Residual sum of squares where the response arrives at `arrival`; a response of the wrong sign does not count.
+    /// Residual sum of squares for an arrival at `arrival`; a response of the wrong sign does not count.
     fn rss(&self, plant: &Plant, arrival: f64, gain_sign: f64) -> f64 {
         let series = Series {
             y: self.y.to_vec(),
@@ -286,7 +286,7 @@ pub(crate) fn by_window(
         .collect();
     let mut plant = pooled.plant;
     let mut measured: Vec<Vec<Option<Measured>>> = Vec::new();
-    // Twice: the neighbouring responses bound a window, and are known only roughly at first.
+    // Two passes: the neighbouring responses bound a window and are known only roughly at first.
     for _ in 0..2 {
         let windows: Vec<Vec<Option<Window<'_>>>> = all
             .iter()
@@ -299,7 +299,7 @@ pub(crate) fn by_window(
             .collect();
         let some: Vec<&Window<'_>> = windows.iter().flatten().flatten().collect();
         let stride = some.len().div_ceil(SHAPE_EDGES).max(1);
-        // An odd stride takes rising and falling edges in turn.
+        // An odd stride alternates between rising and falling edges.
         let stride = stride + usize::from(stride > 1 && stride.is_multiple_of(2));
         let some: Vec<&Window<'_>> = some.into_iter().step_by(stride).collect();
         plant = shape(&some, plant, gain_sign);
@@ -352,7 +352,7 @@ pub(crate) fn by_window(
         .collect()
 }
 
-/// The time constants that leave least in some windows, each at its best arrival.
+/// The time constants with the least residual over some windows, each at its best arrival.
 fn shape(windows: &[&Window<'_>], start: Plant, gain_sign: f64) -> Plant {
     let left = |plant: &Plant| -> f64 {
         windows
@@ -400,7 +400,7 @@ fn shape(windows: &[&Window<'_>], start: Plant, gain_sign: f64) -> Plant {
     let best = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     match (first, best) {
         (Some(first), Some(best)) => {
-            // A second order must say more than its parameter takes (BIC).
+            // A second order must pay for its parameter (BIC).
             let samples = samples.max(2) as f64;
             let gain = samples * (first.0 / best.0.max(f64::MIN_POSITIVE)).ln();
             if gain > samples.ln() { best.1 } else { first.1 }

@@ -25,11 +25,11 @@ use crate::linalg::dot;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Unmeasured {
-    /// The next edge, or the end of the record, comes before the response can be told.
+    /// The next edge, or the end of the record, comes before the response is visible.
     CutOff,
-    /// No response in the direction of the edge stands above the noise.
+    /// No response in the direction of the edge is significant.
     BelowNoise,
-    /// There is a response, but its start is blurred by more than a few samples.
+    /// There is a response, but its start is uncertain by more than a few samples.
     Blurred,
 }
 
@@ -40,7 +40,7 @@ impl Unmeasured {
         match self {
             Self::CutOff => "cut off by the next edge or the end of the record",
             Self::BelowNoise => "no response above the noise",
-            Self::Blurred => "start of the response blurred by the noise",
+            Self::Blurred => "start of the response too uncertain because of the noise",
         }
     }
 }
@@ -57,7 +57,7 @@ pub struct Onset {
     pub half_response: Option<f64>,
 }
 
-/// The stretch of a record in which one response can be seen, and the arrivals that are tried.
+/// The part of a record in which one response is visible, with the arrivals to try.
 #[derive(Debug, Clone, Copy)]
 struct Stretch {
     from: usize,
@@ -66,7 +66,7 @@ struct Stretch {
     last_arrival: f64,
 }
 
-/// One edge with what surrounds it.
+/// One edge with its surroundings.
 struct Neighbourhood<'a> {
     y: &'a [f64],
     edge: Edge,
@@ -83,7 +83,7 @@ impl<'a> Neighbourhood<'a> {
         index: usize,
         expected: &'a Expectation,
     ) -> Result<Self, Unmeasured> {
-        // Room for the neighbouring responses to come late or early.
+        // Margin for neighbouring responses that are late or early.
         let room = (expected.reach / 4).max(2);
         let start = |e: &Edge| e.sample + expected.of(*e).onset;
         Ok(Self {
@@ -109,7 +109,7 @@ impl<'a> Neighbourhood<'a> {
         last: f64,
     ) -> Result<Stretch, Unmeasured> {
         let (from, to) = (from.max(self.earliest), to.min(self.latest));
-        // A record that starts with an edge has nothing but the zero history before it.
+        // Before a record that starts with an edge there is only the zero history.
         let left = if from == 0 { 0 } else { RULES.least_side };
         let stretch = Stretch {
             from,
@@ -124,18 +124,18 @@ impl<'a> Neighbourhood<'a> {
         room.then_some(stretch).ok_or(Unmeasured::CutOff)
     }
 
-    /// To a sample, around the front.
+    /// Location to one sample, around the front.
     fn roughly(&self, levels: &[f64]) -> Result<Located, Unmeasured> {
         let reach = self.expected.reach;
         let front = own_front(levels, self.edge, self.expected);
-        // The front is the middle of the rise, between 0 and `reach` after its start.
+        // The front is the middle of the rise, 0 to `reach` samples after its start.
         let stretch = self.stretch(
             front.saturating_sub(2 * reach),
             front + reach,
             front as f64 - 1.5 * reach as f64,
             front as f64 + reach as f64 / 3.0,
         )?;
-        // What is expected before the stretch begins is hidden by the response to the edge before.
+        // An arrival before the interval begins is hidden by the response to the previous edge.
         let expected = self.edge.sample + self.expected.of(self.edge).onset;
         if ((expected + 2) as f64) < stretch.first_arrival {
             return Err(Unmeasured::CutOff);
@@ -145,7 +145,7 @@ impl<'a> Neighbourhood<'a> {
         profile(self.y, stretch, coarse, 1.0, direction).ok_or(Unmeasured::BelowNoise)
     }
 
-    /// To a fraction of a sample.
+    /// Location to a fraction of a sample.
     fn exactly(&self, levels: &[f64]) -> Result<Onset, Unmeasured> {
         let rough = self.roughly(levels)?;
         let reach = self.expected.reach;
@@ -186,7 +186,7 @@ impl<'a> Neighbourhood<'a> {
 
 /// The responses to all edges of some records of one rig, in the order of the edges.
 ///
-/// Two rounds: where the neighbouring responses start is known only roughly in the first.
+/// Two passes: the starts of neighbouring responses are known only roughly in the first.
 pub(crate) fn measure_all(
     series: &[(&[f64], Vec<Edge>)],
     max_delay: usize,
@@ -223,19 +223,19 @@ pub(crate) fn measure_all(
         .collect()
 }
 
-/// The best arrival in a stretch.
+/// The best arrival in an interval.
 #[derive(Debug, Clone, Copy)]
 struct Located {
     arrival: f64,
     standard_error: f64,
-    /// Fall of the residual sum of squares through the response, in noise variances.
+    /// Reduction of the residual sum of squares by the response, in noise variances.
     evidence: f64,
     /// Fitted y at the arrival.
     level: f64,
 }
 
 impl Located {
-    /// Itself, if it stands out from the noise and is sharp enough.
+    /// The result, if it is significant and precise enough.
     fn checked(self) -> Result<Self, Unmeasured> {
         if self.evidence < RULES.detection {
             Err(Unmeasured::BelowNoise)
@@ -247,7 +247,7 @@ impl Located {
     }
 }
 
-/// A regressor with its mean taken off, and its products.
+/// A regressor with its mean removed, and its products.
 #[derive(Debug, Clone)]
 struct Column {
     values: Vec<f64>,
@@ -267,7 +267,7 @@ impl Column {
     }
 }
 
-/// The response from `arrival` (in samples of the stretch) on, written into `out`.
+/// The response from `arrival` on (in samples of the interval), written into `out`.
 fn write_response(out: &mut [f64], arrival: f64, tau: f64) {
     let n = out.len() as f64;
     let first = arrival.max(0.0).ceil();
@@ -287,7 +287,7 @@ fn write_response(out: &mut [f64], arrival: f64, tau: f64) {
     }
 }
 
-/// Least squares over all arrivals and shapes in a stretch.
+/// Least squares over all arrivals and shapes in an interval.
 fn profile(
     y: &[f64],
     stretch: Stretch,
@@ -366,7 +366,7 @@ fn profile(
         .map(|((y, b), r)| y - best.course * b - best.gain * (r - best.r_mean))
         .collect();
     let free = n.saturating_sub(6).max(1) as f64;
-    // Data without noise still have rounding: no certainty beyond it.
+    // Data without noise still have rounding errors, which limit the precision.
     let variance = best.rss / free + 1e-18 * (level * level + total / n as f64) + f64::MIN_POSITIVE;
     let widened = variance * widening(&residual);
     let rss_without = befores
@@ -389,7 +389,7 @@ fn profile(
     })
 }
 
-/// The best of all fits of a stretch.
+/// The best fit in an interval.
 #[derive(Debug, Clone, Copy)]
 struct Best {
     rss: f64,
@@ -402,7 +402,7 @@ struct Best {
     r_mean: f64,
 }
 
-/// How many steps (with the fraction of the last) a profile takes to rise above a limit.
+/// Number of steps (with fraction) after which a profile exceeds a limit.
 fn reach_of_limit<'a>(values: impl Iterator<Item = &'a f64>, start: f64, limit: f64) -> f64 {
     let mut last = start;
     let mut steps = 0.0;
@@ -421,7 +421,7 @@ fn reach_of_limit<'a>(values: impl Iterator<Item = &'a f64>, start: f64, limit: 
     steps
 }
 
-/// By how much autocorrelation widens a variance: (1 + ρ)/(1 − ρ) of a first-order process, at most 10.
+/// Variance inflation by autocorrelation: (1 + ρ)/(1 − ρ) of a first-order process, at most 10.
 fn widening(residual: &[f64]) -> f64 {
     let square = dot(residual, residual);
     let lagged: f64 = residual.windows(2).map(|w| w[0] * w[1]).sum();

@@ -10,10 +10,10 @@
 /// Below this ratio the second time constant counts as 0.
 const FIRST_ORDER: f64 = 1e-5;
 
-/// Changes of the command of one record.
+/// The changes of the command in one record.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Switching {
-    /// In the order of time.
+    /// In order of time.
     pub(crate) changes: Vec<Change>,
     /// Whether the command is on (in the upper half of its range) before the first of them.
     pub(crate) on: bool,
@@ -24,7 +24,7 @@ pub(crate) struct Switching {
 pub(crate) struct Change {
     /// Its time, samples; that of the first sample with the new command.
     pub(crate) time: f64,
-    /// The new command less that before the record.
+    /// The new command minus that before the record.
     pub(crate) level: f64,
     /// Whether it rose.
     pub(crate) rising: bool,
@@ -109,7 +109,7 @@ impl Dynamics {
     }
 }
 
-/// Transitions already computed.
+/// Cache of transition matrices.
 #[derive(Debug, Default)]
 struct Memory(Vec<(usize, f64, Square)>);
 
@@ -123,7 +123,7 @@ impl Plant {
         }
     }
 
-    /// Whether there is one time constant only.
+    /// Whether there is only one time constant.
     pub(crate) fn is_first_order(&self) -> bool {
         self.ratio < FIRST_ORDER
     }
@@ -138,7 +138,7 @@ impl Plant {
         f64::midpoint(self.sum[0], self.sum[1])
     }
 
-    /// The same plant where a sample is `factor` times shorter.
+    /// The same plant at a sampling period `factor` times longer.
     pub(crate) fn slower(&self, factor: f64) -> Self {
         Self {
             delay: self.delay.map(|h| h * factor),
@@ -147,7 +147,7 @@ impl Plant {
         }
     }
 
-    /// When the changes arrive: time, level, on. A change that a later one overtakes is never seen.
+    /// Arrivals of the changes: time, level, on. A change overtaken by a later one has no effect.
     fn arrivals(&self, switching: &Switching) -> Vec<(f64, f64, bool)> {
         let mut arrivals: Vec<(f64, f64, bool)> = Vec::with_capacity(switching.changes.len());
         for change in &switching.changes {
@@ -175,7 +175,7 @@ impl Plant {
         square
     }
 
-    /// Runs over `n` samples from a state (y, b·S·ẏ); levels count `gain` times.
+    /// Simulates `n` samples from a state (y, b·S·ẏ); levels are multiplied by `gain`.
     fn run(&self, switching: &Switching, start: [f64; 2], gain: f64, out: &mut [f64]) {
         let arrivals = self.arrivals(switching);
         let mut next = arrivals.iter().peekable();
@@ -217,7 +217,8 @@ impl Plant {
         self.run(switching, [0.0, 0.0], 1.0, out);
     }
 
-    /// The free courses of `n` samples, one for each order: all that y can do without an input, but for its level.
+    /// The free responses of `n` samples, one per order: all possible outputs without input, except the
+    /// constant level.
     pub(crate) fn free(&self, switching: &Switching, n: usize) -> Vec<Vec<f64>> {
         let course = |start: [f64; 2]| {
             let mut out = vec![0.0; n];

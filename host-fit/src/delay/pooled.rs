@@ -1,4 +1,4 @@
-//! All edges of all records together: time scales, what u was before each record, one plant, one dead time.
+//! Fit to all edges of all records: time scales, command before each record, one plant, one dead time.
 
 use super::dead_time::{DeadTime, dead_time, widened_variance};
 use super::linear::{Free, Refined, Series, coarse, evaluate, fit, refine};
@@ -10,7 +10,7 @@ use crate::linalg::dot;
 /// Samples of the refinement; longer records are thinned as far as the time constants allow.
 const FIT_SAMPLES: usize = 12_000;
 
-/// What all records together say.
+/// Result of the pooled fit.
 #[derive(Debug, Clone)]
 pub(crate) struct Pooled {
     /// Smallest and largest command.
@@ -19,15 +19,15 @@ pub(crate) struct Pooled {
     pub(crate) plant: Plant,
     /// K, units of y per unit of u.
     pub(crate) gain: f64,
-    /// The dead time over all edges; the middle of both directions where they differ.
+    /// The dead time over all edges; the mean of both directions if they differ.
     pub(crate) dead_time: DeadTime,
     /// Variance of the residual per sample, widened for its autocorrelation.
     pub(crate) noise: f64,
-    /// Whether the plant leaves little more than noise.
+    /// Whether the plant's residual is close to the noise.
     pub(crate) describes: bool,
-    /// Whether the command moves y beyond the noise.
+    /// Whether the response of y to the command is significant.
     pub(crate) responds: bool,
-    /// The longest delay that is looked for, samples.
+    /// The longest delay that is searched, samples.
     pub(crate) max_delay: f64,
 }
 
@@ -61,8 +61,8 @@ pub(crate) fn spacing(records: &[&Record]) -> usize {
     *times.select_nth_unstable(middle).1
 }
 
-/// Variance of white noise in some records, from the median of the squared second differences of y: few of them are in
-/// the bend of a response.
+/// Variance of white noise in some records, from the median of the squared second differences of y, to which
+/// responses contribute only in few samples.
 fn white_noise(records: &[&Record]) -> f64 {
     let mut squares: Vec<f64> = records
         .iter()
@@ -151,7 +151,7 @@ pub(crate) fn longest_delay(records: &[&Record]) -> usize {
         .max(1)
 }
 
-/// The fits, with dynamics and then dead times that differ by direction where that is better beyond chance.
+/// The fits, with dynamics and then dead times that differ by direction if that is significantly better.
 fn with_directions(series: &[Series], fits: Vec<Refined>, max_delay: f64) -> (Vec<Refined>, Free) {
     let changes = series.iter().flat_map(|s| &s.switching.changes);
     let rising = changes.clone().filter(|c| c.rising).count();
@@ -180,7 +180,7 @@ fn with_directions(series: &[Series], fits: Vec<Refined>, max_delay: f64) -> (Ve
         let Some(best) = next.iter().min_by(|a, b| a.at.rss.total_cmp(&b.at.rss)) else {
             break;
         };
-        // A disturbance that the further parameters take up would whiten the residual: neither variance alone is it.
+        // Further parameters that follow a disturbance whiten the residual: both variances are considered.
         let before = known
             .iter()
             .min_by(|a, b| a.at.rss.total_cmp(&b.at.rss))

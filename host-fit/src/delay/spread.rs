@@ -11,7 +11,7 @@ pub struct Spread {
     pub sd: f64,
 }
 
-/// Mean; 0 of nothing.
+/// Mean; 0 of an empty slice.
 pub(super) fn mean(x: &[f64]) -> f64 {
     x.iter().sum::<f64>() / x.len().max(1) as f64
 }

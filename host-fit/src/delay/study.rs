@@ -1,4 +1,4 @@
-//! All delays of a data set, the law through them, their statistics, and whether the data bear the law out.
+//! The delays of a data set: the fitted law, their statistics, and the tests on which the verdict rests.
 
 use super::begun::Begun;
 use super::dead_time::DeadTime;
@@ -17,16 +17,16 @@ use crate::averages::averaged_past;
 use crate::data::{DataError, DataSet, Record, Use};
 use model_core::average::WINDOW;
 
-/// How delays are measured. What is `None` follows from the time scales of the data.
+/// Options of the measurement. `None` means: chosen from the time scales of the data.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DelayOptions {
     /// W of the averaged output (1), samples; 250 in the paper and in every model that is fitted.
     pub window: u32,
-    /// Longest delay that is looked for, samples. Otherwise as long as the records can show.
+    /// Longest delay that is searched, samples. By default the longest that the records can show.
     pub max_delay: Option<usize>,
-    /// Samples of y used on either side of the start of a response where each edge is measured by itself: more average
-    /// away more noise, fewer cope with faster responses. Otherwise three response times, or half the time between
-    /// edges if that is less.
+    /// Samples of y used on either side of a response's start where each edge is located by itself: more
+    /// reduce the noise, fewer suit faster responses. By default three response times, or half the time
+    /// between edges if that is less.
     pub reach: Option<usize>,
     /// Seed of the permutation tests.
     pub seed: u64,
@@ -43,15 +43,16 @@ impl Default for DelayOptions {
     }
 }
 
-/// How the delays of the edges were measured.
+/// Method by which the delays of the edges were measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DelayMethod {
-    /// One plant describes the records; each edge is moved on its trajectory.
+    /// One plant describes the records; each edge is shifted on its trajectory.
     Trajectory,
-    /// The kink where y starts to head elsewhere, for each edge by itself.
+    /// Each edge by itself: the kink where y changes course.
     Kink,
-    /// Each edge in its window with the time constants of all: for records with few samples between edges.
+    /// Each edge in its own window with the common time constants: for records with few samples between
+    /// edges.
     Window,
 }
 
@@ -67,7 +68,7 @@ impl DelayMethod {
     }
 }
 
-/// The plant that describes the responses best, as far as one does.
+/// The best-fitting plant of the response, if one fits.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct ResponsePlant {
     /// 1 or 2.
@@ -110,7 +111,7 @@ pub struct DelayStatistics {
     pub correlation_input: Option<f64>,
     /// Correlation of the edges' delays with ỹ at the response.
     pub correlation_output: Option<f64>,
-    /// The law evaluated at every sample of the identify records (ỹ below 0 counts as 0): the delay sequence a model uses.
+    /// The law evaluated at every sample of the identify records (ỹ below 0 counts as 0), as a model does.
     pub sequence: Option<SequenceStatistics>,
 }
 
@@ -130,45 +131,45 @@ pub struct SequenceStatistics {
 pub struct DelayStudy {
     /// Every edge of every record.
     pub edges: Vec<EdgeDelay>,
-    /// How they were measured.
+    /// Method of measurement.
     pub method: DelayMethod,
-    /// Longest delay that was looked for, samples.
+    /// Longest delay that was searched, samples.
     pub max_delay: usize,
-    /// Samples of y on either side of a response, where each edge was measured by itself.
+    /// Samples of y on either side of a response, where each edge was located by itself.
     pub reach: usize,
-    /// The plant that describes the responses; `None` where none does.
+    /// The plant of the response; `None` if none fits.
     pub plant: Option<ResponsePlant>,
     /// The dead time over all measured edges of the identify records. Its interval covers the order of the plant, or
     /// the choice of `reach`.
     pub dead_time: Option<DeadTime>,
-    /// The same of rising edges alone.
+    /// The dead time of rising edges alone.
     pub rising: Option<DeadTime>,
-    /// The same of falling edges alone.
+    /// The dead time of falling edges alone.
     pub falling: Option<DeadTime>,
-    /// The law through the measured edges of the identify records, where it holds.
+    /// The law through the measured edges of the identify records, if it is significant.
     pub law: Option<DelayLawFit>,
     /// Why there is no law, in words.
     pub law_not_kept: Option<String>,
-    /// Their statistics.
+    /// Statistics of the measured delays.
     pub statistics: Option<DelayStatistics>,
-    /// What the tests say.
+    /// The verdict of the tests.
     pub verdict: DelayVerdict,
-    /// The same in words.
+    /// The verdict in words.
     pub words: String,
-    /// Probability of so good a law if the delays did not depend on ỹ (permutation test).
+    /// p-value of the law by a permutation test: H0 is that delays do not depend on ỹ.
     pub p_law: Option<f64>,
     /// The same within rising and within falling edges.
     pub p_law_within_direction: Option<f64>,
-    /// Probability of so large a difference between rising and falling edges if the law were all there is (t test).
+    /// p-value of the difference between rising and falling edges beside the law (t test).
     pub p_direction: Option<f64>,
-    /// Rising less falling at the same ỹ, samples, from the law with an offset.
+    /// Rising minus falling at the same ỹ, samples, from the law with an offset.
     pub direction_offset: Option<f64>,
 }
 
-/// The edges of one record with what was measured.
+/// The edges of one record with their onsets.
 type Measured = Vec<(Edge, Result<Onset, Unmeasured>)>;
 
-/// All edges of a data set, and what they have in common.
+/// All edges of a data set, and their common quantities.
 struct Measurement {
     edges: Vec<Measured>,
     method: DelayMethod,
@@ -177,7 +178,7 @@ struct Measurement {
     plant: Option<ResponsePlant>,
     /// The dead time of a plant that describes the records.
     dead_time: Option<DeadTime>,
-    /// Standard error that all edges share, samples.
+    /// Standard error common to all edges, samples.
     common: f64,
 }
 
@@ -202,7 +203,7 @@ impl Measurement {
             times.min(spacing / 2).clamp(4, 10_000)
         });
         let max_delay = options.max_delay.unwrap_or_else(|| {
-            // A plant that does not describe the records has no response time to go by.
+            // A plant that does not fit has no usable response time.
             let seen = if pooled.describes {
                 2.0 * (pooled.dead_time.samples + response)
             } else {
@@ -280,7 +281,7 @@ impl Measurement {
         }
     }
 
-    /// The edges of records whose response no plant can be fitted to: y does not move, or u never does.
+    /// The edges of records to which no plant can be fitted: y or u is constant.
     fn without_response(records: &[&Record], options: &DelayOptions, spacing: usize) -> Self {
         let levels = records.iter().flat_map(|r| r.u.iter());
         let (low, high) = levels.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &u| {
@@ -306,7 +307,7 @@ impl Measurement {
     }
 }
 
-/// Typical difference (median) between two measurements of the same edges, samples.
+/// Median difference between two measurements of the same edges, samples.
 fn apart(
     found: &[Vec<Result<Onset, Unmeasured>>],
     other: &[Vec<Result<Onset, Unmeasured>>],
@@ -323,7 +324,7 @@ fn apart(
 }
 
 impl Pooled {
-    /// The measured changes that count as edges, with half of their responses.
+    /// The edges with measured onsets and half-response times.
     fn onsets(
         &self,
         records: &[&Record],
@@ -531,7 +532,8 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// A delay equation of its own, ẏ = rate(u_arrived)·(u_arrived − y) with u_arrived(t) = u(t − h(ỹ)), 20 steps per sample.
+    /// A simulated plant: ẏ = rate(u_arrived)·(u_arrived − y) with u_arrived(t) = u(t − h(ỹ)), 20 steps per
+    /// sample.
     fn plant(u: &[f64], law: &dyn Fn(f64) -> f64) -> Vec<f64> {
         let steps = 20;
         let mut y = vec![0.0];
@@ -670,7 +672,7 @@ mod tests {
             assert!(values.len() > 100, "{}", values.len());
             spread(&values).mean
         };
-        // Described: half of the response 53–61 samples after rising and 19–21 after falling edges.
+        // Description: half of the response 53–61 samples after rising and 19–21 after falling edges.
         let (up, down) = (
             mean(true, &|o| o.half_response),
             mean(false, &|o| o.half_response),

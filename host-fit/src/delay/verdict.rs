@@ -1,23 +1,23 @@
-//! Whether the delay depends on anything.
+//! The verdict: whether the delay depends on anything.
 
-/// What the measured delays depend on.
+/// The dependence of the measured delays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DelayVerdict {
-    /// The delay depends on ỹ as the law says.
+    /// The delay depends on ỹ according to the law.
     StateDependent,
-    /// No dependence on anything: a fixed delay is enough.
+    /// No significant dependence: a fixed delay is enough.
     Fixed,
-    /// Rising and falling edges differ, and ỹ explains nothing beyond: see the effect `edge-dependent-delay`.
+    /// Rising and falling edges differ, and ỹ explains nothing more: see the effect `edge-dependent-delay`.
     EdgeDependent,
-    /// Rising and falling edges differ, and within a direction the delay depends on ỹ too.
+    /// Rising and falling edges differ, and within a direction the delay also depends on ỹ.
     EdgeAndStateDependent,
-    /// Too few edges could be measured to say.
+    /// Too few edges were measured for a test.
     TooFewEdges,
 }
 
 impl DelayVerdict {
-    /// The verdict where the law was not kept.
+    /// The verdict after the law was rejected.
     pub(super) fn without_law(self, law: bool) -> Self {
         match self {
             Self::StateDependent if !law => Self::Fixed,

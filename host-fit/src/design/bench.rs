@@ -1,4 +1,4 @@
-//! A model set up to be played commands.
+//! A model prepared for simulating commands.
 
 use crate::model::{Footprint, Model, Prepared};
 use crate::simulate::HostState;
@@ -15,11 +15,11 @@ pub(super) fn hold_times(on_s: f64, off_s: f64, period_s: f64) -> HoldTimes {
     }
 }
 
-/// A prepared model with memories that fit it and channels at their references.
+/// A prepared model with its delay memories and channels at their references.
 pub(super) struct Player<T: Real> {
     pub(super) prepared: Prepared<T>,
     pub(super) channels: Vec<T>,
-    /// s.
+    /// Sample period, s.
     pub(super) period_s: f64,
     memory: Footprint,
 }
@@ -39,7 +39,7 @@ impl<T: Real> Player<T> {
         self.memory.at_rest(&self.prepared)
     }
 
-    /// How long a run of so many samples is at this period, [`span`].
+    /// Length of a run of so many samples at this period, see [`span`].
     pub(super) fn span(&self, samples: usize) -> usize {
         span(samples, self.period_s)
     }
@@ -53,8 +53,8 @@ impl<T: Real> Player<T> {
         step(&self.prepared, state, &input)
     }
 
-    /// The shortest and the longest time from a command to its first arrival,
-    /// in samples, over outputs from 0 to `high`.
+    /// The shortest and the longest time from a command to its first arrival, samples, for outputs from 0 to
+    /// `high`.
     pub(super) fn first_arrival(&self, high: f64) -> (u16, u16) {
         use model_core::delay::DelayLaw;
         let law = self.prepared.delay();
@@ -77,7 +77,7 @@ impl<T: Real> Player<T> {
     pub(super) fn valve(&self) -> (u16, u16) {
         use model_core::delay::DelayLaw;
         use model_core::effect::{Effect, Instant};
-        /// Longer than any valve, samples.
+        /// Upper limit of a valve's response time, samples.
         const LONGEST: usize = 1000;
         let most = u16::try_from(span(LONGEST, self.period_s)).unwrap_or(u16::MAX);
         let (law, effects) = (self.prepared.delay(), self.prepared.effects());

@@ -1,4 +1,4 @@
-//! What laws can be designed from, and why none was.
+//! Requirements of a law on its model, and why no law was designed.
 
 use crate::model::{Model, Start};
 use crate::terms::Units;
@@ -11,7 +11,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum DesignError {
-    /// The reference cannot be held.
+    /// The reference is not reachable.
     #[error(transparent)]
     Unreachable(#[from] Unreachable),
     /// The model's poles could not be found.
@@ -22,34 +22,33 @@ pub enum DesignError {
     Unusable(#[from] Unusable),
     /// The model starts in mid-run.
     #[error(
-        "the model begins from measurements, not from rest, so there is no natural flow to blow on; \
-         identify it on records that start at rest"
+        "the free run of the model starts from measurements, not from rest; identify it on records that start at rest"
     )]
     NotFromRest,
-    /// The model's sample period, s, is no loop's.
+    /// The model's sample period is outside the range of a control loop.
     #[error(
-        "key `sample_period_s`: a loop takes a sample every {} to {} ms, and the model is for one every {} ms; \
-         identify on records with a sample period within that range",
+        "key `sample_period_s`: a control loop runs with a sample period of {} to {} ms, and the model has \
+        {} ms; identify on records with a sample period within that range",
         f64::from(SHORTEST_US) * 1e-3, f64::from(LONGEST_US) * 1e-3, milliseconds(*.0)
     )]
     SamplePeriod(f64),
     /// The model does not settle under a constant command.
     #[error(
         "with the valve {} the model does not settle within {seconds} s (largest pole modulus {modulus:.5}); \
-         no reference can be promised on it; identify again with fewer lags or `--objective free-run`",
+         no reachable interval can be given; identify again with fewer lags or `--objective free-run`",
         if *.on { "open" } else { "closed" }
     )]
     Unsettled {
         /// The constant command.
         on: bool,
-        /// How long it was waited, s.
+        /// Time allowed for settling, s.
         seconds: f64,
         /// Largest pole modulus under it.
         modulus: f64,
     },
     /// Steady blowing does not raise the friction.
     #[error(
-        "steady blowing takes the model's friction from {low} to {high}: there is nothing to control"
+        "steady blowing does not raise the model's friction ({low} → {high}), so no law is possible"
     )]
     NoEffect {
         /// Without blowing.
@@ -57,7 +56,7 @@ pub enum DesignError {
         /// With.
         high: f64,
     },
-    /// Holding the reference takes more air than allowed.
+    /// Holding the reference needs more air than allowed.
     #[error(
         "holding {reference} takes {needed:.3} of the air of steady blowing, but {allowed:.3} is allowed; \
          allow more, or lower the reference"
@@ -70,10 +69,9 @@ pub enum DesignError {
         /// The duty allowed.
         allowed: f64,
     },
-    /// No pulse train survives the long run.
+    /// No pulse train stays bounded in the long run.
     #[error(
-        "every pulse train that looks better than steady blowing makes the model grow without bound \
-         (largest pole modulus {off:.5} closed, {on:.5} open): these are instabilities of the model, not of the flow; \
+        "the model diverges under every pulse train with a higher mean than steady blowing (largest pole modulus {off:.5} closed, {on:.5} open): these are instabilities of the model, not of the flow; \
          identify again with fewer lags or `--objective free-run`"
     )]
     OnlyInstabilities {
@@ -85,7 +83,7 @@ pub enum DesignError {
 }
 
 impl DesignError {
-    /// The same with levels in outer units, the sensor's zero in them.
+    /// The same with levels in the user's units, the sensor's offset included.
     pub(crate) fn outward(self, units: &Units) -> Self {
         let level = |y: f64| y * units.y + units.zero;
         match self {
@@ -114,12 +112,12 @@ impl DesignError {
     }
 }
 
-/// A period as it is printed, ms: without the digits that a product of decimals adds.
+/// A period for messages, ms, rounded to remove binary representation errors.
 fn milliseconds(period_s: f64) -> f64 {
     (period_s * 1e9).round() / 1e6
 }
 
-/// Refuses a sample period that is no loop's: the first thing that is asked of a model, before any work.
+/// Rejects a sample period outside the range of a control loop; checked before any work.
 ///
 /// # Errors
 /// [`DesignError::SamplePeriod`].
@@ -130,7 +128,7 @@ pub fn check_period(model: &Model) -> Result<(), DesignError> {
     }
 }
 
-/// Refuses models that no law can be designed from.
+/// Rejects models from which no law can be designed.
 pub(super) fn check(model: &Model) -> Result<(), DesignError> {
     check_period(model)?;
     if model.start == Start::Measured {

@@ -1,10 +1,9 @@
-//! The best on/off command over a finite horizon, under the valve's hold times.
+//! The best on/off command over a finite horizon with the valve's hold times.
 //!
-//! A beam search over blocks of samples. Two valid completions rank a command so
-//! far: the valve stays open, or closed, to the end of the horizon, as soon as
-//! its hold time allows. The rank is thus what a command of full length really
-//! gives, the best one met is the answer, and what is still in flight counts.
-//! Where the beam never had to drop a command, all were tried: the answer is exact.
+//! A beam search over blocks of samples. A partial command is ranked by its better completion: the valve
+//! open, or closed, to the end of the horizon, as soon as its hold time allows. The rank is therefore the
+//! value of a complete command, with everything still in the delay counted, and the best completion met is
+//! the answer. If the beam never dropped a command, the answer is exact.
 
 use super::bench::Player;
 use super::rules::RULES;
@@ -12,29 +11,29 @@ use crate::simulate::HostState;
 use model_core::control::HoldTimes;
 use rayon::prelude::*;
 
-/// What to search.
+/// Parameters of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Horizon {
     /// Length, samples.
     pub(super) length: u32,
-    /// Samples between two chances to switch, at least 1.
+    /// Samples between two switching opportunities, at least 1.
     pub(super) block: u32,
-    /// Commands kept at each block.
+    /// Beam width: commands kept per block.
     pub(super) width: usize,
 }
 
-/// The best command found from a state on.
+/// The best command from a given state.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Plan {
     /// Whether the valve is open, sample by sample.
     pub(super) command: Vec<bool>,
     /// Mean friction over the horizon minus price times duty.
     pub(super) value: f64,
-    /// Whether all commands were tried.
+    /// Whether the search was exhaustive.
     pub(super) exact: bool,
 }
 
-/// A flow in mid-run: the model's state and the valve's.
+/// State of the model and of the valve.
 #[derive(Clone)]
 pub(super) struct FlowState {
     pub(super) state: HostState<f64>,
@@ -52,7 +51,7 @@ impl FlowState {
         }
     }
 
-    /// Plays `samples` at one position and returns the sum of friction minus price.
+    /// Simulates `samples` at one valve position; returns the sum of friction minus price.
     pub(super) fn play(&mut self, bench: &Player<f64>, on: bool, samples: u32, price: f64) -> f64 {
         self.since = if on == self.on {
             self.since.saturating_add(samples)
@@ -76,7 +75,7 @@ struct Node {
     /// Sum so far.
     gained: f64,
     blocks: Vec<bool>,
-    /// The better completion: its sum, its position from the earliest switch on.
+    /// The better completion: its value, and its valve position from the earliest switch on.
     promise: f64,
     completed: Vec<bool>,
 }
@@ -123,7 +122,7 @@ impl HorizonSearch<'_> {
                 });
                 grown.collect::<Vec<_>>()
             };
-            // In the order of the beam, whatever the threads do.
+            // Kept in beam order, whatever the thread timing.
             let mut grown: Vec<Node> = beam
                 .par_iter()
                 .flat_map_iter(grow)
@@ -148,7 +147,7 @@ impl HorizonSearch<'_> {
         }
     }
 
-    /// Completes a command in both ways and notes the better one.
+    /// Evaluates both completions of a command and stores the better one.
     fn promise(&self, mut node: Node, blocks: usize) -> Node {
         node.promise = f64::NEG_INFINITY;
         for end in [true, false] {
@@ -171,9 +170,8 @@ impl HorizonSearch<'_> {
         node
     }
 
-    /// Plans again and again, playing the first `apply` samples of each plan, for
-    /// `length` samples: what a law with this horizon would do. `None` if the
-    /// model grows.
+    /// Receding horizon: replans after the first `apply` samples of each plan, for `length` samples. `None`
+    /// if the model diverges.
     pub(super) fn recede(&self, apply: u32, length: usize) -> Option<Vec<bool>> {
         let mut flow = FlowState::at_rest(self.bench);
         let mut played = Vec::with_capacity(length);
@@ -191,9 +189,8 @@ impl HorizonSearch<'_> {
     }
 }
 
-/// The period (samples, from `shortest` on) after which the end of `command`
-/// repeats itself best, and the share of samples in which it does not. The last
-/// two periods are compared.
+/// The period (samples, at least `shortest`) with which the end of `command` repeats best, and the share of
+/// samples that differ. The last two periods are compared.
 pub(super) fn cycle(command: &[bool], shortest: usize) -> Option<(usize, f64)> {
     let end = command.len();
     (shortest.max(1)..=end / 2)
@@ -202,12 +199,12 @@ pub(super) fn cycle(command: &[bool], shortest: usize) -> Option<(usize, f64)> {
             let differ = late.iter().zip(early).filter(|(a, b)| a != b).count();
             (period, differ as f64 / period as f64)
         })
-        // The first of equals: the shortest.
+        // Among equals the shortest period.
         .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Pulses of the last `period` samples of `command`, begun with an opening;
-/// `None` where the valve never moves.
+/// Pulses of the last `period` samples of `command`, starting with an opening; `None` if the valve never
+/// moves.
 pub(super) fn pulses(command: &[bool], period: usize) -> Option<Vec<(u32, u32)>> {
     let cycle = command.get(command.len().checked_sub(period)?..)?;
     let opens = (0..period).find(|&k| cycle[k] && !cycle[(k + period - 1) % period])?;
@@ -243,7 +240,7 @@ mod tests {
         }
     }
 
-    /// Every command of 12 blocks, its hold times kept, tried one by one.
+    /// Compared with the evaluation of every admissible command of 12 blocks.
     #[test]
     fn a_beam_that_drops_nothing_finds_what_trying_all_finds() {
         let model = paper_state_dependent(LagConvention::OneStep);
@@ -255,7 +252,7 @@ mod tests {
         };
         for (hold, price) in [(30, 0.3), (60, 0.1), (90, 0.5)] {
             let search = search(&bench, hold, price, horizon);
-            // From a flow that blowing attached, valve just opened.
+            // From an attached flow with the valve just opened.
             let mut start = FlowState::at_rest(&bench);
             start.play(&bench, true, 900, 0.0);
             start.play(&bench, false, 300, 0.0);

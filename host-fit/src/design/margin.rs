@@ -1,9 +1,9 @@
-//! How wrong the model may be: the region of errors of delay, gain and time constants in which a law works.
+//! Robustness margin: the region of errors of delay, gain and time constants within which a law works.
 //!
-//! The flow is the model with its delays, its gain and its time constants each times a factor. From the model itself,
-//! rays go out in the planes of two logarithms of these factors; bisection finds where along a ray attachment is
-//! lost in one of several seeded runs, or the rms error exceeds twice that on the model itself. No certificate stands behind
-//! it: between rays, and for flows that differ otherwise, it says nothing.
+//! The plant is the model with delays, gain and time constants multiplied by factors. Rays start at the model
+//! in the planes of two logarithmic factors; bisection finds the point on each ray where attachment is lost
+//! in one of several seeded runs, or the rms error exceeds twice that on the model. This is a sampled region
+//! without a certificate: it says nothing between rays, or about other model errors.
 
 use super::bench::Player;
 use super::noise::Noisy;
@@ -17,40 +17,40 @@ use serde::Serialize;
 /// The errors, in the order of [`Margin::intervals`].
 pub const ERRORS: [&str; 3] = ["delay", "gain", "time constants"];
 
-/// Errors that a law bears, as shares: 0.2 is a flow with 20 % more than the model.
+/// Errors that a law tolerates, as fractions: 0.2 is a plant with 20 % more than the model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Margin {
-    /// Lowest and highest error of each of [`ERRORS`], the others 0.
+    /// Lowest and highest tolerated error of each of [`ERRORS`] with the others at 0.
     pub intervals: [ErrorInterval; 3],
-    /// Two errors at once.
+    /// Regions of two simultaneous errors.
     pub planes: Vec<MarginPlane>,
     /// The rms error on the model itself, mean of the seeded runs, y.
     pub rms: f64,
 }
 
-/// How far an error may go.
+/// The tolerated interval of one error.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ErrorInterval {
-    /// Of what.
+    /// The quantity in error.
     pub error: &'static str,
     /// Lowest, as a share; above −1.
     pub low: f64,
     /// Highest, as a share.
     pub high: f64,
-    /// Whether either end is only the end of what was tried.
+    /// Whether each end is the limit of the search rather than of the law.
     pub open: [bool; 2],
 }
 
-/// Two errors at once.
+/// Region of two simultaneous errors.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MarginPlane {
-    /// The errors, across and up.
+    /// The errors on the horizontal and vertical axis.
     pub errors: [&'static str; 2],
     /// The contour of the region, as shares, around the model at (0, 0).
     pub contour: Vec<[f64; 2]>,
 }
 
-/// `model` with its delays and its gain times these factors.
+/// `model` with its delays and its gain multiplied by these factors.
 fn mistaken(model: &Model, delay: f64, gain: f64) -> Model {
     let mut model = model.clone();
     if delay != 1.0 {
@@ -64,12 +64,12 @@ fn mistaken(model: &Model, delay: f64, gain: f64) -> Model {
     model
 }
 
-/// A flow on a clock of its own, so many times as slow as the loop's: all its times are longer, its delay too.
+/// A flow with all times, including its delay, multiplied by a factor.
 #[derive(Clone)]
 struct Slowed<F> {
     flow: F,
     times: f64,
-    /// Time of the flow that has not passed yet, samples.
+    /// Pending time of the flow, samples.
     due: f64,
     reading: Option<f64>,
 }
@@ -91,8 +91,8 @@ impl<F: Controlled> Controlled for Slowed<F> {
     }
 }
 
-/// The margin of the tracking `law` of `model`; errors two at a time are searched where `planes` are wanted. `noise` is that
-/// of [`Trials`](super::Trials).
+/// The margin of the tracking `law` of `model`; pairs of errors are searched if `planes` is set. `noise` as
+/// in [`Trials`](super::Trials).
 #[must_use]
 pub fn margin(model: &Model, law: &Track, noise: f64, seed: u64, planes: bool) -> Margin {
     let search = Search {
@@ -162,12 +162,12 @@ pub fn margin(model: &Model, law: &Track, noise: f64, seed: u64, planes: bool) -
     }
 }
 
-/// Where a ray ends.
+/// End of a ray.
 #[derive(Clone, Copy)]
 struct End {
     /// The errors there, as shares.
     shares: [f64; 3],
-    /// Whether nothing worse was tried.
+    /// Whether it is the limit of the search.
     open: bool,
 }
 
@@ -177,7 +177,7 @@ struct Search<'a> {
     bench: Player<f32>,
     noise: f64,
     seed: u64,
-    /// Largest rms error, y.
+    /// Largest allowed rms error, y.
     most: f64,
 }
 
@@ -185,7 +185,7 @@ impl Search<'_> {
     /// Whether attachment is kept in every seeded run, and the mean rms error, y.
     fn worst(&self, factors: [f64; 3]) -> (bool, f64) {
         let [delay, gain, times] = factors;
-        // On a slower clock the delay is longer too.
+        // A slower plant has a longer delay too.
         let bench = Player::<f64>::of(&mistaken(self.model, delay / times, gain));
         let runs = (0..RULES.margin_runs).map(|run| {
             let flow = ModelFlow::new(
@@ -213,7 +213,8 @@ impl Search<'_> {
         kept && rms <= self.most
     }
 
-    /// How far along a direction the law works, one step of the bisection inside: rms errors scatter from plant to plant.
+    /// The largest error along a direction for which the law works, minus one bisection step, because rms
+    /// errors scatter.
     fn end(&self, direction: [f64; 3]) -> End {
         let shares = |reach: f64| direction.map(|d| (reach * d).exp_m1());
         let (mut works, mut fails) = (0.0, RULES.margin_reach.ln());
@@ -291,7 +292,7 @@ mod tests {
         assert!(near(slower[2], end));
     }
 
-    /// A gain that leaves less than the target under steady blowing cannot be in the margin.
+    /// A plant that stays below the target under steady blowing is outside the margin.
     #[test]
     fn a_flow_too_weak_for_the_target_ends_the_margin() {
         let model = paper_state_dependent(LagConvention::OneStep);

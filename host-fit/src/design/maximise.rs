@@ -1,10 +1,9 @@
-//! The periodic on/off command that gives the most friction for the air.
+//! The periodic on/off command with the highest mean friction for the air.
 //!
-//! Since the mean friction is affine in every single command, best commands are
-//! on/off by themselves (theory 3.4); over a horizon shorter than the longest
-//! lags the benefit of pulsing is invisible, so the search is over periodic
-//! commands: period, lengths and phases of the pulses. A search of free commands
-//! over a finite horizon ([`super::horizon`]) can propose further ones.
+//! The mean friction is affine in every single command, so optimal commands are on/off (theory 3.4). Over a
+//! horizon shorter than the longest lags the benefit of pulsing is invisible; the search is therefore over
+//! periodic commands: period, lengths and phases of the pulses. A finite-horizon search ([`super::horizon`])
+//! can propose further ones.
 
 use super::bench::{Player, hold_times};
 use super::error::{DesignError, check};
@@ -17,46 +16,46 @@ use model_core::control::period::samples_at_least;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// What is wanted of a maximising law.
+/// Requirements on a maximising law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MaximiseRequest {
     /// Shortest on time of the valve, s.
     pub min_on_s: f64,
     /// Shortest off time of the valve, s.
     pub min_off_s: f64,
-    /// What steady blowing costs, y: the law maximises mean friction − price·duty.
+    /// Price of steady blowing, y: the law maximises mean friction − price·duty.
     pub air_price: f64,
     /// Most pulses in a period, 1–4.
     pub pulses: usize,
     /// Longest period, s; `None`: 3000 samples, at least 3 s.
     pub longest_period_s: Option<f64>,
-    /// Horizon over which free on/off commands are searched as well, s.
+    /// Horizon of an additional search over free on/off commands, s.
     pub horizon_s: Option<f64>,
 }
 
-/// What the search over a finite horizon found.
+/// Result of the finite-horizon search.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Planned {
     /// The horizon, s.
     pub horizon_s: f64,
-    /// Time between two chances to switch, s.
+    /// Time between two switching opportunities, s.
     pub block_s: f64,
-    /// From rest: mean friction minus price times duty of the best command.
+    /// Best value from rest: mean friction minus price times duty.
     pub value: f64,
-    /// The same under steady blowing.
+    /// The same value under steady blowing.
     pub steady_value: f64,
     /// Duty of the best command.
     pub duty: f64,
-    /// Whether all commands were tried; otherwise a beam of them.
+    /// Whether the search was exhaustive; otherwise a beam search.
     pub exact: bool,
-    /// The cycle that a law with this horizon runs into, planning again and again, s;
-    /// `None` if the valve comes to rest or the model grows.
+    /// The limit cycle of a receding-horizon law, s; `None` if the valve stops switching or the model
+    /// diverges.
     pub cycle_s: Option<f64>,
-    /// Share of samples in which a cycle differs from the one before.
+    /// Share of samples that differ between successive cycles.
     pub irregular: f64,
 }
 
-/// The best pulses and what they are worth. Serialises to the keys under `maximise` of `design --json`.
+/// The best pulse train and its value. Serialises to the keys under `maximise` of `design --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Optimum {
     /// The law.
@@ -70,40 +69,38 @@ pub struct Optimum {
     pub range: [f64; 2],
     /// Share of time with the valve open.
     pub duty: f64,
-    /// Mean friction under steady blowing in the same time; `None` if the model
-    /// grows under it.
+    /// Mean friction under steady blowing in the same time; `None` if the model diverges.
     pub steady_mean: Option<f64>,
-    /// The lowest mean with a period 2 % shorter or longer: this is what is
-    /// maximised, since a resonance sharper than that does not survive on a rig.
+    /// The lowest mean over periods 2 % shorter and longer. This is maximised, because a sharper resonance
+    /// would not survive on a rig.
     pub mean_detuned: f64,
-    /// Pulse trains that looked better and were refused because the model grows
-    /// under them.
+    /// Number of pulse trains with a higher mean that were rejected because the model diverges under them.
     pub refused: usize,
-    /// The best of those: its mean friction before it grew.
+    /// The best mean friction among those, before the divergence.
     pub refused_mean: Option<f64>,
     /// Largest pole moduli, valve closed and open.
     #[serde(rename = "pole_moduli")]
     pub moduli: [f64; 2],
-    /// Where the optimum leaves what was recorded; `None` if nothing is known of that.
+    /// Distance of the optimum from the recorded data; `None` if the recorded range is unknown.
     pub outside: Option<Outside>,
-    /// The search over a finite horizon, if asked for.
+    /// Result of the finite-horizon search, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub planned: Option<Planned>,
 }
 
-/// How far an optimum lies outside the recorded data.
+/// Distance of an optimum from the recorded data.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Outside {
-    /// By how much the highest friction exceeds the highest recorded, y; 0 if inside.
+    /// Highest friction minus the highest recorded, y; 0 if inside.
     pub friction: f64,
-    /// By how much the duty lies outside the recorded range, 0 if inside.
+    /// Distance of the duty from the recorded range; 0 if inside.
     pub duty: f64,
-    /// Longest and shortest on time over the recorded ones' ends, as a factor; 1 if inside.
+    /// Ratio of the longest or shortest on time to the recorded extreme; 1 if inside.
     pub on_time_factor: f64,
 }
 
 impl Outside {
-    /// How far `judged` lies outside the data that `model` comes from.
+    /// Distance of `judged` from the data that `model` was identified on.
     fn of(model: &Model, judged: &JudgedTrain) -> Option<Self> {
         let training = &model.training;
         if training.y_range == [0.0; 2] {
@@ -131,7 +128,7 @@ impl Outside {
         })
     }
 
-    /// Whether the optimum stays inside what was recorded.
+    /// Whether the optimum is inside the recorded range.
     #[must_use]
     pub fn is_inside(&self) -> bool {
         self.friction <= 0.0 && self.duty <= 0.0 && self.on_time_factor <= 1.0
@@ -163,7 +160,7 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
     candidates.push(search.judge(&steady));
     let best_first = |list: &mut Vec<JudgedTrain>| list.sort_by(|a, b| b.value.total_cmp(&a.value));
     best_first(&mut candidates);
-    // Refined from the best few, which are rarely neighbours of each other.
+    // The best few are refined; they are rarely neighbours.
     let starts: Vec<JudgedTrain> = distinct(&candidates, RULES.refined);
     let mut refined: Vec<JudgedTrain> = starts
         .par_iter()
@@ -180,7 +177,7 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
     });
     best_first(&mut refined);
 
-    // The best are judged again where slow models have settled, and must last.
+    // The best are evaluated again over a long run, in which slow models settle and unstable ones diverge.
     let tried: Vec<(f64, Option<Lasting>)> = refined
         .par_iter()
         .filter(|judged| judged.value.is_finite())
@@ -225,7 +222,7 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
     })
 }
 
-/// A train that lasts, and what it is worth when the flow is 2 % faster or slower.
+/// A train that stays bounded, with its value for a flow 2 % faster or slower.
 struct Lasting {
     judged: JudgedTrain,
     after: f64,
@@ -241,7 +238,7 @@ struct TrainSearch {
 }
 
 impl TrainSearch {
-    /// Whether the valve can play it: every pulse and every gap long enough.
+    /// Whether every pulse and gap respects the valve's hold times.
     fn playable(&self, train: &Train) -> bool {
         if *train == Train::steady() {
             return true;
@@ -288,8 +285,8 @@ impl TrainSearch {
         trains.par_iter().map(|train| self.judge(train)).collect()
     }
 
-    /// The best command over a horizon of `length` samples from rest, and the
-    /// pulses that planning so again and again runs into.
+    /// The best command over a horizon of `length` samples from rest, and the limit cycle of the
+    /// receding-horizon law.
     fn planned(&self, length: u32) -> (Planned, Option<Train>) {
         let block = self
             .hold
@@ -334,13 +331,12 @@ impl TrainSearch {
         (planned, train)
     }
 
-    /// Coordinate search with shrinking steps, then with one pulse more as long
-    /// as that helps.
+    /// Coordinate search with decreasing steps, repeated with one more pulse while that helps.
     fn refine(&self, start: JudgedTrain, most: usize) -> JudgedTrain {
         let mut best = self.descend(start);
         while best.train.pulses.len() < most && best.train.period > 4 * self.hold.on {
             let mut train = best.train.clone();
-            // The longest pulse is cut by a gap in its middle.
+            // The longest pulse is split by a gap in its middle.
             let Some(longest) = (0..train.pulses.len()).max_by_key(|&i| train.pulses[i].1) else {
                 break;
             };
@@ -424,14 +420,14 @@ impl TrainSearch {
         all
     }
 
-    /// The train and its neighbours 2 % shorter and longer in the long run.
+    /// The train and its neighbours 2 % shorter and longer in a long run.
     fn lasting(&self, train: &Train) -> Option<Lasting> {
         let (judged, after) = self.long_run(train)?;
         let (mut detuned, mut robust_value) = (judged.mean, judged.value);
         if *train != Train::steady() {
             let off = train.period.div_ceil(RULES.detuned);
             for period in [train.period - off, train.period + off] {
-                // The same duty, as the law would be played on a slower or faster flow.
+                // Same duty, as for a slower or faster flow.
                 let stretched = train.stretched(period);
                 let near = self.long_run(&stretched);
                 detuned = detuned.min(near.as_ref().map_or(f64::NEG_INFINITY, |n| n.0.mean));
@@ -446,8 +442,8 @@ impl TrainSearch {
         })
     }
 
-    /// What the train gives from 20 s to 40 s (at 1 kHz), and its mean at the end of four
-    /// minutes; `None` if the motion has grown by then.
+    /// Value of the train from 20 s to 40 s (at 1 kHz), and its mean at the end of four minutes; `None` if it
+    /// diverges.
     fn long_run(&self, train: &Train) -> Option<(JudgedTrain, f64)> {
         let mut played = Played::new(&self.bench, train);
         let [from, until] = [RULES.long_from, RULES.long_until].map(|n| self.bench.span(n));
@@ -494,8 +490,7 @@ mod tests {
         assert!((optimum.moduli[0] - 1.0).abs() < 1e-5);
     }
 
-    /// Theory 2.4: the full model offers nothing beyond steady blowing but motions
-    /// that grow.
+    /// Theory 2.4: the full model has no bounded motion better than steady blowing.
     #[test]
     fn the_full_model_gives_no_more_than_steady_blowing() {
         let model = paper_state_dependent(LagConvention::OneStep);
@@ -517,9 +512,8 @@ mod tests {
         assert!((optimum.mean_after_minutes / optimum.mean - 1.0).abs() < 0.05);
     }
 
-    /// Theory 2.5 has .93 at 250 ms with 40 % of the air, the best on its grid of
-    /// periods, and a finer search finds sharper resonances still. What counts is
-    /// what 2 % of detuning leaves of them.
+    /// Theory 2.5 gives 0.93 at 250 ms with 40 % of the air, the best on its grid of periods. A finer search
+    /// finds sharper resonances; the value after 2 % of detuning counts.
     #[test]
     fn air_at_a_price_is_not_spent_on_a_sharp_resonance() {
         let model = paper_state_dependent(LagConvention::OneStep);
@@ -539,8 +533,8 @@ mod tests {
         assert!(optimum.mean_detuned > 0.95 * optimum.mean, "{optimum:?}");
     }
 
-    /// Theory 2.1: this reading grows under steady blowing; whatever the
-    /// horizon promises, what is designed must last four minutes.
+    /// Theory 2.1: this model diverges under steady blowing. Whatever a finite horizon proposes, the design
+    /// must stay bounded for four minutes.
     #[test]
     fn a_finite_horizon_proposes_and_the_long_run_disposes() {
         let request = MaximiseRequest {

@@ -1,4 +1,4 @@
-//! Control laws designed from a model and tried in the loop before they reach a valve.
+//! Control laws: design from a model, and trials in closed loop before use on a valve.
 
 mod bench;
 mod error;

@@ -1,4 +1,4 @@
-//! A flow seen through the noise of a usual sensor.
+//! Sensor noise added to a simulated flow.
 
 use super::rules::RULES;
 use closed_loop::Controlled;
@@ -12,14 +12,14 @@ pub(super) struct Noisy<F> {
     flow: F,
     /// Standard deviations of the white and the coloured part, y.
     sizes: [f64; 2],
-    /// What is left of the coloured part after a sample.
+    /// Pole of the coloured part.
     kept: f64,
     coloured: f64,
     rng: ChaCha8Rng,
 }
 
 impl<F> Noisy<F> {
-    /// `size` is 1 for friction of order one and a usual hot film.
+    /// `size` 1 is a typical hot film for friction of order one.
     pub(super) fn new(flow: F, size: f64, seed: u64) -> Self {
         Self {
             flow,

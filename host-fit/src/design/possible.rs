@@ -1,10 +1,10 @@
-//! Flows that the records leave possible: what a law has to keep attached.
+//! Plants that the records do not exclude, on which a law must keep attachment.
 //!
-//! Each is the model with one thing as different as the records allow, everything else fitted again: delay, gain and time
-//! constants at the ends of their 95 % intervals; each effect of the catalogue at the largest size that is not excluded;
-//! delay laws that fit as well as the model's own; and for each effect of the model those others of its place that take
-//! its part (its equivalence set). Beside these stand effects of the size up to which a diagnosis need not have named them
-//! (the power statement): where that is more than the records leave possible, they warn.
+//! Each is the model with one change as large as the records allow and everything else refitted: delay, gain
+//! and time constants at the ends of their 95 % intervals; each effect of the catalogue at the largest size
+//! not excluded; delay laws that fit equally well; and for each effect of the model the other members of its
+//! equivalence set. In addition: effects at the size that a diagnosis detects with 80 % power. Where that is
+//! more than the records allow, these only warn.
 
 use super::bench::Player;
 use super::record_judge::{RecordJudge, Refitted};
@@ -20,31 +20,32 @@ use crate::terms::Units;
 use model_core::effect::{Place, Spec};
 use rayon::prelude::*;
 
-/// Standard errors to either side of an interval of 95 %.
+/// Half width of a 95 % interval in standard errors.
 const DEVIATES: f64 = 1.96;
 
-/// A flow that the records leave possible, or a diagnosis unseen.
+/// A plant that the records do not exclude, or an effect below the detectable size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PossibleFlow {
-    /// What is different from the model, in words.
+    /// The difference from the model, in words.
     pub name: String,
-    /// One-sided p-value of the records if this is the flow; 0.025 at the end of a 95 % interval. Below that the records
-    /// exclude the flow, and it only warns: an effect of the size that a diagnosis would have named in eight cases of ten
+    /// One-sided p-value of the records under this plant; 0.025 at the end of a 95 % interval. Below that the
+    /// plant is excluded and only warns: an effect at the size detected in 80 % of cases
     /// ([`detectable`](crate::power::detectable)).
     pub p_value: f64,
-    /// The flow, in the units of the model that was given.
+    /// The plant in the units of the given model.
     pub model: Model,
 }
 
 impl PossibleFlow {
-    /// Whether the records leave it possible.
+    /// Whether the records do not exclude it.
     #[must_use]
     pub fn is_possible(&self) -> bool {
         self.p_value >= RULES.not_excluded
     }
 }
 
-/// The flows that the records of `prepared` leave possible beside `model`; none where the records tell nothing of it.
+/// The plants that the records of `prepared` do not exclude beside `model`; none if the records contain no
+/// information about it.
 ///
 /// # Errors
 /// A missing channel, or a model whose free run diverges.
@@ -80,7 +81,7 @@ pub fn possible_flows(
     Ok(flows)
 }
 
-/// Whether an effect is not in the model and would show on the records at all.
+/// Whether an effect is not in the model and would be visible on the records.
 fn can_be_tried(judge: &RecordJudge, spec: &Spec) -> bool {
     let on_off = judge.records().iter().all(|record| record.is_on_off());
     let present = judge
@@ -91,14 +92,14 @@ fn can_be_tried(judge: &RecordJudge, spec: &Spec) -> bool {
     !present && spec.channel.is_none() && spec.needs.unmet(on_off).is_none()
 }
 
-/// The model with each effect as large as it may be without a diagnosis naming it, all else fitted again.
+/// The model with each effect at its detectable size, everything else refitted.
 fn unseen(
     judge: &RecordJudge,
     model: &Model,
     records: &[Record],
     units: &Units,
 ) -> Vec<PossibleFlow> {
-    // A model on the verge of instability has no such amplitudes.
+    // A model at the stability limit has no detectable sizes.
     let found = detectable(model, records, RULES.usual_by_chance).unwrap_or_default();
     let flows = found
         .par_iter()
@@ -128,7 +129,7 @@ fn unseen(
     flows.collect()
 }
 
-/// What is measured of a flow's step: delay in samples, gain in y, time constants in samples.
+/// Characteristics of a step response: delay in samples, gain in y, time constants in samples.
 fn step_figures(model: &Model, length: usize) -> Option<[f64; 4]> {
     let bench = Player::<f64>::of(model);
     let mut state = bench.at_rest();
@@ -140,7 +141,7 @@ fn step_figures(model: &Model, length: usize) -> Option<[f64; 4]> {
     let (rise, fall) = (play(true), play(false));
     let (high, low) = (*rise.last()?, *fall.last()?);
     let delay = model.delay.present(0.5 * high, model.sample_period_s);
-    // The area above a step response is its mean delay, the dead time in it.
+    // The area above a step response is the mean delay, dead time included.
     let area = |run: &[f64], end: f64| run.iter().map(|y| y - end).sum::<f64>() / (high - low);
     let figures = [
         delay,
@@ -164,7 +165,7 @@ fn intervals(judge: &RecordJudge) -> Vec<PossibleFlow> {
     let places: Vec<usize> = judge.places(&judge.best).into_iter().flatten().collect();
     let n = places.len();
     let deviations: Vec<f64> = (0..n).map(|i| judge.covariance[i * n + i].sqrt()).collect();
-    // Gradients by central differences over a tenth of a standard error, which stays linear.
+    // Gradients by central differences over a tenth of a standard error, within the linear range.
     let gradients: Vec<Option<[f64; 4]>> = (0..n)
         .into_par_iter()
         .map(|i| {
@@ -182,7 +183,7 @@ fn intervals(judge: &RecordJudge) -> Vec<PossibleFlow> {
     let mut flows = Vec::new();
     for (q, name) in FIGURES.iter().enumerate() {
         let slope = |i: usize| gradients[i].map_or(0.0, |g| g[q]);
-        // C·g, along which the figure moves as the records let it move.
+        // C·g, the direction in which the characteristic varies most within the confidence region.
         let along: Vec<f64> = (0..n)
             .map(|i| (0..n).map(|j| judge.covariance[i * n + j] * slope(j)).sum())
             .collect();
@@ -191,7 +192,7 @@ fn intervals(judge: &RecordJudge) -> Vec<PossibleFlow> {
             continue;
         }
         for side in [-1.0, 1.0] {
-            // As far as the records let it: where the covariance is that of a line that bends, less than 1.96 deviations.
+            // Shortened below 1.96 standard errors if the linear approximation fails.
             let ends = (0..RULES.interval_steps).map(|step| 0.8_f64.powf(f64::from(step)));
             let flow = ends.into_iter().find_map(|share| {
                 let mut moved = values.clone();
@@ -220,7 +221,7 @@ fn sign(x: f64) -> &'static str {
     if x < 0.0 { "−" } else { "+" }
 }
 
-/// Parameters between two ends: in the logarithm where they span orders of magnitude.
+/// Parameters between two ends; logarithmic if they span orders of magnitude.
 fn between(spec: &Spec, mild: &[f64], worst: &[f64], size: f64) -> Vec<f64> {
     let ends = spec.parameters.iter().zip(mild.iter().zip(worst));
     ends.map(|(card, (mild, worst))| {
@@ -233,7 +234,7 @@ fn between(spec: &Spec, mild: &[f64], worst: &[f64], size: f64) -> Vec<f64> {
     .collect()
 }
 
-/// Ways along which an effect grows from nothing to its largest usual size.
+/// Paths along which an effect grows from 0 to its largest size.
 fn ways(judge: &RecordJudge, spec: &'static Spec) -> Vec<[Vec<f64>; 2]> {
     let records: Vec<_> = judge.records().iter().collect();
     let rows = starts(&judge.best, spec, &records);
@@ -264,7 +265,8 @@ fn ways(judge: &RecordJudge, spec: &'static Spec) -> Vec<[Vec<f64>; 2]> {
         }
         return ways;
     }
-    // Without an amplitude: from that corner of its ranges which changes the run least to that start which changes it most.
+    // For effects without an amplitude: from the corner of the ranges with the least change of the run to the
+    // start with the largest.
     let change = |parameters: &Vec<f64>| {
         let flow = judge.refitted(&with_effect(judge, spec, parameters));
         flow.map_or(f64::INFINITY, |flow| flow.change)
@@ -346,7 +348,7 @@ fn largest_size(
     let at = |size: f64, start: &Option<Model>| {
         let parameters = between(spec, mild, worst, size);
         let fresh = with_effect(judge, spec, &parameters);
-        // Sets out from the refit of a smaller size.
+        // Starts from the refit at a smaller size.
         let model = match start {
             Some(model) => Model {
                 effects: fresh.effects,
@@ -381,7 +383,7 @@ fn largest_size(
     largest
 }
 
-/// Flows whose delay follows another law: the best fit, and the ends of the interval of its variation.
+/// Plants with another delay law: the best fit, and the ends of the interval of its variation.
 fn delay_laws(judge: &RecordJudge, spec: &'static Spec) -> Vec<PossibleFlow> {
     let records: Vec<_> = judge.records().iter().collect();
     let options = FitOptions {
@@ -460,7 +462,7 @@ fn delay_laws(judge: &RecordJudge, spec: &'static Spec) -> Vec<PossibleFlow> {
     judged.collect()
 }
 
-/// The model with another effect in the place of one that it has, where that fits as well.
+/// The model with one effect replaced by another that fits equally well.
 fn equivalents(judge: &RecordJudge) -> Vec<PossibleFlow> {
     let records: Vec<_> = judge.records().iter().collect();
     let options = FitOptions {

@@ -1,8 +1,9 @@
-//! A law tried in the loop: on its own model, on the flows that the records leave possible, and under stress.
+//! Trials of a law in closed loop: on its own model, on the plants that the records do not exclude, and under
+//! stress.
 //!
-//! The model and the possible flows decide: a law that loses attachment on one of them is refused. Stress is
-//! reported and never refuses a law: the program brings the nearest physical plant, with every effect of the catalogue at its worst and
-//! under worse conditions than designed for.
+//! A law that loses attachment on the model or on a possible plant is rejected. Stress tests are reported and
+//! never reject a law: a plant of nearest physics with every effect of the catalogue at its worst, and
+//! conditions beyond the design.
 
 use super::bench::Player;
 use super::noise::Noisy;
@@ -17,53 +18,53 @@ use closed_loop::{
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
-/// What a case is about.
+/// Group of a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CaseGroup {
-    /// The model in place of the flow.
+    /// The model itself.
     Model,
-    /// A flow that the records leave possible.
+    /// A plant that the records do not exclude.
     Possible,
-    /// A flow that the records exclude, though a diagnosis need not have named what is different.
+    /// A plant that the records exclude, with an effect below the detectable size.
     Unseen,
-    /// The nearest physical plant, noisy.
+    /// The nearest physical plant with noise.
     Plant,
-    /// The plant with an effect that the law does not know of.
+    /// That plant with an effect missing in the model.
     Effect,
-    /// The plant otherwise than designed for.
+    /// That plant under conditions beyond the design.
     Disturbance,
 }
 
 impl CaseGroup {
-    /// Whether a law that loses attachment in such a case is refused; of other cases it warns.
+    /// Whether losing attachment in this group rejects the law; otherwise it only warns.
     #[must_use]
     pub fn decides(self) -> bool {
         matches!(self, Self::Model | Self::Possible)
     }
 }
 
-/// A flow that a law is tried on, at the start of the trial.
+/// A plant for a trial, in its initial state.
 #[derive(Clone, Debug)]
 pub struct Trial<F> {
-    /// What it is about.
+    /// Its group.
     pub group: CaseGroup,
-    /// What is different, in words.
+    /// The difference from the model, in words.
     pub name: String,
-    /// The flow; every run has a copy of its own.
+    /// The plant; every run gets a copy.
     pub flow: F,
 }
 
-/// One law on one flow.
+/// Result of one law on one plant.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Case {
-    /// What it is about.
+    /// Its group.
     pub group: CaseGroup,
-    /// What is different, in words.
+    /// The difference from the model, in words.
     pub name: String,
-    /// How likely the records are if this is the flow: one-sided p-value; `None` where they do not say.
+    /// One-sided p-value of the records under this plant; `None` if unknown.
     pub p_value: Option<f64>,
-    /// What came of it, from 4000 samples on (4 s at 1 kHz).
+    /// Figures of the run after 4000 samples (4 s at 1 kHz).
     #[serde(flatten)]
     pub figures: Figures,
     /// Mean friction of the same flow under steady blowing.
@@ -72,8 +73,8 @@ pub struct Case {
     /// Lowest mean of the friction over 250 samples (250 ms at 1 kHz).
     #[serde(rename = "lowest_mean")]
     pub lowest: f64,
-    /// Whether the flow stays attached wherever steady blowing keeps it so: the
-    /// lowest mean is above half of what was asked for or steady blowing gives.
+    /// Whether the flow stays attached where steady blowing keeps it so: the lowest mean exceeds half of the
+    /// target or of the level under steady blowing.
     pub kept: bool,
 }
 
@@ -85,29 +86,28 @@ pub struct Proof {
     /// The run on the model, through a noisy sensor.
     #[serde(skip)]
     pub trace: Trace,
-    /// Something simpler on the same flow: a relay with the same hold times, or
-    /// steady blowing; here its figures.
+    /// A reference run on the same flow: a relay with the same hold times, or steady blowing.
     #[serde(rename = "relay", serialize_with = "figures")]
     pub compared: Trace,
-    /// What it is.
+    /// Name of the reference.
     #[serde(skip)]
     pub compared_name: &'static str,
 }
 
 impl Proof {
-    /// The deciding trials in which attachment was lost, by name.
+    /// Names of the deciding trials in which attachment was lost.
     #[must_use]
     pub fn lost(&self) -> Vec<String> {
         self.lost_where(CaseGroup::decides)
     }
 
-    /// The other trials in which attachment was lost, by name: unseen effects and stress.
+    /// Names of the other trials in which attachment was lost: undetectable effects and stress.
     #[must_use]
     pub fn lost_beyond_the_records(&self) -> Vec<String> {
         self.lost_where(|group| !group.decides())
     }
 
-    /// The same with levels as a sensor shows them whose zero is at `zero`.
+    /// The same with levels as sensor readings with offset `zero`.
     #[must_use]
     pub fn shown_by(mut self, zero: f64) -> Self {
         if zero == 0.0 {
@@ -136,14 +136,15 @@ impl Proof {
     }
 }
 
-/// What a law is tried on beside its model.
+/// The plants of the trials beside the model.
 #[derive(Clone, Copy, Debug)]
 pub struct Trials<'a, F> {
     /// Flows that the records leave possible.
     pub possible: &'a [PossibleFlow],
     /// Flows under stress.
     pub stress: &'a [Trial<F>],
-    /// Noise of the sensor on model and possible flows, in units of a usual hot film's at friction of order one.
+    /// Sensor noise on the model and possible plants, in units of a typical hot film's at friction of order
+    /// one.
     pub noise: f64,
     /// Seed of that noise.
     pub seed: u64,
@@ -153,7 +154,7 @@ fn figures<S: Serializer>(trace: &Trace, to: S) -> Result<S::Ok, S::Error> {
     judged(trace).serialize(to)
 }
 
-/// Figures of a trial, after its start.
+/// Figures of a run after its start.
 #[must_use]
 pub fn judged(trace: &Trace) -> Figures {
     Figures::of(trace, span(RULES.trial_from, trace.sample_period_s))
@@ -184,7 +185,7 @@ fn lowest_mean(trace: &Trace) -> f64 {
     lowest_mean_from(trace, RULES.trial_from)
 }
 
-/// The lowest mean of the friction over the window of [`RULES`], from so many samples on.
+/// Lowest mean friction over the window of [`RULES`], from sample `from` on.
 fn lowest_mean_from(trace: &Trace, from: usize) -> f64 {
     let [from, window] = [from, RULES.attached_mean].map(|n| span(n, trace.sample_period_s));
     let judged = trace.samples.get(from..).unwrap_or_default();
@@ -195,7 +196,7 @@ fn lowest_mean_from(trace: &Trace, from: usize) -> f64 {
     means.fold(f64::INFINITY, f64::min)
 }
 
-/// A short run of a law on a flow, for its margin.
+/// A short run of a law for its robustness margin.
 pub(super) struct Attempt {
     /// Root mean square of friction minus reference, y.
     pub(super) rms: f64,
@@ -215,7 +216,7 @@ impl Attempt {
     }
 }
 
-/// A law ready for a run.
+/// A law initialised for a run.
 trait Ready: Sync {
     fn run<F: Controlled + Clone>(&self, trial: &Trial<F>) -> (Case, Trace);
 }
@@ -244,7 +245,7 @@ impl Ready for Pulses<'_> {
     }
 }
 
-/// The model in the place of the flow, through a noisy sensor.
+/// The model as the plant, with sensor noise.
 fn on_bench<'a>(
     bench: &'a Player<f64>,
     group: CaseGroup,
@@ -265,7 +266,7 @@ fn on_bench<'a>(
     }
 }
 
-/// The case of a possible flow.
+/// Trial on a possible plant.
 fn on_possible(law: &impl Ready, flow: &PossibleFlow, noise: f64, seed: u64) -> Case {
     let bench = Player::<f64>::of(&flow.model);
     let group = if flow.is_possible() {
@@ -281,7 +282,7 @@ fn on_possible(law: &impl Ready, flow: &PossibleFlow, noise: f64, seed: u64) -> 
     }
 }
 
-/// All cases of a law, and the run on its noisy model.
+/// All trials of a law, and its run on the noisy model.
 fn cases<F>(law: &impl Ready, model: &Model, trials: &Trials<'_, F>) -> (Vec<Case>, Trace)
 where
     F: Controlled + Clone + Sync,
@@ -302,7 +303,7 @@ where
     (cases, trace)
 }
 
-/// Tries the tracking `law` of `model` on its own model and in all `trials`.
+/// Runs the tracking `law` of `model` on its own model and in all `trials`.
 pub fn prove<F>(model: &Model, law: &Track, trials: &Trials<'_, F>) -> Proof
 where
     F: Controlled + Clone + Sync,
@@ -320,8 +321,8 @@ where
     }
 }
 
-/// Tries the pulses of a maximising law of `model` in all `trials`; `blown`, the friction under steady blowing, is the
-/// reference.
+/// Runs the pulses of a maximising law of `model` in all `trials`; `blown`, the friction under steady
+/// blowing, is the reference.
 pub fn prove_pulses<F>(model: &Model, law: &Maximise, blown: f64, trials: &Trials<'_, F>) -> Proof
 where
     F: Controlled + Clone + Sync,
@@ -335,7 +336,7 @@ where
     }
 }
 
-/// The run of something simpler on the model, through the same noisy sensor.
+/// The reference run on the model with the same sensor noise.
 fn compared<F>(
     controller: &mut impl Controller,
     reference: f64,
@@ -389,7 +390,7 @@ fn on_model(law: &Track, bench: &Player<f32>) -> Case {
         ),
     };
     let (case, _) = itself.run(&mut host_law(bench, law), law.reference);
-    // On a model steady blowing may grow; what was asked for is the measure.
+    // The model may diverge under steady blowing: the target is the measure.
     Case {
         kept: case.lowest >= RULES.attached * law.reference,
         ..case

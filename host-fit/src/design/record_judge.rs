@@ -1,11 +1,12 @@
-//! Records as the judge of other flows: how likely they are if the flow is not the fitted model.
+//! Likelihood of the records under plants other than the fitted model.
 //!
-//! A flow θ' changes the free run of the best fit by d. If θ' is the flow, the records less its run are noise alone, e, and
-//! Σ d·e scatters about 0; if the best fit is, Σ d·e is about −Σ d². The one-sided p-value of z = −Σ d·e / s judges θ'. s² is
-//! the sum over blocks of (Σ d·r)², r the residual of the best fit, as in the covariance of a fit, and at least that of
-//! noise without memory, as many times as large as the covariance of the best fit is beside that of noise without memory: what
-//! differs between records counts there too. That holds for a flow which differs in one thing, everything else fitted again; the true
-//! flow as it is, different in all coordinates at once, would be excluded too often.
+//! A plant θ' changes the free run of the best fit by d. Under θ', the records minus its run are noise e
+//! alone, and Σ d·e scatters about 0; under the best fit, Σ d·e is about −Σ d². The one-sided p-value of z =
+//! −Σ d·e / s judges θ'. s² is the sum over blocks of (Σ d·r)², with r the residual of the best fit, and at
+//! least the white-noise variance times the ratio of the fit's robust covariance to its white-noise
+//! covariance, so that record-to-record scatter counts. This is valid for a plant that differs in one thing
+//! with everything else refitted. The true plant, which differs in all coordinates at once, would be excluded
+//! too often.
 
 use super::rules::RULES;
 use crate::data::Record;
@@ -16,32 +17,32 @@ use crate::simulate::SimulateError;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-/// Free runs over scored samples, one for each record, y.
+/// Free runs over the scored samples, one per record, y.
 type Runs = Vec<Vec<f64>>;
 
-/// Records, and the model that fits them best.
+/// The records with their best-fitting model.
 pub(super) struct RecordJudge {
     records: Vec<Record>,
-    /// The best fit, its delays between samples.
+    /// The best fit, with unrounded delays.
     pub(super) best: Model,
-    /// Names of the coordinates that the records tell.
+    /// Names of the identifiable coordinates.
     free: Vec<String>,
-    /// Covariance of these, row-major.
+    /// Their covariance, row-major.
     pub(super) covariance: Vec<f64>,
     runs: Runs,
     residuals: Runs,
-    /// By record and coordinate: derivatives of the run.
+    /// Derivatives of the run by record and coordinate.
     columns: Vec<Vec<Vec<f64>>>,
     /// (JᵀJ)⁻¹.
     inverse: Vec<f64>,
     /// Variance of the residual, y².
     variance: f64,
-    /// How many times the variances of the coordinates are those under noise without memory: their median.
+    /// Median ratio of the coordinates' variances to those under white noise.
     inflation: f64,
     samples: usize,
 }
 
-/// A flow after its free coordinates were fitted.
+/// A plant after its free coordinates were refitted.
 pub(super) struct Refitted {
     pub(super) model: Model,
     pub(super) p_value: f64,
@@ -50,7 +51,7 @@ pub(super) struct Refitted {
 }
 
 impl RecordJudge {
-    /// Fits `model` to all `records`. `None` where the records tell none of its coordinates, or there is none.
+    /// Fits `model` to all `records`. `None` if there are no records or no identifiable coordinates.
     ///
     /// # Errors
     /// A missing channel, or a model whose free run diverges.
@@ -141,7 +142,7 @@ impl RecordJudge {
         &self.records
     }
 
-    /// Where the free coordinates of the best fit stand among those of `model`; none for those that it does not have.
+    /// Indices of the best fit's free coordinates among those of `model`; none for those it lacks.
     pub(super) fn places(&self, model: &Model) -> Vec<Option<usize>> {
         let coordinates = model.coordinates();
         let place = |name: &String| coordinates.iter().position(|own| own.name == *name);
@@ -156,7 +157,7 @@ impl RecordJudge {
         self.records.iter().map(run).collect()
     }
 
-    /// What the records less `runs` are.
+    /// The records minus `runs`.
     fn errors(&self, runs: &Runs) -> Runs {
         let each = self.runs.iter().zip(&self.residuals).zip(runs);
         each.map(|((best, residual), run)| {
@@ -166,8 +167,8 @@ impl RecordJudge {
         .collect()
     }
 
-    /// Fits the free coordinates of the best fit in `model` by Gauss–Newton steps on the derivatives of the best fit, and
-    /// judges what comes out. `None` where its free run diverges.
+    /// Refits the free coordinates in `model` by Gauss–Newton steps with the derivatives of the best fit, and
+    /// judges the result. `None` if its free run diverges.
     pub(super) fn refitted(&self, model: &Model) -> Option<Refitted> {
         let places = self.places(model);
         let coordinates = model.coordinates();
@@ -213,7 +214,7 @@ impl RecordJudge {
         })
     }
 
-    /// Judges `model` as it is.
+    /// Judges `model` without a refit.
     pub(super) fn as_it_is(&self, model: Model) -> Option<Refitted> {
         let (p_value, change) = self.judged(&self.runs(&model)?);
         Some(Refitted {
@@ -223,7 +224,7 @@ impl RecordJudge {
         })
     }
 
-    /// The p-value of a flow with these free runs, and Σ d² over the variance of the residual.
+    /// The p-value of a plant with these free runs, and Σ d² over the residual variance.
     fn judged(&self, runs: &Runs) -> (f64, f64) {
         let (mut square, mut product) = (0.0, 0.0);
         let mut scatter = [0.0; 2];
@@ -268,7 +269,7 @@ mod tests {
         }
     }
 
-    /// The base with a pickup of so much y.
+    /// The base model with a pickup of this gain.
     fn with_pickup(model: &Model, gain: f64) -> Model {
         let mut model = model.clone();
         let spec = spec("electrical-pickup").expect("in the catalogue");
@@ -278,7 +279,7 @@ mod tests {
 
     const PICKUP: f64 = 0.005;
 
-    /// Four records of the base with a small pickup, with noise that remembers ten samples.
+    /// Four records of the base with a small pickup and noise of correlation length ten.
     fn records(seed: u64) -> Vec<Record> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -287,7 +288,7 @@ mod tests {
             let u: Vec<f64> = (0..2500)
                 .map(|k| f64::from(u8::from(k / half % 2 == 1)))
                 .collect();
-            // The size of y bounds a free run.
+            // The size of y limits a free run.
             let y = vec![1.0; u.len()];
             let mut record = Record::new(&format!("r{each}"), Use::Identify, 0.001, u, y);
             let run = with_pickup(&base(), PICKUP)
@@ -306,7 +307,8 @@ mod tests {
         (0..4).map(record).collect()
     }
 
-    /// A pickup of its true size is excluded no more often than the p-value says, and one of ten times that always is.
+    /// The true size of a pickup is excluded no more often than the p-value states; ten times that size
+    /// always is.
     #[test]
     fn the_true_size_is_rarely_excluded_and_ten_times_that_is() {
         let seeds = 40;
@@ -323,7 +325,7 @@ mod tests {
             let large = of_size(10.0 * PICKUP);
             assert!(large < RULES.not_excluded, "{seed}: {large}");
         }
-        // 5 of 40 or more are met in one case of 300 at a rate of 2.5 %.
+        // At a rate of 2.5 %, 5 or more of 40 have a probability of 1 in 300.
         assert!(excluded < 5, "{excluded} of {seeds}");
     }
 }

@@ -1,4 +1,4 @@
-//! What a model settles at, whether it settles, and how fast.
+//! Steady states of a model under constant blowing, their stability and their time constants.
 
 use super::DesignError;
 use super::bench::Player;
@@ -6,26 +6,26 @@ use super::rules::RULES;
 use crate::model::Model;
 use serde::Serialize;
 
-/// Time constants are no longer than this, samples.
+/// Longest time constant, samples.
 const LONGEST_CONSTANT: usize = 10_000;
 
-/// What constant blowing leads to.
+/// Steady state under a constant command.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Steady {
     /// Friction of the flow, y.
     pub friction: f64,
     /// What the sensor shows, y.
     pub reading: f64,
-    /// Largest modulus of the model's poles under the command; above 1 it grows.
+    /// Largest pole modulus under the command; above 1 the model is unstable.
     pub modulus: f64,
 }
 
-/// The value `model` settles at with the valve open or closed throughout; closed
-/// means after two thousand samples ([`closed_loop::span`]) of blowing.
+/// The steady state of `model` with the valve constantly open or closed; closed means after two thousand
+/// samples ([`closed_loop::span`]) of blowing.
 ///
 /// # Errors
-/// [`DesignError::Unsettled`] when it does not within [`RULES`]' longest wait,
-/// [`DesignError::NotConverged`] when the poles cannot be found.
+/// [`DesignError::Unsettled`] if it does not settle within [`RULES`]' longest wait,
+/// [`DesignError::NotConverged`] if the poles cannot be found.
 pub fn steady(model: &Model, on: bool) -> Result<Steady, DesignError> {
     let bench = Player::<f64>::of(model);
     let mut state = bench.at_rest();

@@ -1,4 +1,4 @@
-//! The constants of the tracking law, from the model and the valve's limits.
+//! Parameters of the tracking law, from the model and the valve's limits.
 
 use super::bench::{Player, hold_times};
 use super::error::{DesignError, check};
@@ -12,7 +12,7 @@ use model_core::control::{HoldTimes, Reachable, Tracking};
 use model_core::delay::Transport;
 use serde::Serialize;
 
-/// What is wanted of a tracking law.
+/// Requirements on a tracking law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackRequest {
     /// The friction to hold: y of the flow for [`track`]; what the sensor shows, its zero included, for
@@ -52,7 +52,7 @@ impl TrackRequest {
     }
 }
 
-/// A tracking law and what the design rests on. Serialises to the keys under `track` of `design --json`.
+/// A tracking law and the figures of its design. Serialises to the keys under `track` of `design --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrackDesign {
     /// The law.
@@ -60,7 +60,7 @@ pub struct TrackDesign {
     pub law: Track,
     /// The friction that is held, y.
     pub target: f64,
-    /// What on/off blowing can hold: the open interval, y.
+    /// Open interval of friction that on/off blowing can hold, y.
     pub reachable: [f64; 2],
     /// The flow with the valve closed.
     pub natural: Steady,
@@ -72,7 +72,7 @@ pub struct TrackDesign {
     /// The duty that the law takes on the model.
     #[serde(rename = "duty_on_model")]
     pub duty: f64,
-    /// What deserves to be said.
+    /// Remarks for the user.
     pub remarks: Vec<String>,
 }
 
@@ -94,7 +94,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         });
     }
     let reachable = Reachable {
-        // What is left of the start after some seconds is no natural friction.
+        // A small remainder of the initial transient is no natural friction.
         low: if natural.friction.abs() < RULES.no_natural * blown.friction {
             0.0
         } else {
@@ -107,8 +107,8 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     for (modulus, valve) in [(natural.modulus, "closed"), (blown.modulus, "open")] {
         if modulus > 1.0 + RULES.grows {
             remarks.push(format!(
-                "with the valve {valve} the model grows slowly (largest pole modulus {modulus:.5}); \
-                 the loop holds it, but a long free run of it means nothing"
+                "with the valve {valve} the model is slightly unstable (largest pole modulus {modulus:.5}); \
+                the law stabilises it, but a long free run is not valid"
             ));
         }
     }
@@ -126,7 +126,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         let [rising, falling] = transport.held_back();
         let varies = transport.bounds().is_none_or(|[low, high]| low < high);
         if varies || law.shapes_command() {
-            // A pulse (or gap) shorter than its edge is held back never arrives.
+            // A pulse or gap shorter than the dispersion of its edges never arrives.
             let sure = |held: f64| held.ceil() as u32 + RULES.sure_pulse;
             hold.on = hold.on.max(sure(rising));
             hold.off = hold.off.max(sure(falling));
@@ -136,7 +136,8 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         let [on, off] =
             [hold.on, hold.off].map(|samples| (1e6 * f64::from(samples) * period_s).round() / 1e3);
         remarks.push(format!(
-            "shortest times are {on} ms on and {off} ms off: what is shorter need not arrive whole"
+            "shortest times are {on} ms on and {off} ms off: shorter pulses may not reach the flow \
+            completely"
         ));
     }
     let air = request
@@ -154,7 +155,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
 
     let lead = shortest.max(1);
     let range = reachable.high - reachable.low;
-    // The noise's density where it is slow, y²·s.
+    // Low-frequency power density of the noise, y²·s.
     let slow_noise = request.slow_noise.unwrap_or(RULES.usual_slow_noise);
     let density = 64.0 * period_s * slow_noise.powi(2);
     let observer = observer(
@@ -186,7 +187,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         play: RULES.play * passed(bias_rate, density, period_s),
         settled: 1.0,
         correction_limit: RULES.correction * range,
-        // A wild reading moves the estimate by the observer's share of the whole range.
+        // An outlier moves the estimate by the observer gain times the whole range.
         residual_limit: range,
         lost: Vec::new(),
     };
@@ -208,7 +209,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         let paces = RULES.paces.map(|pace| pace / a_thousand);
         for rate in paces.into_iter().filter(|rate| *rate < fastest) {
             let slower = paced(&law, rate, duty);
-            // What the look-ahead cannot hold or the model cannot follow is no choice.
+            // Rates that the look-ahead cannot hold or at which the model diverges are excluded.
             let Ok(figures) = duty_of(&slower) else { break };
             if figures.air < (1.0 - RULES.worthwhile_saving) * duty
                 && figures.offset.abs() < RULES.paced_offset * range
@@ -250,32 +251,32 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     })
 }
 
-/// u_eq = (α·y* − d)/(Σb + y*·Σc), theory 3.1; effects are not in it.
+/// u_eq = (α·y* − d)/(Σb + y*·Σc), theory 3.1; without effects.
 fn equivalent_duty(model: &Model, reference: f64) -> f64 {
     let alpha = 1.0 - model.a.iter().sum::<f64>();
     let gain = model.b.iter().sum::<f64>() + reference * model.c.iter().sum::<f64>();
     (alpha * reference - model.constant) / gain
 }
 
-/// The share of each residual that corrects the estimate: the stationary Kalman gain of a flow that forgets within its
-/// faster time constant τ and that the model misses by σ = `model_error` of the `range`. With
-/// q = 2σ²/τ, what pushes it away from the model, and S, the noise's `density`
-/// (y²·s), the estimate follows the sensor at √(1/τ² + q/S) − 1/τ per second.
+/// The observer gain per sample: the stationary Kalman gain for a flow with its faster time constant τ and a
+/// model error σ = `model_error` of the `range`. With the process noise q = 2σ²/τ and the sensor noise
+/// `density` S (y²·s), the bandwidth is √(1/τ² + q/S) − 1/τ per second.
 fn observer(time_constants_s: [f64; 2], density: f64, range: f64, period_s: f64) -> f64 {
     let tau = time_constants_s[0].min(time_constants_s[1]);
     let pushed = 2.0 * (RULES.model_error * range).powi(2) / tau;
     let rate = (tau.powi(-2) + pushed / density).sqrt() - 1.0 / tau;
-    // Without noise nothing is to be smoothed, and the rate is no number.
+    // Without noise the rate is infinite and the limit applies.
     (rate * period_s).min(RULES.observer_most)
 }
 
-/// What a first-order filter of `rate` (1 per sample) lets through of noise of `density` (y²·s): √(S·g/2), y rms.
+/// Noise at the output of a first-order filter of `rate` (per sample) for noise of `density` (y²·s):
+/// √(S·g/2), y rms.
 fn passed(rate: f64, density: f64, period_s: f64) -> f64 {
     (density * rate / period_s / 2.0).sqrt()
 }
 
-/// What is left of an integral `rate` (1 per sample) in the long run: it lets through noise of a given share of the
-/// `ripple` (y rms) that the valve's times enforce anyway.
+/// Long-term rate of an integrator that starts at `rate` (per sample): its noise is a given share of the
+/// `ripple` (y rms) that the valve's hold times cause anyway.
 fn settled(rate: f64, ripple: f64, density: f64, period_s: f64) -> f64 {
     if density <= 0.0 {
         return 1.0;
@@ -284,11 +285,11 @@ fn settled(rate: f64, ripple: f64, density: f64, period_s: f64) -> f64 {
     share.powi(2).clamp(RULES.least_settled, 1.0)
 }
 
-/// `law` with no more than `rate` switches per sample, for a flow that takes `duty`.
+/// `law` limited to `rate` switches per sample, for a flow that needs `duty`.
 ///
-/// The time between two openings is kept by the budget, whatever duty the flow
-/// really takes. The shorter part of the cycle is held a little less long than its share, so
-/// that the law knows its swing and yet the budget binds.
+/// The switching budget fixes the time between two openings, whatever duty the flow needs. The hold time of
+/// the shorter part is slightly less than its duration, so that the law knows its ripple and the budget
+/// remains the limit.
 fn paced(law: &Track, rate: f64, duty: f64) -> Track {
     let cycle = 2.0 / rate;
     let duty = duty.clamp(0.02, 0.98);
@@ -309,12 +310,12 @@ fn paced(law: &Track, rate: f64, duty: f64) -> Track {
     paced
 }
 
-/// Half of the longer time that a valve is held for, samples.
+/// Half of the valve's longer hold time, samples.
 fn half(hold: HoldTimes) -> u16 {
     hold.on.max(hold.off).div_ceil(2).min(10_000) as u16
 }
 
-/// The law on the model itself, once it has started, without the air budget.
+/// The law on the model itself, after the initial transient, without air budget.
 fn on_model(bench: &Player<f64>, tracking: Tracking<f64>) -> Figures {
     let free = Tracking {
         budget: Budget {

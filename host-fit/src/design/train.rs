@@ -1,4 +1,4 @@
-//! Pulse trains, and what they are worth when they are played to a model.
+//! Pulse trains and their value on a model.
 
 use super::bench::Player;
 use super::rules::RULES;
@@ -47,7 +47,7 @@ impl Train {
     }
 }
 
-/// What a train is worth.
+/// A pulse train with its value.
 #[derive(Clone, Debug)]
 pub(super) struct JudgedTrain {
     pub(super) train: Train,
@@ -100,7 +100,7 @@ impl<'a> Played<'a> {
         (s, on)
     }
 
-    /// Plays on for so many samples.
+    /// Simulates `samples` samples.
     pub(super) fn pass(&mut self, samples: usize) {
         for _ in 0..samples {
             if self.grown {
@@ -110,7 +110,7 @@ impl<'a> Played<'a> {
         }
     }
 
-    /// Judges whole periods, at least `samples` long; `None` if the model has grown.
+    /// Evaluates whole periods, at least `samples` long; `None` if the model diverges.
     pub(super) fn judge(&mut self, samples: usize, price: f64) -> Option<JudgedTrain> {
         let length = samples.div_ceil(self.on.len()) * self.on.len();
         let (mut sum, mut open) = (0.0, 0.0);

@@ -1,4 +1,4 @@
-//! What else could stand for a named effect, and the experiment that would tell.
+//! Which effects are not distinguishable from a named one, and the experiment that would distinguish them.
 
 use super::ranking::{Rival, alike, rivals};
 use super::session::Session;
@@ -8,15 +8,15 @@ use crate::terms::{Hypothesis, Judged, Likelihood, Term, is_out, shares_won};
 use model_core::effect::Spec;
 use std::sync::atomic::Ordering;
 
-/// An effect with what the records cannot tell from it.
+/// An effect with its equivalence set: all candidates that are not distinguishable from it on these records.
 pub(super) struct Set {
     pub(super) names: Vec<String>,
-    /// The models with the others in its place, inner units.
+    /// For each other member of the set, the model with that member in the effect's place, inner units.
     pub(super) models: Vec<Model>,
 }
 
 impl Set {
-    /// The share of the evidence that each member has, the effect of `last` first; empty where no run stays within bounds.
+    /// Posterior probability of each member, the effect of `last` first. Empty where every free run diverges.
     pub(super) fn posterior(&self, likelihood: &Likelihood<'_>, last: &Judged) -> Vec<f64> {
         let models = std::iter::once(last.model()).chain(&self.models);
         let evidence: Vec<f64> = models
@@ -33,7 +33,7 @@ impl Set {
 }
 
 impl Session<'_> {
-    /// For each of the first `told` effects all that the records cannot tell from it.
+    /// The equivalence sets of the first `told` effects.
     pub(super) fn sets(
         &self,
         last: &Hypothesis,
@@ -80,8 +80,7 @@ impl Session<'_> {
             .collect()
     }
 
-    /// The command that would tell the final model from those in which something else
-    /// stands for one of its effects.
+    /// The command that would distinguish the final model from models with another member of an effect's set.
     pub(super) fn separation(
         &self,
         model: &Model,

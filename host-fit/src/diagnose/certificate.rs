@@ -1,4 +1,4 @@
-//! How sure an effect is, whatever else may be missing (theory 4.5).
+//! Certificates of effects: a test whose error rate does not depend on what else is missing (theory 4.5).
 
 use super::RULES;
 use super::alternatives::Set;
@@ -10,18 +10,19 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// How sure an effect is, whatever else may be missing (theory 4.5).
+/// The certificate of an effect: a bound on its false-alarm rate, whatever else is missing (theory 4.5).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Certificate {
-    /// ln of the evidence for the model with the effect, less that of the best without it, nats.
+    /// ln of the Bayes factor of the model with the effect against the best model without it, nats.
     pub evidence_nats: f64,
-    /// ln of the e-value of "a model without the effect is enough", nats: ln of the evidence for the model with it, over the number
-    /// of models tried, less ln of the largest likelihood of models without it.
+    /// ln of the e-value against "no model without the effect needs more", nats: ln of the evidence of the
+    /// model with it, minus ln of the number of models tried, minus ln of the largest likelihood of any model
+    /// without it.
     pub log_e: f64,
-    /// Level α from 0 to 1. The effect is certified from ln(1/α) on: at most this share of certificates is false, as far as the
-    /// noise model holds and the base class has the truth.
+    /// Level α, 0 to 1. The effect is certified if the log e-value is at least ln(1/α). At most a share α of
+    /// certificates is false, provided that the noise model holds and the base class contains the true base.
     pub alpha: f64,
-    /// The records that it rests on.
+    /// Names of the records from which it was computed.
     pub records: Vec<String>,
 }
 
@@ -33,19 +34,20 @@ impl Certificate {
     }
 }
 
-/// Effects with which fewer terms explain the records better than the given model.
+/// Parsimony: the final model explains the records better than the given one, with fewer parameters.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Parsimony {
-    /// The effects.
+    /// The effects of the final model.
     pub effects: Vec<String>,
-    /// ln of the evidence for the final model, less that of the given one, nats.
+    /// ln of the evidence of the final model minus that of the given model, nats.
     pub nats: f64,
-    /// By how many coefficients and parameters it is smaller.
+    /// Number of coefficients and parameters that the final model has fewer than the given one.
     pub terms_fewer: usize,
 }
 
 impl Session<'_> {
-    /// What `last` with these effects explains better than `given` with fewer parameters; none where it does not.
+    /// Compares `last`, which has these effects, with `given`. `None` unless it has more evidence and fewer
+    /// parameters.
     pub(super) fn parsimony(
         &self,
         given: &Model,
@@ -66,12 +68,12 @@ impl Session<'_> {
         })
     }
 
-    /// ln of the evidence of a model at its most likely parameters, nats.
+    /// ln of the evidence of a model at its maximum-likelihood parameters, nats.
     fn evidence(&self, hypothesis: &Hypothesis) -> Option<f64> {
         MostLikely::of(self.judge(), hypothesis.judged.model())?.evidence(self.judge())
     }
 
-    /// Whether the records certify that `best` has something that the best base has not.
+    /// Whether the records certify that `best` contains an effect that the best base model lacks.
     pub(super) fn is_certified(&self, best: &Hypothesis, found: &Found) -> bool {
         let certificate = || {
             let own = self.evidence(best)?;
@@ -80,12 +82,12 @@ impl Session<'_> {
         certificate().is_some_and(|certificate| certificate.holds())
     }
 
-    /// The certificate of a model with this evidence, nats, against others.
+    /// The certificate of a model with this evidence (nats) against these null models.
     fn certificate(&self, own: f64, nulls: &[Hypothesis], found: &Found) -> Option<Certificate> {
         let judge = self.judge();
         let each = nulls.par_iter().filter_map(|null| {
             let null = MostLikely::of(judge, null.judged.model())?;
-            // A model counts by its likelihood also where its evidence is not to be had.
+            // Where the evidence of a null model cannot be computed, its likelihood is used.
             let evidence = null.evidence(judge).unwrap_or(f64::NEG_INFINITY);
             Some((null.log_likelihood, evidence))
         });
@@ -94,7 +96,7 @@ impl Session<'_> {
         let all = judge.first_fold();
         let mut records: Vec<String> = all.iter().map(|record| record.name.clone()).collect();
         records.dedup();
-        // One structure of all that were tried.
+        // The e-value is divided by the number of structures tried.
         let tried = (found.tried.max(1) as f64).ln();
         Some(Certificate {
             evidence_nats: own - evidence,
@@ -104,8 +106,8 @@ impl Session<'_> {
         })
     }
 
-    /// How sure each effect of `subject` is: the evidence for that model over the largest likelihood of any without the effect, and
-    /// without those of its set.
+    /// The certificate of each effect of `subject`: the evidence of that model over the largest likelihood of
+    /// all models that contain neither the effect nor another member of its equivalence set.
     pub(super) fn certificates(
         &self,
         subject: &Hypothesis,

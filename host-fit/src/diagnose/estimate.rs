@@ -8,7 +8,7 @@ use model_core::effect::{Parameter, Spec};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Standard errors to either side of an interval of 95 %.
+/// Half width of a 95 % interval in standard errors.
 const DEVIATES: f64 = 1.96;
 
 /// A fitted physical parameter.
@@ -33,8 +33,8 @@ pub(crate) fn estimates(
     estimates_among(fit, &[], spec, units)
 }
 
-/// The same with the choice of lags and of jet response in the intervals: by how much the
-/// parameters differ in `alike`, models that do as well with the same effects, adds to the variance.
+/// The same with the choice of the structure included: the scatter of the parameters over `alike`, models
+/// with the same effects and an equivalent validation error, is added to the variance.
 pub(crate) fn estimates_among(
     fit: &Fit,
     alike: &[&Model],
@@ -75,7 +75,8 @@ pub(crate) fn estimates_among(
     .collect()
 }
 
-/// Whether the parameters of an effect in a fit are known: its amplitude from 0, and each that is positive to within a factor.
+/// Whether an effect's parameters are identifiable: the interval of its amplitude excludes 0, and each
+/// positive parameter is known to within a factor.
 pub(super) fn is_identified(fit: &Fit, spec: &Spec) -> bool {
     let values = fit.model.values();
     let amplitude = spec.amplitude.filter(|amplitude| amplitude.linear);
@@ -91,7 +92,7 @@ pub(super) fn is_identified(fit: &Fit, spec: &Spec) -> bool {
     })
 }
 
-/// Whether the amplitude of an effect in a fit is known from 0; `true` where its card has no amplitude that is linear.
+/// Whether the amplitude of an effect differs significantly from 0; `true` if its card has no linear amplitude.
 pub(super) fn is_there(fit: &Fit, spec: &Spec) -> bool {
     let values = fit.model.values();
     let amplitude = spec.amplitude.filter(|amplitude| amplitude.linear);
@@ -102,7 +103,7 @@ pub(super) fn is_there(fit: &Fit, spec: &Spec) -> bool {
     })
 }
 
-/// An effect's parameters and where they stand among the coordinates of a model.
+/// An effect's parameters with their indices among the coordinates of a model.
 fn own(model: &Model, spec: &Spec) -> Vec<(usize, &'static Parameter)> {
     let coordinates = model.coordinates();
     let place = |parameter: &'static Parameter| {
@@ -119,7 +120,7 @@ mod tests {
     use crate::fit::FitStop;
     use model_core::effects::spec;
 
-    /// A vortex of gain 0.3 that decays in 30 ms, its parameters known to these standard errors.
+    /// Whether a vortex of gain 0.3 and decay time 30 ms counts as identified with these standard errors.
     fn known_to(gain: f64, decay: f64) -> bool {
         let vortex = spec("starting-vortex").expect("in the catalogue");
         let mut model = Model::default();

@@ -1,23 +1,23 @@
-//! What the flow feels of its own past.
+//! Memory of the flow: dependence on y at large lags.
 
 use super::RULES;
 use crate::model::Model;
 use model_core::effects::SLOW_WAKE;
 use serde::Serialize;
 
-/// What the flow feels of its own past.
+/// A memory of the flow: dependence on y at one large lag.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Memory {
-    /// How long ago, s.
+    /// The lag, s.
     pub lag_s: f64,
-    /// The level that the flow tends to, per y of then, without jets.
+    /// Change of the steady level per unit of y at that lag, without jets.
     pub weight: f64,
-    /// The same under full jets.
+    /// The same at full jet strength.
     pub weight_blown: f64,
 }
 
-/// What the flow of `model` feels of its own past: a term a·y(t − τ) of the recursion
-/// over the rate at which the flow forgets; and a slow wake.
+/// The memories of the flow of `model`: each term a·y(t − τ) of the recursion divided by the relaxation rate,
+/// and a slow wake.
 pub(super) fn memory(model: &Model) -> Vec<Memory> {
     let behind = |lag: &u16| model.convention.behind_newest(*lag);
     let is_memory = |lag: &u16| behind(lag) >= RULES.shortest_memory;
@@ -31,9 +31,8 @@ pub(super) fn memory(model: &Model) -> Vec<Memory> {
         .filter(|(lag, _)| !is_memory(lag))
         .map(|(_, c)| c)
         .sum();
-    // Where lags cancel, what is left of them is no rate: that of the way back is. A
-    // strong memory hides the way back behind its own: then nothing is known against
-    // the rate of the short lags.
+    // If the short lags nearly cancel, their sum is no relaxation rate: the dominant pole is used instead. A
+    // strong memory hides the pole; then the rate of the short lags is taken as it is.
     let slowest = model.sample_period_s / model.time_constant();
     let or_slowest = |rate: f64| {
         if slowest.is_finite() && rate <= RULES.cancelled * slowest {
@@ -97,14 +96,14 @@ mod tests {
             panic!("{found:?}")
         };
         assert!((one.lag_s - 0.2).abs() < 1e-12);
-        // At rest the flow forgets a tenth in a sample, under jets a fifth.
+        // The relaxation rate is 0.1 per sample without jets and 0.2 under them.
         assert!((one.weight + 0.2).abs() < 1e-9, "{one:?}");
         assert!((one.weight_blown - 0.2).abs() < 1e-9, "{one:?}");
     }
 
     #[test]
     fn lags_that_cancel_leave_no_rate_to_weigh_by() {
-        // The newest y is kept whole; what is forgotten, 0.02 in 1 − 31·0.02 samples, the far lag takes.
+        // The newest coefficient is 1; the relaxation of 0.02 per 1 − 31·0.02 samples is all in the far lag.
         let found = memory(&model(&[(1, 1.0), (31, -0.02)], &[]));
         let [one] = found.as_slice() else {
             panic!("{found:?}")

@@ -1,4 +1,4 @@
-//! What a diagnosis hands over.
+//! The result of a diagnosis.
 
 use super::memory::memory;
 use super::{Certificate, Memory, ParameterEstimate, Parsimony, Quoted};
@@ -12,51 +12,50 @@ use model_core::effect::Spec;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What a diagnosis says.
+/// The verdict of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// The held-out error is at the repeat scatter.
+    /// The validation error is at the noise level.
     NothingMissing,
-    /// One effect or several account for most of the misfit.
+    /// One or more effects explain most of the model error above the noise.
     EffectMissing,
-    /// Effects describe part of the misfit without being proven: stand-ins.
+    /// Effects describe part of the model error without being significant: surrogates.
     PartlyExplained,
-    /// A repeatable misfit that the catalogue does not explain.
+    /// A repeatable model error that no effect of the catalogue explains.
     Unexplained,
 }
 
-/// What is said, and of which hypothesis.
+/// The verdict and the hypothesis that it is about.
 pub(super) struct Conclusion {
     pub(super) verdict: Verdict,
-    /// The model that is handed over, inner units.
+    /// The final model, inner units.
     pub(super) model: Hypothesis,
     pub(super) effects: Vec<&'static Spec>,
     pub(super) p_value: Option<f64>,
 }
 
-/// Held-out error after adding effects.
+/// One step of the ladder: the validation error after adding effects.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Rung {
-    /// The effects added so far, in their order; those of the given model are not among them.
+    /// The effects added so far, in this order; without those of the given model.
     pub effects: Vec<String>,
-    /// Root mean square error of the free run on the held-out records, y.
+    /// Root mean square of the free-run error on the validation records, y.
     pub validate_rmse: f64,
-    /// FIT on the held-out records, %.
+    /// FIT on the validation records, %.
     pub validate_fit_percent: f64,
-    /// The noise floor, y; none without y_sd.
+    /// The noise level, y rms; none without y_sd.
     pub noise_rmse: Option<f64>,
-    /// What was done to get here, in words.
+    /// The step in words.
     pub step: String,
-    /// The model that stands here, fitted to everything that may be learned from; none on the way to a discovery, where
-    /// the terms have no names yet.
+    /// The model of this step, fitted to all estimation records. None during a discovery, where terms have no
+    /// names yet.
     #[serde(skip)]
     pub model: Option<Model>,
 }
 
 impl Diagnosis {
-    /// The same, with the model as it was given where nothing is named and the search ended
-    /// above what that leaves.
+    /// Returns to the given model if no effect is named and the search did not lower its error.
     pub(super) fn no_worse_than(mut self, given: &Model, as_given: Rung) -> Self {
         let named = !self.missing.is_empty() || !self.stand_ins.is_empty();
         let last = self.ladder.last().map_or(0.0, |rung| rung.validate_rmse);
@@ -72,7 +71,7 @@ impl Diagnosis {
 }
 
 impl Rung {
-    /// The rung of the model as given at the end of a ladder that led to nothing better.
+    /// The step of the given model again, as the last step of a ladder without improvement.
     pub(crate) fn once_more(self) -> Self {
         Self {
             step: "the model as given, which is better".to_owned(),
@@ -80,8 +79,8 @@ impl Rung {
         }
     }
 
-    /// The same with the error of the model's free run over whole `records`, as `compare` has it; as it was where no model
-    /// stands here. A run that diverges errs without end.
+    /// The same with the free-run error over whole `records`, as `compare` computes it. Unchanged where the
+    /// step has no model; infinite if the run diverges.
     pub(crate) fn as_compared(&mut self, records: &[Record]) {
         let Some(model) = &self.model else { return };
         let scores = score(model, records).map(|(scores, _)| scores);
@@ -92,7 +91,7 @@ impl Rung {
         };
     }
 
-    /// What was held out, in the user's units.
+    /// The errors on the validation records, in the user's units.
     pub(crate) fn of(
         judge: &Judge,
         units: &Units,
@@ -113,31 +112,31 @@ impl Rung {
     }
 }
 
-/// A candidate, judged against the model it was added to.
+/// A candidate compared with the model it was added to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Ranked {
     /// Its name.
     pub effect: String,
-    /// Held-out error with it, y.
+    /// Validation error with it, y rms.
     pub validate_rmse: f64,
-    /// By how much the held-out error falls, %.
+    /// Reduction of the validation error, %.
     pub error_reduction_percent: f64,
-    /// p-value of the whole search: how often noise alone lets any effect, at any point of its
-    /// grid, take as much of the held-out error.
+    /// Family-wise p-value: the probability that noise alone gives any effect, at any grid point, a gain as
+    /// large.
     pub p_value: f64,
-    /// By how much noise alone lets the best of all effects lower the held-out error in one
-    /// case of twenty, %.
+    /// 95 % quantile of the largest reduction of the validation error that noise alone gives any effect, %.
     pub by_chance_percent: f64,
     /// Fitted parameters by name.
     pub parameters: BTreeMap<String, ParameterEstimate>,
-    /// Candidates that the held-out records cannot tell from it.
+    /// Candidates that are not distinguishable from it on the validation records.
     pub confounded_with: Vec<String>,
-    /// Whether the gain counts as real: significant, worthwhile, better than chance.
+    /// Whether the gain is significant, above the practical margin, and above the gain that noise gives.
     pub significant: bool,
-    /// Whether everything was refitted with it; otherwise its numbers are what the
-    /// screening promises.
+    /// Whether the whole model was refitted with it; if not, its numbers are first-order predictions of the
+    /// screening.
     pub refitted: bool,
-    /// ln of the evidence of the refitted model on the estimation records, nats; comparable within one diagnosis.
+    /// ln of the evidence of the refitted model on the estimation records, nats. Comparable within one
+    /// diagnosis.
     pub evidence_nats: Option<f64>,
 }
 
@@ -150,63 +149,63 @@ pub struct NotTried {
     pub reason: String,
 }
 
-/// The outcome.
+/// The result of a diagnosis.
 #[derive(Clone, Debug)]
 pub struct Diagnosis {
-    /// What it says.
+    /// The verdict.
     pub verdict: Verdict,
-    /// The missing effects in the order added; none where the verdict is
-    /// "unexplained" or "partly explained", though the ladder shows what was tried.
+    /// The missing effects in the order added. Empty if the verdict is "unexplained" or "partly explained",
+    /// also where the ladder shows effects that were tried.
     pub missing: Vec<String>,
-    /// Effects that describe part of the misfit without being proven; beside `missing` those that take the rest only,
-    /// without which the model fits as well as the noise floor is known.
+    /// Surrogates: effects that describe part of the model error without being significant. Beside `missing`,
+    /// those without which the model fits within the uncertainty of the noise level.
     pub stand_ins: Vec<String>,
-    /// For each of `missing` all that the records cannot tell from it, itself first.
+    /// The equivalence set of each of `missing`, itself first.
     pub sets: Vec<Vec<String>>,
-    /// What the flow feels of its own past, in the final model.
+    /// Memories of the flow in the final model.
     pub memory: Vec<Memory>,
-    /// Models that were refitted in full on the way.
+    /// Number of models that were refitted in full.
     pub tried: usize,
-    /// Effects at points of their grids that were screened on the final model without effects:
-    /// what the p-values of the ranking are corrected for.
+    /// Number of candidates (effects × grid points) screened on the final base model: the family over which
+    /// the p-values of the ranking are corrected.
     pub alternatives: usize,
-    /// How the errors were held out.
+    /// How the validation error was obtained.
     pub held_out_by: HeldOutBy,
-    /// After how many seconds free runs started anew from the measurement, for rigs
-    /// that drift: see [`restart_after`](crate::fit::restart_after).
+    /// Free runs are restarted from the measurement after so many seconds, for rigs that drift: see
+    /// [`restart_after`](crate::fit::restart_after).
     pub restarted_s: Option<f64>,
-    /// Where the noise floor comes from.
+    /// Where the noise level comes from.
     pub noise_source: NoiseSource,
-    /// The noise floor on what was judged, y rms: measured or estimated.
+    /// The noise level on the validation samples, y rms: measured or estimated.
     pub noise_estimate: f64,
-    /// By how much of itself the level of a record scatters between repeats, where `y_sd` says so: what that explains of an
-    /// error is not held against a model.
+    /// Relative scatter of a record's level between repeats, if `y_sd` shows one. Errors along it are not
+    /// counted as model error.
     pub level_scatter: Option<f64>,
-    /// The last error on records that nothing was chosen by; none where there are too few to keep
-    /// some back.
+    /// The final model's error on records that played no part in the choice of the structure. None if there
+    /// are too few records to set some aside.
     pub quoted: Option<Quoted>,
-    /// Share of the held-out energy that the best of all effects takes of noise alone in one search of twenty.
+    /// 95 % quantile of the largest share of the validation error energy that noise alone gives any effect.
     pub usual_by_chance: f64,
-    /// Held-out errors from the model as given to the last one.
+    /// Validation errors from the given model to the final one.
     pub ladder: Vec<Rung>,
-    /// All candidates for the final model without effects, best first.
+    /// All candidates for the final base model, best first.
     pub ranking: Vec<Ranked>,
-    /// Parameters of the missing effects, or of the stand-ins, in the final model.
+    /// Parameters of the missing effects, or of the surrogates, in the final model.
     pub parameters: BTreeMap<String, BTreeMap<String, ParameterEstimate>>,
-    /// ln of the evidence of the final model on the estimation records, nats; none where it was not searched for.
+    /// ln of the evidence of the final model on the estimation records, nats; none if no search was made.
     pub evidence_nats: Option<f64>,
-    /// How sure each effect of the best model is that was found, named or not.
+    /// The certificate of each effect of the best model, named or not.
     pub certificates: BTreeMap<String, Certificate>,
-    /// What `missing` explains better with fewer parameters than the given model has.
+    /// What `missing` gains in evidence with fewer parameters than the given model.
     pub parsimony: Option<Parsimony>,
-    /// The share of the evidence that each member of each of `sets` has.
+    /// Posterior probability of each member of each of `sets`.
     pub posterior: Vec<Vec<f64>>,
     /// Candidates that could not be tried.
     pub not_tried: Vec<NotTried>,
-    /// The experiment for effects that the data cannot tell apart.
+    /// The experiment that would distinguish the members of an equivalence set.
     pub separation: Option<Separation>,
-    /// p-value of the whole search by which the effects were named or stand in; none where none are, or where
-    /// they do only as well as lags, with fewer parameters.
+    /// Family-wise p-value of the named effects or surrogates. None without any, or where effects were named
+    /// for fitting equally well with fewer parameters.
     pub p_value: Option<f64>,
     /// The final model.
     pub model: Model,

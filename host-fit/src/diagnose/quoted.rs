@@ -1,4 +1,4 @@
-//! The last error, told of records that played no part in the choice.
+//! The final model's error on records that played no part in choosing it.
 
 use super::RULES;
 use crate::data::{Record, Use};
@@ -6,21 +6,21 @@ use crate::indicators::score;
 use crate::model::Model;
 use serde::Serialize;
 
-/// What the final model does on records that nothing was chosen by.
+/// Errors of the given and the final model on records that played no part in choosing the structure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Quoted {
     /// Their names.
     pub records: Vec<String>,
-    /// Root mean square error of the given model's free run there, y.
+    /// Root mean square of the given model's free-run error there, y.
     pub before_rmse: f64,
-    /// The same of the final model.
+    /// Root mean square of the final model's free-run error there, y.
     pub validate_rmse: f64,
-    /// The noise floor there; none without y_sd.
+    /// The noise level there, y rms; none without y_sd.
     pub noise_rmse: Option<f64>,
 }
 
-/// Records to choose by, and every third `validate` record, kept back to quote on; `None` where there are
-/// too few of them.
+/// Splits the validation records: every third one is set aside for an independent estimate, the structure is
+/// chosen on the others. `None` if there are too few.
 pub(super) fn kept_back(records: &[Record]) -> Option<(Vec<Record>, Vec<Record>)> {
     let held_out = records.iter().filter(|r| r.role == Use::Validate).count();
     if held_out < RULES.enough_to_quote {
@@ -40,7 +40,7 @@ pub(super) fn kept_back(records: &[Record]) -> Option<(Vec<Record>, Vec<Record>)
 }
 
 impl Quoted {
-    /// What both models do on `kept`; `None` where one diverges.
+    /// Errors of both models on `kept`; `None` if one diverges.
     pub(super) fn of(given: &Model, last: &Model, kept: &[Record]) -> Option<Self> {
         let (before, after) = (score(given, kept).ok()?.0, score(last, kept).ok()?.0);
         Some(Self {

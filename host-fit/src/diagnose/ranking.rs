@@ -1,5 +1,4 @@
-//! Candidates against the model they would be added to, and which of them the data
-//! cannot tell apart.
+//! Ranking of the candidates on one model, and which of them are not distinguishable.
 
 use super::{NotTried, RULES, Ranked, estimates};
 use crate::model::Model;
@@ -10,24 +9,25 @@ use crate::terms::{
 use model_core::effect::Spec;
 use rayon::prelude::*;
 
-/// What a longer memory is called among the effects that data cannot tell apart.
+/// Name of a longer memory in equivalence sets.
 pub const FLOW_MEMORY: &str = "flow-memory";
-/// What a second lag of the flow is called there.
+/// Name of a second lag of the flow in equivalence sets.
 pub const FLOW_LAG: &str = "flow-lag";
 
-/// Whether the data cannot tell two models apart: by chance or by size.
+/// Whether two models are not distinguishable: the difference of their errors is not significant, or below
+/// the practical margin.
 pub(super) fn alike(a: &HeldOut, b: &HeldOut) -> bool {
     let (better, worse) = if a.rmse() <= b.rmse() { (a, b) } else { (b, a) };
     worse.rmse() <= (1.0 + RULES.alike) * better.rmse() || p_value(worse, better) >= RULES.level
 }
 
-/// A candidate as the screening sees it, and refitted where it promised enough.
+/// A candidate with its first-order prediction, and refitted if the prediction was good enough.
 pub(super) struct Rival {
-    /// Its name: an effect's, or what a memory or a lag of the flow is called.
+    /// The effect's name, or the name of a memory or lag of the flow.
     pub(super) name: String,
     pub(super) spec: Option<&'static Spec>,
     pub(super) refitted: Option<Hypothesis>,
-    /// Held-out rms error as screened, inner units.
+    /// First-order prediction of the validation error, inner units rms.
     pub(super) promised: f64,
 }
 
@@ -36,7 +36,7 @@ impl Rival {
         self.judged().map_or(self.promised, Judged::rmse)
     }
 
-    /// As it is measured, scatter of the level and all.
+    /// Validation error as measured, scatter of the level included.
     fn measured_rmse(&self) -> f64 {
         let measured = |judged: &Judged| judged.held_out.measured_rmse();
         self.judged().map_or(self.promised, measured)
@@ -48,8 +48,7 @@ impl Rival {
     }
 }
 
-/// All candidates for `context`, best first: the most promising refitted, and `named`
-/// in any case.
+/// All candidates for `context`, best first. The most promising ones and `named` are refitted.
 pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) -> Vec<Rival> {
     match Screen::new(search.judge, context.judged.model()) {
         Some(screen) => {
@@ -60,8 +59,8 @@ pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) 
     }
 }
 
-/// The same, with what noise alone would make of the best of them: the error of `last`
-/// under signs drawn from `seed`.
+/// The same with the bootstrap distribution of the best candidate's gain under noise alone: the error of
+/// `last` with random signs from `seed`.
 pub(super) fn rivals_and_chance(
     search: &Search<'_>,
     context: &Hypothesis,
@@ -78,14 +77,12 @@ pub(super) fn rivals_and_chance(
     made.unwrap_or_default()
 }
 
-/// All candidates as the screening sees them, best first; `before` is the held-out error
-/// without them.
+/// The first-order predictions of all candidates, best first; `before` is the validation error without them.
 pub(super) fn screened(screen: &Screen<'_>, table: &Table, before: f64) -> Vec<Rival> {
     rated(screen, table, before, |_, _, _| None)
 }
 
-/// The most promising candidates, and `named` in any case, refitted on `context`. Nothing
-/// is where no effect is named.
+/// The most promising candidates and `named`, refitted on `context`. None if no effect is named.
 fn refitted(
     search: &Search<'_>,
     context: &Hypothesis,
@@ -103,8 +100,8 @@ fn refitted(
         table,
         context.judged.rmse(),
         |place, name, candidate| {
-            // What the flow may be without a name promises little to first order, and often does as well; and so does
-            // what acts like a named effect at another place of its grid.
+            // Unnamed terms of the base promise little to first order and often fit equally well after a
+            // refit, as do named effects at another grid point: these are refitted too.
             let wanted = place < RULES.ranked_in_full
                 || [FLOW_MEMORY, FLOW_LAG].contains(&name)
                 || named.contains(&name)
@@ -128,7 +125,7 @@ fn rated(
     before: f64,
     refit: impl Fn(usize, &str, &Candidate) -> Option<Hypothesis> + Sync,
 ) -> Vec<Rival> {
-    // The best of each kind, in the order of what they promise.
+    // The best candidate of each kind, in the order of the predictions.
     let mut best: Vec<(String, &Candidate)> = Vec::new();
     for candidate in &table.candidates {
         let name = match &candidate.term {
@@ -157,7 +154,7 @@ fn rated(
             promised: before * (1.0 - candidate.held_out).max(0.0).sqrt(),
         })
         .collect();
-    // What the screening found no use for was tried all the same.
+    // Candidates that the screening rejected are listed as tried.
     let useless = screen.model().candidates().filter(|spec| {
         screen.pointless(spec).is_none() && !best.iter().any(|(name, _)| name == spec.name)
     });
@@ -167,7 +164,7 @@ fn rated(
         refitted: None,
         promised: before,
     }));
-    // What was fitted comes before what is only promised.
+    // Refitted candidates come before screened ones.
     rated.sort_by(|a, b| {
         let fitted = a.refitted.is_none().cmp(&b.refitted.is_none());
         fitted.then(a.rmse().total_cmp(&b.rmse()))
@@ -175,8 +172,7 @@ fn rated(
     rated
 }
 
-/// The ranking as it is reported, in the user's units: `before` is the held-out error
-/// without them.
+/// The ranking in the user's units; `before` is the validation error without the candidates.
 pub(super) fn ranked(
     units: &Units,
     before: f64,

@@ -1,4 +1,4 @@
-//! A diagnosis in the making: from what the search found to what is handed over.
+//! A diagnosis in progress: from the result of the search to the final answer.
 
 use super::estimate::{estimates_among, is_identified};
 use super::memory::memory;
@@ -13,25 +13,25 @@ use model_core::effect::Spec;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// A diagnosis in the making.
+/// A diagnosis in progress.
 pub(super) struct Session<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) units: Units,
     pub(super) options: &'a Options,
 }
 
-/// The steps from the first effect to the last.
+/// The ladder from the first effect to the last.
 struct Way {
-    /// The effects, what is missed most first.
+    /// The effects, the most important first.
     order: Vec<&'static Spec>,
-    /// A rung for each, with those before it.
+    /// One step for each effect, with those before it.
     rungs: Vec<Rung>,
-    /// How many of them are proven: without those that follow the model fits all the same, or as well with one of the others twice, or their parameters
-    /// are not known.
+    /// Number of significant effects. Not counted: those without which the model still fits, those that a
+    /// second copy of another effect replaces, and those whose parameters are not identifiable.
     proven: usize,
 }
 
-/// A model without effects, and what each of them does there.
+/// A base model, and the result of adding each effect to it.
 struct Compared {
     context: Hypothesis,
     others: Vec<Rival>,
@@ -52,7 +52,7 @@ impl Session<'_> {
         self.search.judge
     }
 
-    /// The step of the ladder on which `judged` stands.
+    /// The step of the ladder for `judged`.
     pub(super) fn rung(&self, judged: &Judged, effects: &[String], step: &str) -> Rung {
         let (judge, units) = (self.judge(), &self.units);
         let end = judge.final_fit(judged);
@@ -61,9 +61,9 @@ impl Session<'_> {
         Rung::of(judge, units, &held_out, effects, step, Some(model))
     }
 
-    /// The given model's own structure, for rigs whose dynamics is the user's choice of
-    /// lags and delays; with the product u·y where it has none and gains by it: that term is in
-    /// the base class and never counts as missing.
+    /// The given model's own structure, for users who chose lags and delays themselves. The product u·y is
+    /// added where it is missing and lowers the error: it belongs to the base class and never counts as a
+    /// missing effect.
     pub(super) fn root_of_given(
         &self,
         given: &Model,
@@ -103,7 +103,7 @@ impl Session<'_> {
         let named = self.named(&found);
         (search.progress)("what else it could be");
         let mut compared = self.compared(&named, &found);
-        // One effect may do better than all that were found together.
+        // One effect alone may give a smaller error than all effects found together.
         let alone = compared.best_alone();
         let alone = alone.filter(|alone| alone.score() < named.score());
         let concluded = |best: &Hypothesis| self.concluded(best, &found, as_given);
@@ -134,7 +134,7 @@ impl Session<'_> {
             ladder.push(self.rung(&context.judged, &[], &step));
         }
         ladder.extend(way.rungs);
-        // What takes the rest only is no name, and nobody has to be told from it.
+        // Surrogates are not named, and no experiment is proposed for them.
         let told = if claims { way.proven } else { order.len() };
         let mut sets = self.sets(&last, &order, told, &others, &found.root);
         let alternatives: Vec<Model> = sets
@@ -144,7 +144,7 @@ impl Session<'_> {
             .collect();
         let end = judge.final_fit(&last.judged);
         let model = units.model_out(&end.model);
-        // It ends with the model that is handed over.
+        // The ladder ends with the final model.
         if order.is_empty() && ladder.last().and_then(|rung| rung.model.as_ref()) != Some(&model) {
             let step = match last.terms.is_empty() {
                 true => refitted,
@@ -179,8 +179,8 @@ impl Session<'_> {
         let certificates = self.certificates(subject, &sets, &others, &found);
         let mut ranking = ranked(units, context.judged.rmse(), &others, &chance, likelihood);
         for entry in &mut ranking {
-            // The ranking shows what the effects are in the final model, and only what
-            // still cannot be told apart there.
+            // The ranking shows the parameters of the final model, and only the ambiguities that remain
+            // there.
             if let Some(own) = parameters.get(&entry.effect) {
                 entry.parameters.clone_from(own);
                 let set = sets
@@ -236,12 +236,12 @@ impl Session<'_> {
         }
     }
 
-    /// A hypothesis without its effects, and all candidates there.
+    /// A hypothesis without its effects, and all candidates on that model.
     fn compared(&self, with: &Hypothesis, found: &Found) -> Compared {
         let effects = with.terms.iter().filter_map(Term::effect);
         let names: Vec<&str> = effects.map(|spec| spec.name).collect();
         let without = self.search.without_effects(with, &found.root, |_| true);
-        // Without them its lags may not run freely.
+        // The lags of a model without effects may make its free run unstable.
         let context = if without.is_bare() {
             without
         } else {
@@ -256,8 +256,8 @@ impl Session<'_> {
         }
     }
 
-    /// From no effect to `last`, with one of its `effects` more at each step: what is missed least comes last. Only where something is
-    /// claimed is it asked which of them are proven.
+    /// The ladder from no effect to `last`, one more of its `effects` at each step, the least important last.
+    /// Significance of each is tested only if effects are claimed.
     fn way(
         &self,
         last: &Hypothesis,

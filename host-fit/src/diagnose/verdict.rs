@@ -1,4 +1,4 @@
-//! Whether anything is missing, and whether it has earned to be named.
+//! The verdict: whether anything is missing, and which effects are significant.
 
 use super::estimate::{is_identified, is_there};
 use super::memory::memory;
@@ -17,8 +17,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 impl Session<'_> {
-    /// The answer for a given model that is at the noise floor already, unless a
-    /// single effect promises to do clearly better.
+    /// The verdict for a given model at the noise level, unless a single effect promises a clear gain.
     pub(super) fn nothing_at_once(
         &self,
         given: &Model,
@@ -76,9 +75,8 @@ impl Session<'_> {
         })
     }
 
-    /// Whether an effect in the place of something that the given base has does better
-    /// than that, or as well with fewer parameters: what a base may have without a name
-    /// imitates some effects well enough to bring them to the noise floor.
+    /// Whether replacing a term of the given base by an effect lowers the error, or fits equally well with
+    /// fewer parameters. Unnamed terms imitate some effects well enough to reach the noise level.
     fn imitated(&self, given: &Model, as_given: &HeldOut) -> bool {
         Term::UNNAMED.iter().any(|stand_in| {
             let without = stand_in.taken_from(given, given);
@@ -90,7 +88,7 @@ impl Session<'_> {
             let others =
                 search.in_place_of(stand_in, &without, own, |term| term.effect().is_some());
             let lags = Term::lags_of(&without);
-            // The lags were found beside what stands in: they move before anything is said.
+            // The lags were estimated beside the surrogate: they are moved before the comparison.
             let others: Vec<_> = others.into_iter().take(RULES.settled).collect();
             others.into_par_iter().any(|other| {
                 let terms = [lags.clone(), vec![other.term.clone()]].concat();
@@ -107,7 +105,7 @@ impl Session<'_> {
         })
     }
 
-    /// Whether an error is no more than the noise, or than the noise is known.
+    /// Whether an error is at the noise level, within its uncertainty.
     fn fits(&self, judged: &Judged) -> bool {
         let judge = self.judge();
         if judge.p_above_noise(&judged.held_out, RULES.floor_margin) >= RULES.level {
@@ -123,14 +121,15 @@ impl Session<'_> {
         }
     }
 
-    /// Whether a model is within what a known noise floor is known to: what takes the rest beside it is not proven.
+    /// Whether a model fits within the uncertainty of a known noise level: further effects are then not
+    /// significant.
     pub(super) fn is_enough(&self, hypothesis: &Hypothesis) -> bool {
         let known = self.judge().noise_source != NoiseSource::Scatter;
         known && self.fits(&hypothesis.judged)
     }
 
-    /// Whether `lesser` with one of its `effects` twice does as well as `best`, which has another one more: an effect in another law
-    /// than the catalogue's looks like two of it.
+    /// Whether `lesser` with a second copy of one of its `effects` fits equally well as `best`, which has one
+    /// effect more. An effect whose law differs from the catalogue's looks like two of it.
     pub(super) fn does_as_well_twice(
         &self,
         effects: &[&'static Spec],
@@ -148,7 +147,7 @@ impl Session<'_> {
         })
     }
 
-    /// Whether the held-out error depends on anything but its own frequency.
+    /// Whether the validation error is a function of any coordinate other than its own frequency.
     fn depends(&self, judged: &Judged) -> bool {
         let (mut records, mut runs) = (Vec::new(), Vec::new());
         for (fold, fit) in self.judge().folds.iter().zip(&judged.fits) {
@@ -169,8 +168,8 @@ impl Session<'_> {
             .any(|place| place.explained_fraction > RULES.depends)
     }
 
-    /// How effects have earned to be named or to stand in: they beat what lags can
-    /// do, or do as well with fewer parameters. `None` if they have not.
+    /// Why effects are named or reported as surrogates: they beat the best base model, or fit equally well
+    /// with fewer parameters. `None` if neither holds.
     fn earned(&self, best: &Hypothesis, found: &Found) -> Option<Earned> {
         let (bare, root) = (&found.bare, &found.root);
         let (with, without) = (best.judged.rmse(), bare.judged.rmse());
@@ -179,7 +178,7 @@ impl Session<'_> {
         } else {
             RULES.worthwhile
         };
-        // What is at the floor has nothing to gain.
+        // A model at the noise level cannot be improved.
         let open = self.judge().over_noise(without) > TERMS.at_the_floor;
         if self.judge().drifts_more(&best.judged, &bare.judged) {
             return None;
@@ -190,13 +189,14 @@ impl Session<'_> {
             && self.all_are_there(best)
             && let Some(p) = self.more_than_chance(best, bare)
         {
-            // Beside a base that fits, parameters that are not identified have to be certified.
+            // On a base that fits, effects with unidentifiable parameters need a certificate.
             let is_sure = is_worthwhile && (!self.is_enough(bare) || self.is_known(best));
             if is_sure || (self.is_enough(bare) && self.is_certified(best, found)) {
                 return Some(Earned { p_value: Some(p) });
             }
         }
-        // Who makes do with less than a base that fits has to be known, and needed: without it, what is left does not.
+        // To be named for parsimony on a base that fits, an effect must be identifiable and needed: the
+        // remaining model without it does not fit.
         let needed = || {
             let without = self.search.without_effects(best, root, |_| true);
             !(without.is_bare() && self.is_enough(&without))
@@ -206,31 +206,30 @@ impl Session<'_> {
         (leaner && self.is_known(best) && needed()).then_some(Earned { p_value: None })
     }
 
-    /// Whether the records tell the parameters of the effects of a model as it would be handed over.
+    /// Whether the effects' parameters are identifiable in the final fit.
     fn is_known(&self, best: &Hypothesis) -> bool {
         let end = self.judge().final_fit(&best.judged);
         let mut effects = best.terms.iter().filter_map(Term::effect);
         effects.all(|spec| is_identified(&end, spec))
     }
 
-    /// Whether no effect's 95 % interval of its amplitude holds 0.
+    /// Whether the 95 % interval of every effect's amplitude excludes 0.
     fn all_are_there(&self, best: &Hypothesis) -> bool {
         let end = self.judge().final_fit(&best.judged);
         let mut effects = best.terms.iter().filter_map(Term::effect);
         effects.all(|spec| is_there(&end, spec))
     }
 
-    /// Whether neither the noise is known nor anything shows that a base errs.
+    /// Whether the noise level is unknown and the error of the base depends on no coordinate.
     fn in_the_dark(&self, bare: &Hypothesis) -> bool {
         self.judge().noise_source == NoiseSource::Scatter && self.fits(&bare.judged)
     }
 
-    /// The p-value of what `best` does better than `bare`, if that is more than chance does.
+    /// p-value of the gain of `best` over `bare`; `None` if noise alone often gives as large a gain.
     fn more_than_chance(&self, best: &Hypothesis, bare: &Hypothesis) -> Option<f64> {
         let scatter = self.judge().noise_source == NoiseSource::Scatter;
-        // The best of so many alternatives is often good by chance. Where the base
-        // errs far beyond what scatters from sample to sample, records are few and
-        // short as a rule: one test for each effect has to do.
+        // Family-wise testing is strict with many candidates. Where the base error is far above the
+        // sample-to-sample scatter, records are usually few and short: one test per effect is used there.
         let (p, level) = if scatter && !self.in_the_dark(bare) {
             let one = p_value(&bare.judged.held_out, &best.judged.held_out);
             let effects = best.judged.model().candidates().count();
@@ -241,8 +240,8 @@ impl Session<'_> {
         (p <= level).then_some(p)
     }
 
-    /// How often noise alone, as `best` leaves it, lets one of all effects lower the error of `bare` as far
-    /// as `best` does. The error of `bare` itself would hide an effect that shows in few records.
+    /// Family-wise p-value of the gain of `best` over `bare`, with the residual of `best` as the noise. The
+    /// residual of `bare` would hide an effect that shows in few records.
     fn by_chance(&self, best: &Hypothesis, bare: &Hypothesis) -> f64 {
         let chance = Screen::new(self.judge(), bare.judged.model()).and_then(|screen| {
             let block = best.judged.held_out.block();
@@ -253,7 +252,7 @@ impl Session<'_> {
         chance.map_or(1.0, |chance| chance.p_value(1.0 - left))
     }
 
-    /// What was found without the effects that the rest of it does as well without.
+    /// The hypothesis without the effects that are not needed.
     fn pared(
         &self,
         found: &Found,
@@ -274,21 +273,21 @@ impl Session<'_> {
         best
     }
 
-    /// The best that was found, with the effects that have earned their names beside each other.
+    /// The best hypothesis, pruned to the effects that are significant beside each other.
     pub(super) fn named(&self, found: &Found) -> Hypothesis {
         let scatter = self.judge().noise_source == NoiseSource::Scatter;
         let dark = scatter
             && self.judge().unexplained_share(&found.bare.judged.held_out) <= RULES.too_much;
         if dark {
-            // One test for each effect: more cannot be asked in the dark.
+            // Without a known noise level, each effect gets a single test.
             self.pared(found, |lesser, best| {
                 let p = p_value(&lesser.judged.held_out, &best.judged.held_out);
                 best.judged.model().candidates().count() as f64 * p >= RULES.level
             })
         } else if found.best.terms.iter().filter_map(Term::effect).count() > 1 {
             let pared = self.pared(found, |lesser, best| self.is_beside_the_point(lesser, best));
-            // Where a base fits, several effects that do nothing but together are a curve through its errors, unless
-            // they make do with less than that base.
+            // On a base that fits, several effects that are useless one by one over-fit its residual, unless
+            // the model has fewer parameters than that base.
             let leaner = pared.cost() <= found.bare.cost();
             if self.fits(&found.bare.judged) && !leaner && !self.one_leads(&pared, found) {
                 return found.bare.clone();
@@ -299,8 +298,9 @@ impl Session<'_> {
         }
     }
 
-    /// `best` without the effects in whose place lags do as well, searched for anew beside the other effects: those that it has
-    /// were found beside all of them. Where the noise floor is not known, errors say too little to ask that.
+    /// `best` without the effects that additional lags replace equally well. Lags are searched anew beside
+    /// the other effects, since the present ones were found beside all of them. Skipped if the noise level is
+    /// unknown: the error then says too little.
     fn without_what_lags_do(&self, mut best: Hypothesis, root: &Hypothesis) -> Hypothesis {
         if self.judge().noise_source == NoiseSource::Scatter {
             return best;
@@ -335,7 +335,7 @@ impl Session<'_> {
         best
     }
 
-    /// Whether one of the effects of `best` does better than the best without effects when it is alone.
+    /// Whether one effect of `best` alone beats the best model without effects.
     fn one_leads(&self, best: &Hypothesis, found: &Found) -> bool {
         let names: Vec<&str> = best
             .terms
@@ -353,9 +353,8 @@ impl Session<'_> {
             })
     }
 
-    /// Whether an effect beside others has not earned its name: where the model does without it,
-    /// it is named for what it takes of the error and of the excess; and noise alone seldom
-    /// lets any effect do as much there.
+    /// Whether an effect beside others is not significant. It is if adding it to the model without it
+    /// explains enough of the error and of the unexplained variance, with a small family-wise p-value.
     fn is_beside_the_point(&self, lesser: &Hypothesis, best: &Hypothesis) -> bool {
         let judge = self.judge();
         let excess = |hypothesis: &Hypothesis| judge.excess(&hypothesis.judged.held_out);
@@ -365,7 +364,7 @@ impl Session<'_> {
         (little && self.fits(&lesser.judged)) || self.more_than_chance(best, lesser).is_none()
     }
 
-    /// What is said of `best` beside the best without effects.
+    /// The verdict on `best` compared with the best model without effects.
     pub(super) fn concluded(
         &self,
         best: &Hypothesis,
@@ -385,7 +384,7 @@ impl Session<'_> {
             effects: Vec::new(),
             p_value: None,
         };
-        // Effects on a base that is worse than what was given explain nothing.
+        // Effects on a base with a larger error than the given model explain nothing.
         let no_better = best.judged.rmse() >= as_given.rmse();
         if effects.is_empty() || no_better {
             return of_bare();
@@ -405,7 +404,7 @@ impl Session<'_> {
         };
         let leaner = is_leaner(best, bare);
         let known = judge.noise_source != NoiseSource::Scatter;
-        // Near a known floor anything fits that takes a little.
+        // Near a known noise level any effect with a small gain reaches it.
         let least = if fits || explained {
             RULES.most
         } else {
@@ -427,13 +426,13 @@ impl Session<'_> {
     }
 }
 
-/// That effects have earned to be named.
+/// The test by which effects were named.
 struct Earned {
-    /// p-value of the search; none where they are only leaner.
+    /// Family-wise p-value; none if they were named for parsimony.
     p_value: Option<f64>,
 }
 
-/// Whether effects do as well as what lags can do, with fewer parameters.
+/// Whether effects fit equally well as additional lags, with fewer parameters.
 fn is_leaner(best: &Hypothesis, bare: &Hypothesis) -> bool {
     best.judged.rmse() < (1.0 + RULES.alike) * bare.judged.rmse() && best.cost() < bare.cost()
 }

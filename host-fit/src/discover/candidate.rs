@@ -1,17 +1,17 @@
-//! A term that was fitted to the end, and the best of many.
+//! Fitted terms and the choice of the best.
 
 use super::RULES;
 use super::place::Place;
 use super::term::Term;
 use crate::terms::{self, Hypothesis, Judged};
 
-/// A term and the model with it, fitted to the end.
+/// A fully fitted term with its model.
 #[derive(Clone)]
 pub(super) struct Candidate {
-    /// Its curve.
+    /// The term as a piecewise-linear curve.
     pub(super) term: Term,
     pub(super) with: Hypothesis,
-    /// The same as a formula, where one was looked for and does as well.
+    /// The term as a formula, if one was tried and fits equally well.
     pub(super) formula: Option<(Term, Judged)>,
 }
 
@@ -24,7 +24,8 @@ impl Candidate {
         }
     }
 
-    /// As a curve or as a formula, whichever is better: what is smooth, straight lines leave some of.
+    /// The curve or the formula, whichever has the smaller penalised error. A formula may win because
+    /// straight lines approximate a smooth function poorly.
     fn told(&self) -> (&Term, &Judged) {
         let curve = (&self.term, &self.with.judged);
         match &self.formula {
@@ -33,12 +34,13 @@ impl Candidate {
         }
     }
 
-    /// The model as it is told.
+    /// The model with the curve or formula that is reported.
     pub(super) fn judged(&self) -> &Judged {
         self.told().1
     }
 
-    /// ln of the held-out error, and the price of the model's parameters and of a time that was chosen and not fitted.
+    /// ln of the validation error plus the penalty of the model's parameters and of a chosen (not fitted)
+    /// time constant.
     pub(super) fn size(&self) -> f64 {
         let (term, judged) = self.told();
         let chosen = if term.has_chosen_time() {
@@ -53,21 +55,22 @@ impl Candidate {
         self.term.entry.place()
     }
 
-    /// While it blows, the length of this pulse is the time since its edge.
+    /// Whether the two differ only between pulse length and time since the edge, which are equal during a
+    /// pulse.
     pub(super) fn is_twin(&self, other: &Self) -> bool {
         let ratio = self.with.judged.rmse() / other.with.judged.rmse();
         self.term.entry == other.term.entry && ratio - 1.0 < RULES.twins
     }
 }
 
-/// The best of some, taken from them.
+/// Removes and returns the best of some candidates.
 pub(super) fn best(all: &mut Vec<Candidate>) -> Option<Candidate> {
     let smaller = |a: &usize, b: &usize| all[*a].size().total_cmp(&all[*b].size());
     let index = (0..all.len()).min_by(smaller)?;
     Some(all.swap_remove(index))
 }
 
-/// Where the best of each place are once all are sorted, the best first.
+/// Indices of the best candidate of each place, after sorting all from best to worst.
 pub(super) fn best_of_each_place(all: &mut [Candidate]) -> Vec<usize> {
     all.sort_by(|a, b| a.size().total_cmp(&b.size()));
     let new = |i: &usize| {

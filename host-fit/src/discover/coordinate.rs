@@ -1,57 +1,57 @@
-//! What a term may depend on: everything that its place can know.
+//! Coordinates: the signals that a term may depend on at its place.
 
 use crate::terms::Units;
 use model_core::effect::Unit;
 
-/// What a term depends on. Times in s.
+/// The coordinate of a term. Times in s.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Coordinate {
     /// The friction of the flow.
     Y,
-    /// What the sensor is about to show.
+    /// The sensor's reading before the term.
     Reading,
-    /// y so long ago.
+    /// y before this time.
     PastY(f64),
-    /// The mean of y over so long.
+    /// Mean of y over this time.
     MeanY(f64),
-    /// Time since the command was switched on.
+    /// Time since the last rising edge of the command.
     SinceRisingEdge,
-    /// Time since it was switched off.
+    /// Time since its last falling edge.
     SinceFallingEdge,
-    /// Length of the rest before the last pulse.
+    /// Duration of the rest before the last pulse.
     RestBefore,
-    /// Length of the last pulse, or of this one so far.
+    /// Duration of the last pulse, or of the present one so far.
     PulseLength,
-    /// How many pulses there were, this one among them.
+    /// Number of pulses so far, the present one included.
     PulseNumber,
-    /// For how long there was blowing in the last so many seconds.
+    /// Total blowing time within this window.
     Blowing(f64),
-    /// The command, forgotten exponentially.
+    /// The command after a first-order low-pass filter.
     MemoryOfU(f64),
-    /// y, forgotten exponentially.
+    /// y after a first-order low-pass filter.
     MemoryOfY(f64),
-    /// |ẏ|, forgotten exponentially.
+    /// |ẏ| after a first-order low-pass filter.
     MemoryOfRate(f64),
-    /// Time in the record.
+    /// Time since the start of the record.
     Time,
-    /// A measured channel, from its mean.
+    /// A measured channel minus its mean.
     Channel(String),
 }
 
-/// A state of an effect file.
+/// A state variable of an effect file.
 pub(super) struct State {
     pub(super) name: &'static str,
     pub(super) start: f64,
     pub(super) update: String,
 }
 
-/// Before the first edge, the last one was so long ago, s at 1 kHz.
+/// Time assumed since the last edge before the record, s at 1 kHz.
 const LONG_AGO_S: f64 = 10.0;
-/// What the fading time is called where it is fitted.
+/// Parameter name of a fitted filter time constant.
 pub(super) const FADING: &str = "fading_time";
 
 impl Coordinate {
-    /// In words, as documents name it.
+    /// The coordinate in words, as in documents.
     #[must_use]
     pub fn words(&self) -> String {
         let seconds = |t: &f64| crate::picture::significant(*t, 2);
@@ -74,7 +74,7 @@ impl Coordinate {
         }
     }
 
-    /// Its words without times, joined by `-`: what a term is named after.
+    /// Its words without times, joined by `-`: part of a term's name.
     pub(super) fn slug(&self) -> String {
         let words = self.words();
         let kind = words.split(" (").next().unwrap_or(&words);
@@ -108,7 +108,7 @@ impl Coordinate {
         }
     }
 
-    /// What an inner unit of it is in the user's.
+    /// One inner unit of it in the user's units.
     pub(super) fn scale(&self, units: &Units) -> f64 {
         match self {
             Self::MemoryOfU(_) => 1.0,
@@ -139,7 +139,7 @@ impl Coordinate {
         }
     }
 
-    /// Whether what it remembers is no longer than so long.
+    /// Whether its memory is no longer than `longest`.
     pub(super) fn fits(&self, longest: f64) -> bool {
         match self {
             Self::PastY(t) | Self::MeanY(t) | Self::Blowing(t) => *t <= longest,
@@ -147,19 +147,19 @@ impl Coordinate {
         }
     }
 
-    /// Whether it has a time that was chosen.
+    /// Whether it has a time constant that was chosen from a grid.
     pub(super) fn has_time(&self) -> bool {
         self.clone().time_mut().is_some()
     }
 
-    /// The same with its time multiplied; `None` if it has none.
+    /// The same with its time constant multiplied by `factor`; `None` if it has none.
     pub(super) fn with_time_times(&self, factor: f64) -> Option<Self> {
         let mut other = self.clone();
         *other.time_mut()? *= factor;
         Some(other)
     }
 
-    /// The fading time, where it can be fitted.
+    /// Its filter time constant, if that can be fitted.
     pub(super) fn fading(&self) -> Option<f64> {
         match self {
             Self::MemoryOfU(t) | Self::MemoryOfY(t) | Self::MemoryOfRate(t) => Some(*t),
@@ -167,7 +167,7 @@ impl Coordinate {
         }
     }
 
-    /// The same with another fading time.
+    /// The same with another filter time constant.
     pub(super) fn with_fading(&self, time: f64) -> Self {
         let mut other = self.clone();
         if self.fading().is_some()
@@ -178,7 +178,7 @@ impl Coordinate {
         other
     }
 
-    /// The channel that it reads.
+    /// Name of the channel that it reads.
     pub(super) fn channel(&self) -> Option<&str> {
         match self {
             Self::Channel(name) => Some(name),
@@ -186,7 +186,7 @@ impl Coordinate {
         }
     }
 
-    /// Its value in an effect file.
+    /// Its expression in an effect file.
     pub(super) fn expression(&self) -> String {
         match self {
             Self::Y => "y".to_owned(),
@@ -205,13 +205,13 @@ impl Coordinate {
         }
     }
 
-    /// What must be carried from sample to sample for it. The command is on above
-    /// `on`; `fitted` if the fading time is a parameter.
+    /// The state variables that it needs. The command counts as on above `on`; with `fitted`, its time
+    /// constant is a parameter.
     pub(super) fn states(&self, on: f64, time: f64, fitted: bool) -> Vec<State> {
         let rises = format!("u > {on:?} && was_on < 0.5");
         let falls = format!("u <= {on:?} && was_on > 0.5");
         let long_ago = LONG_AGO_S * time;
-        // Comes last: until then it is what was at the sample before.
+        // Must be updated last, so that the others see its value of the sample before.
         let was_on = || State {
             name: "was_on",
             start: 0.0,
@@ -273,13 +273,13 @@ impl Coordinate {
     }
 }
 
-/// Signals can be remembered for so long in records of `longest` seconds, both at 1 kHz.
+/// Longest memory in records of `longest` seconds, both at 1 kHz.
 pub(super) fn remembered(longest: f64) -> f64 {
     (0.25 * longest).min(2.0)
 }
 
-/// What terms are screened over: times are multiples of how long the flow takes, all
-/// within records of `longest` seconds.
+/// All coordinates to screen: time constants are multiples of the flow's, limited by the record length
+/// `longest` in seconds.
 pub(super) fn coordinates(
     time_constant: f64,
     longest: f64,

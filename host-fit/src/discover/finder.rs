@@ -1,4 +1,4 @@
-//! From screened curves to a term that counts, with what else it could be.
+//! The search from screened curves to a significant term and its equivalence set.
 
 use super::candidate::{Candidate, best};
 use super::coordinate::Coordinate;
@@ -16,25 +16,24 @@ use crate::terms::{
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 
-/// What a round found, and what it looked at.
+/// The result of a round: the term found, and the number of candidates.
 pub(super) struct Round {
     pub(super) found: Option<Found>,
     pub(super) looked_at: usize,
     pub(super) smallest: BTreeMap<String, Smallest>,
 }
 
-/// The search for terms and what it works on.
+/// The search for terms with its data.
 pub(super) struct Finder<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) units: &'a Units,
     pub(super) options: &'a Options,
-    /// Whether the sensor's zero is another one in each record.
+    /// Whether the sensor has a record-to-record offset.
     pub(super) moving_zero: bool,
 }
 
 impl Finder<'_> {
-    /// The best term for any of the `contexts`, the richest first, if it does better than
-    /// `base` does.
+    /// The best term for any of the `contexts` (highest model order first), if it beats `base`.
     pub(super) fn next(&self, contexts: &[Hypothesis], base: &Hypothesis, number: usize) -> Round {
         let progress = self.search.progress;
         progress(&format!("term {number}: screening curves"));
@@ -47,7 +46,8 @@ impl Finder<'_> {
             looked_at += curves.len();
             let most = if index == 0 {
                 smallest = self.smallest(&curves);
-                // To first order a term promises less than it does: half of what is asked is enough to try it.
+                // A first-order prediction underestimates the gain: half of the required gain is enough for a
+                // refit.
                 let wanted = (1.0 - RULES.promised * RULES.worthwhile) * base.judged.rmse();
                 let left = |curve: &Screened| (1.0 - curve.held_out).max(0.0).sqrt();
                 curves.retain(|curve| left(curve) * beside.judged.rmse() < wanted);
@@ -58,7 +58,7 @@ impl Finder<'_> {
             let curves = diverse(curves, most);
             pool.extend(curves.into_iter().map(|curve| (beside, curve)));
         }
-        // What is at the floor has nothing to gain.
+        // A model at the noise level cannot be improved.
         let open = self.search.judge.over_noise(base.judged.rmse()) > DIAGNOSE.at_once;
         let found = open
             .then(|| self.judged(self.followed(pool, number), base, looked_at, number))
@@ -70,7 +70,7 @@ impl Finder<'_> {
         }
     }
 
-    /// The same with more points where its curve is steepest, as long as they pay: a step lies between two of them.
+    /// The same with more points where its curve is steepest, while they pay: a step lies between two points.
     fn finer(&self, candidate: Candidate) -> Candidate {
         let judge = self.search.judge;
         let mut last = candidate;
@@ -94,20 +94,20 @@ impl Finder<'_> {
         last
     }
 
-    /// Whether `base` leaves next to nothing.
+    /// Whether `base` is close to the noise level.
     fn is_near_the_floor(&self, base: &Hypothesis) -> bool {
         self.search.judge.over_noise(base.judged.rmse()) < RULES.near_the_floor
     }
 
-    /// Whether a term beside `base` may be told: near the noise floor a sensitivity or a change with time is what
-    /// scatters or drifts from record to record.
+    /// Whether a term beside `base` may be reported. Near the noise level, a sensitivity or a drift over time
+    /// cannot be distinguished from record-to-record scatter.
     fn may_be_told(&self, term: &Term, base: &Hypothesis) -> bool {
         let varies = term.entry == Entry::Sensitivity || term.coordinate == Coordinate::Time;
         !varies || !self.is_near_the_floor(base)
     }
 
-    /// Whether a term takes too little of the excess: of the model without it, or most of what the best base leaves where
-    /// what scatters or drifts from record to record may be all of that.
+    /// Whether a term explains too little: less than the required share of the unexplained variance, or,
+    /// where record-to-record scatter may account for all of it, less than most of what the best base leaves.
     fn takes_too_little(&self, with: &Judged, without: &Judged, base: &Hypothesis) -> bool {
         let judge = self.search.judge;
         let may_scatter = self.moving_zero || self.is_near_the_floor(base);
@@ -117,7 +117,7 @@ impl Finder<'_> {
                 || may_scatter && too_little(&base.judged, RULES.most_of_it))
     }
 
-    /// How large a term would have to be at each place, in the user's units.
+    /// Detectable size of a term at each place, in the user's units.
     fn smallest(&self, curves: &[Screened]) -> BTreeMap<String, Smallest> {
         let mut all = BTreeMap::new();
         for entry in [Entry::Jet, Entry::Delay, Entry::Level, Entry::Reading] {
@@ -137,7 +137,7 @@ impl Finder<'_> {
         all
     }
 
-    /// The best of some with what else it could be, if it does better than the base.
+    /// The best candidate with its equivalence set, if it beats the base.
     fn judged(
         &self,
         mut all: Vec<Candidate>,
@@ -158,7 +158,7 @@ impl Finder<'_> {
         let near = context.near(&leader.term).into_iter();
         all.extend(self.refitted(&without, diverse(others, RULES.tried)));
         all.extend(self.refitted(&without, near.take(RULES.of_a_kind).collect()));
-        // Beside the final base another one may do better.
+        // A different candidate may fit best beside the final base.
         all.push(leader);
         let found = self.finer(best(&mut all)?);
         let last = found.judged();
@@ -177,7 +177,7 @@ impl Finder<'_> {
             place: term.entry.place(),
             coordinate: coordinate_words(term.entry, term),
         };
-        // One coordinate may enter a place in two ways: for who reads it, that is the same finding.
+        // One coordinate may enter one place in two forms: they are reported as one finding.
         let same = |other: &Term| other.is_like(term) || told(other) == told(term);
         all.sort_by(|a, b| a.size().total_cmp(&b.size()));
         let held_out: Vec<&HeldOut> = std::iter::once(&found)
@@ -190,7 +190,7 @@ impl Finder<'_> {
         let stability = shares[0] + of_the_same.map(|(i, _)| shares[i + 1]).sum::<f64>();
         let (mut alike, mut rivals): (Vec<Alike>, Vec<Candidate>) = (Vec::new(), Vec::new());
         for (index, rival) in all.iter().enumerate() {
-            // Of one kind with several times, the best is told.
+            // Of equal coordinates with different time constants, only the best is reported.
             let met = rivals.iter().any(|other| other.term.is_like(&rival.term));
             let new = !met && !same(&rival.term) && !alike.contains(&told(&rival.term));
             let as_good = is_as_good(held_out[index + 1], held_out[0]);
@@ -224,21 +224,22 @@ impl Finder<'_> {
         })
     }
 
-    /// How often noise alone would let one of all curves do as much for `base` as the one that `with` has.
+    /// Family-wise p-value of the gain of `with` over `base`, over all curves.
     fn by_chance(&self, base: &Hypothesis, with: &Judged, looked_at: usize, number: usize) -> f64 {
         let one = p_value(&base.judged.held_out, &with.held_out);
         let at_most = one * looked_at as f64;
         if at_most < RULES.level_of_search || one >= RULES.level_of_search {
             return at_most.min(1.0);
         }
-        // Most curves are much alike: that one of so many does it by chance is far less likely than all together.
+        // Most curves are strongly correlated, so that a Bonferroni correction over all of them would be far
+        // too strict: bootstrap draws give the distribution of the maximum.
         let chance = Context::new(self.search, base.judged.model(), number)
             .and_then(|context| context.chance(with.model(), &with.held_out));
         let left = (with.rmse() / base.judged.rmse()).powi(2);
         chance.map_or(1.0, |chance| chance.p_value(1.0 - left))
     }
 
-    /// A model in the user's units, and its `terms`, in the order they were added.
+    /// A model in the user's units, and its `terms` in the order they were added.
     pub(super) fn outer(&self, model: &Model, terms: &[&Term]) -> (Model, Vec<Term>) {
         let mut bare = model.clone();
         let mut written = Vec::new();
@@ -256,8 +257,8 @@ impl Finder<'_> {
         (outer, written)
     }
 
-    /// The command that would tell `model`, which has all terms, from those in which another one stands for the first
-    /// that is not alone.
+    /// The command that would distinguish `model` (with all terms) from models with an alternative for the
+    /// first ambiguous term.
     pub(super) fn separation(&self, found: &[Found], model: &Model) -> Option<Separation> {
         let judge = self.search.judge;
         let index = found.iter().position(|found| !found.rivals.is_empty())?;
@@ -274,7 +275,7 @@ impl Finder<'_> {
         Separation::of(models, names, noise, 0)
     }
 
-    /// Effects of the catalogue that change the free run along `direction`.
+    /// Effects of the catalogue whose change of the free run is similar to `direction`.
     fn resembling(&self, screen: &Screen<'_>, direction: &[f64]) -> Vec<String> {
         let table = Table::of(screen, &self.search.known, true);
         let mut names: Vec<String> = Vec::new();
@@ -292,13 +293,13 @@ impl Finder<'_> {
     }
 }
 
-/// Share of the excess of one model that is gone with another.
+/// Share of the unexplained variance of one model that another one explains.
 fn taken(judge: &Judge, without: &Judged, with: &Judged) -> f64 {
     let excess = |judged: &Judged| judge.excess(&judged.held_out);
     1.0 - excess(with) / excess(without).max(f64::MIN_POSITIVE)
 }
 
-/// Whether a model is as good as a better one, for all that the records say.
+/// Whether a worse model is not distinguishable from a better one on these records.
 fn is_as_good(worse: &HeldOut, better: &HeldOut) -> bool {
     worse.rmse() <= (1.0 + RULES.alike) * better.rmse() || p_value(worse, better) >= RULES.level
 }

@@ -1,5 +1,5 @@
-//! From promising curves to the best term: refitted with everything else, the flow's lags searched beside it, its
-//! coordinate chosen anew beside those.
+//! Refits of promising curves: the model is refitted with each, the flow's lags are searched again, and the
+//! term's coordinate is chosen again beside those lags.
 
 use super::RULES;
 use super::candidate::{Candidate, best, best_of_each_place};
@@ -13,25 +13,25 @@ use crate::terms::{self, Hypothesis};
 use rayon::prelude::*;
 use std::sync::atomic::Ordering;
 
-/// A term beside a base, followed for a few steps.
+/// A term beside a base, fitted for a few iterations.
 struct Tried {
     term: Term,
     brief: Fit,
-    /// The terms of the base: what the flow remembers.
+    /// The memory terms of the base.
     memory: Vec<terms::Term>,
 }
 
-/// What a term beside a base is known by: where it acts, the number of terms of the base, and its delay law where that
-/// is one of the catalogue.
+/// Group of a candidate for comparison: its place, the number of terms of the base, and the catalogue's delay
+/// law if the base has one.
 type Kind = (Place, usize, Option<&'static str>);
 
 fn kind(term: &Term, memory: &[terms::Term], model: &Model) -> Kind {
     (term.entry.place(), memory.len(), model.delay.effect_name())
 }
 
-/// Who is followed further, of many that come the best first: so many, the best at each place and the best beside
-/// each base. Beside a lean base a few steps say less, as it is further to go; at the wrong place a rich one bends
-/// further.
+/// Selection of candidates for further fitting: the leading ones, the best at each place, and the best beside
+/// each base. A brief fit ranks unfairly across base models, because a low-order base has further to go and a
+/// high-order one adapts to a wrong term.
 struct Heirs {
     free: usize,
     taken: Vec<Kind>,
@@ -61,7 +61,7 @@ impl Heirs {
 }
 
 impl Finder<'_> {
-    /// What comes of some curves beside their models; one at the floor alone.
+    /// The fitted terms of some curves beside their models; only one if it is at the noise level.
     pub(super) fn followed(
         &self,
         curves: Vec<(&Hypothesis, Screened)>,
@@ -76,7 +76,7 @@ impl Finder<'_> {
         for candidate in self.leading(&mut all) {
             let with = self.search.run(candidate.with, || None).best;
             let followed = Candidate::of(candidate.term, with);
-            // At the floor there is nothing to gain from others; what is as good is asked later.
+            // At the noise level nothing can be better; equivalent alternatives are sought later.
             if self.at_the_floor(&followed) {
                 return vec![followed];
             }
@@ -108,14 +108,15 @@ impl Finder<'_> {
         all
     }
 
-    /// Whether nothing is left that another term could explain.
+    /// Whether the model with this candidate is at the noise level.
     fn at_the_floor(&self, candidate: &Candidate) -> bool {
         let judge = self.search.judge;
         judge.over_noise(candidate.with.judged.rmse()) < RULES.at_the_floor
     }
 
-    /// Those beside which the flow's lags are searched again, what is at the floor and the leanest base first: a rich
-    /// base leaves less with any term, and its lags stand in for the right one.
+    /// Candidates beside which the flow's lags are searched again: first those at the noise level and those
+    /// on the lowest-order base. On a high-order base the error is small with any term, because its lags
+    /// imitate the right one.
     fn leading(&self, all: &mut [Candidate]) -> Vec<Candidate> {
         all.sort_by(|a, b| a.size().total_cmp(&b.size()));
         let mut leading: Vec<Candidate> = Vec::new();
@@ -130,9 +131,9 @@ impl Finder<'_> {
         leading
     }
 
-    /// A term with its lags, followed further: its coordinate is chosen anew beside these lags, and the lags beside
-    /// it, as long as that does better and is in reach of the best of all. Beside a lean base another coordinate may
-    /// stand in for lags that are missing.
+    /// A term with its lags, fitted further: the coordinate is chosen again beside these lags, then the lags
+    /// beside the coordinate, while the error falls and remains within reach of the best. On a low-order base
+    /// a wrong coordinate may imitate missing lags.
     fn settled(&self, from: Candidate, least: f64, number: usize) -> Option<Candidate> {
         let reach = least + RULES.in_reach.ln();
         let (mut last, mut settled) = (from, None);
@@ -152,7 +153,7 @@ impl Finder<'_> {
         settled
     }
 
-    /// The best other term at the same place, beside the model without this one.
+    /// The best other coordinate at the same place, on the model without this term.
     fn another_coordinate(&self, candidate: &Candidate, number: usize) -> Option<Candidate> {
         let without = self.without(candidate)?;
         let context = Context::new(self.search, without.judged.model(), number)?;
@@ -180,7 +181,8 @@ impl Finder<'_> {
         self.finished(tried.collect())
     }
 
-    /// A model with the term, fitted for a few steps; from 0 where the promised values are too bold for a free run.
+    /// A model with the term, fitted for a few iterations; from 0 if the predicted values make the free run
+    /// diverge.
     fn fitted(&self, model: &Model, term: &Term) -> Option<Fit> {
         if self.search.interrupt.load(Ordering::Relaxed) {
             return None;
@@ -200,10 +202,11 @@ impl Finder<'_> {
         from(term).or_else(|| from(&term.with_values(&nothing)))
     }
 
-    /// A curve beside a model, followed for a few steps.
+    /// A curve beside a model, fitted for a few iterations.
     fn tried(&self, beside: &Hypothesis, curve: Screened) -> Option<Tried> {
         let model = beside.judged.model();
-        // On/off commands do not show how the flow takes jets of part strength, which a term at the jet makes of them.
+        // On/off commands do not identify the response to jets of part strength, which a term at the jet
+        // needs.
         let term = curve.term.with_free_time(RULES.time_of_a_curve);
         let unknown = term.entry == Entry::Jet && self.search.judge.on_off;
         let mut responses = vec![model.grading];
@@ -225,8 +228,8 @@ impl Finder<'_> {
         })
     }
 
-    /// The best of some brief fits, followed to the end: the base bent to stand in for what
-    /// was missing, and its lags move back.
+    /// The best of some brief fits, refitted in full. The lags of the base, which had imitated the missing
+    /// term, move back.
     fn finished(&self, tried: Vec<Tried>) -> Vec<Candidate> {
         let judge = self.search.judge;
         let rated = tried.into_par_iter().filter_map(|tried| {

@@ -1,19 +1,19 @@
-//! Forms that engineers know, for a curve that was found.
+//! Standard functions to replace a fitted curve.
 
 use crate::linalg::{dot, solve_symmetric};
 
-/// What a parameter of a form is a multiple of.
+/// Dimension of a parameter of a form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// g over so many powers of x.
+    /// Dimension of g over x to this power.
     Amplitude(i32),
-    /// √x: g over its root.
+    /// Dimension of g over √x.
     OverRoot,
-    /// x: where something happens, or over how much of x.
+    /// A position or a width in x.
     Place,
-    /// x above 0.
+    /// A positive position or width in x.
     Width,
-    /// Turns per x.
+    /// Cycles per unit of x.
     Frequency,
 }
 
@@ -25,7 +25,7 @@ pub(super) struct Card {
 }
 
 impl Card {
-    /// Where it is searched, given a first value and the extent of x.
+    /// Its search interval, given an initial value and the extent of x.
     pub(super) fn range(&self, value: f64, x: [f64; 2]) -> [f64; 2] {
         let extent = (x[1] - x[0]).max(f64::MIN_POSITIVE);
         match self.kind {
@@ -50,7 +50,7 @@ impl Card {
     }
 }
 
-/// A form: linear in its amplitudes, which come first, and with up to two others.
+/// A standard function: linear in its amplitudes, which come first, with up to two nonlinear parameters.
 #[derive(Debug)]
 pub(super) struct Form {
     /// As an expression of `{x}`.
@@ -58,9 +58,9 @@ pub(super) struct Form {
     /// Its parameters, amplitudes first.
     pub(super) parameters: &'static [Card],
     amplitudes: usize,
-    /// g at x.
+    /// g at x for these parameters.
     pub(super) value: fn(f64, &[f64]) -> f64,
-    /// Whether it needs x from 0 on.
+    /// Whether it is defined for x ≥ 0 only.
     positive: bool,
 }
 
@@ -81,7 +81,7 @@ const fn width(name: &'static str) -> Card {
     Card { name, kind }
 }
 
-/// The forms, shorter ones first.
+/// The forms, from few to many parameters.
 pub(super) static FORMS: [Form; 14] = [
     Form {
         expression: "amplitude * {x}",
@@ -205,10 +205,10 @@ pub(super) static FORMS: [Form; 14] = [
     },
 ];
 
-/// Points of a form's inner parameters from which its fit to a curve is taken.
+/// Grid points per nonlinear parameter of a form.
 const STEPS: usize = 24;
 
-/// Forms are told apart by what they say.
+/// Forms are equal if their expressions are.
 impl PartialEq for Form {
     fn eq(&self, other: &Self) -> bool {
         self.expression == other.expression
@@ -216,7 +216,7 @@ impl PartialEq for Form {
 }
 
 impl Form {
-    /// Whether the form has a constant as one of its amplitudes.
+    /// Whether one amplitude of the form is a constant.
     pub(super) fn has_level(&self) -> bool {
         self.parameters.iter().any(|card| card.name == "offset")
     }
@@ -234,9 +234,8 @@ impl Form {
             .collect()
     }
 
-    /// Its parameters nearest to points of a curve, and the mean square that is left;
-    /// with `free_level`, a constant between both does not count. `None` if the form
-    /// makes no sense there.
+    /// Least-squares parameters for the points of a curve, and the remaining mean square; with `free_level`,
+    /// up to a constant. `None` if the form is not defined there.
     pub(super) fn nearest(
         &self,
         x: &[f64],
@@ -316,7 +315,8 @@ impl Form {
     }
 }
 
-/// The point that lies so far along some: they are where a coordinate spends its time, which may span decades.
+/// The value at this fraction along sorted points; they follow the distribution of the coordinate, which may
+/// span decades.
 fn between(points: &[f64], along: f64) -> f64 {
     let index = along * (points.len() - 1) as f64;
     let before = (index as usize).min(points.len() - 2);
@@ -328,7 +328,7 @@ fn between(points: &[f64], along: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Points on a form are recognised as that form, to a few per cent.
+    /// The form behind a set of points is recovered to a few per cent.
     #[test]
     fn a_curve_that_is_a_form_is_found_again() {
         let x: Vec<f64> = (0..8).map(|i| 0.1 + 0.2 * f64::from(i)).collect();
@@ -349,7 +349,7 @@ mod tests {
         }
     }
 
-    /// Units of x and g may be changed before or after.
+    /// Scaling x and g before or after the fit gives the same parameters.
     #[test]
     fn parameters_follow_their_units() {
         for form in &FORMS {

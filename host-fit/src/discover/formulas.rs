@@ -1,4 +1,4 @@
-//! From a term's curve to its formula.
+//! Replacement of a term's curve by a formula.
 
 use super::RULES;
 use super::finder::Finder;
@@ -10,8 +10,7 @@ use crate::terms::{HeldOut, Hypothesis, Judged, p_value};
 use rayon::prelude::*;
 
 impl Finder<'_> {
-    /// The terms with formulas where one does as well as the curve, and the model with
-    /// them.
+    /// The terms, each as a formula if one fits equally well, and the model with them.
     pub(super) fn formulas(
         &self,
         found: Vec<Found>,
@@ -27,8 +26,8 @@ impl Finder<'_> {
         (told, current)
     }
 
-    /// A term as a formula at once where that is better than its curve: what straight lines leave of something smooth
-    /// is no other term.
+    /// A term as a formula if that is better than its curve: the residual of straight lines on a smooth
+    /// function must not be taken for a second term.
     pub(super) fn better_as_formula(&self, found: &mut Found, current: &mut Hypothesis) {
         if let Some((term, judged)) = self.formula_of(found, current)
             && judged.size() < current.judged.size()
@@ -37,7 +36,7 @@ impl Finder<'_> {
         }
     }
 
-    /// The formula of a term that is told as a curve yet.
+    /// The formula of a term that is still a curve.
     fn formula_of(&self, found: &Found, current: &Hypothesis) -> Option<(Term, Judged)> {
         let is_curve = matches!(found.term.shape, Shape::Points { .. });
         let formula = is_curve.then(|| self.formula(&found.curve, &current.judged));
@@ -47,7 +46,8 @@ impl Finder<'_> {
     fn tell(&self, found: &mut Found, term: Term, judged: &Judged, current: &mut Hypothesis) {
         let excess = |held_out: &HeldOut| self.search.judge.excess(held_out);
         let without = excess(&found.without.held_out).max(f64::MIN_POSITIVE);
-        // Other terms may have come since: what the formula loses, it loses here.
+        // Other terms may have been added since the curve was fitted: the loss by the formula is measured on
+        // the present model.
         let lost = excess(&judged.held_out) - excess(&current.judged.held_out);
         found.formula_taken = found.taken - lost / without;
         found.term = term;
@@ -56,7 +56,7 @@ impl Finder<'_> {
         current.terms = terms;
     }
 
-    /// The shortest formula that does as well as a curve that is part of a model.
+    /// The shortest formula that fits equally well as the curve in a model.
     pub(super) fn formula(&self, curve: &Term, with_curve: &Judged) -> Option<(Term, Judged)> {
         let judge = self.search.judge;
         let model = with_curve.model();

@@ -1,12 +1,11 @@
-//! The term that is missing where no catalogue has it: where it acts, on what it
-//! depends, its curve, and the shortest formula that does as well.
+//! Discovery of a term that is not in the catalogue: its place, its coordinate, its curve, and the shortest
+//! formula that fits equally well.
 //!
-//! Every way to enter the model (jet, delay, flow, sensor) by every coordinate that can
-//! be known there is a curve through points. Screening says to first order what each
-//! takes of the free-run error beside all that the base can do (diagnosis 7); the best
-//! are refitted with everything else, the flow's lags are searched again beside them,
-//! and what is left on held-out records decides. A term has to beat the best base
-//! without it, with all curves that were looked at as alternatives.
+//! Candidates are all entries (jet, delay, flow, sensor) times all coordinates defined there, each with a
+//! piecewise-linear curve. A first-order screening predicts the share of the free-run error that each
+//! explains beyond the base (diagnosis 7). The best are refitted with the whole model, the flow's lags are
+//! searched again, and the validation error decides. A term must beat the best base without it, tested over
+//! all screened curves.
 
 mod candidate;
 mod coordinate;
@@ -38,12 +37,12 @@ use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
 use term::Term;
 
-/// What to look for.
+/// Options of a discovery.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Most terms.
+    /// Largest number of terms.
     pub terms: usize,
-    /// Effects of the catalogue that are to be forgotten: no term is said to resemble them.
+    /// Effects of the catalogue to ignore: no term is reported to resemble them.
     pub without: Vec<String>,
 }
 
@@ -56,19 +55,19 @@ impl Default for Options {
     }
 }
 
-/// What a first look promises, to first order.
+/// First-order prediction for the most promising term.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Glance {
     /// Where a term would act.
     pub place: Place,
-    /// On what it would depend.
+    /// The coordinate it would depend on.
     pub coordinate: String,
-    /// What it would take of the held-out error energy, %.
+    /// Predicted reduction of the validation error energy, %.
     pub error_taken_percent: f64,
 }
 
-/// The curve that promises most beside `model` as it is, without refitting any: what
-/// [`discover`] would try first. `None` if nothing promises to be worth it.
+/// The most promising curve beside `model` without any refit: the first candidate of [`discover`]. `None` if
+/// no predicted gain is above the practical margin.
 #[must_use]
 pub fn glance(model: &Model, records: &[Record], interrupt: &AtomicBool) -> Option<Glance> {
     let bench = Bench::of(model, records)?;
@@ -89,8 +88,8 @@ pub fn glance(model: &Model, records: &[Record], interrupt: &AtomicBool) -> Opti
     })
 }
 
-/// The best base with half as many terms as the best one at most, but some: a rich one has
-/// bent to stand in for what is missing, and a bare one is far from the flow.
+/// The best base with at least one and at most half as many terms as the best: a high-order base has adapted
+/// to the missing term, and the lowest-order one is too far from the flow.
 fn halfway(found: &Searched) -> Option<Hypothesis> {
     let most = found.best.terms.len() / 2;
     let all = found.all.iter();
@@ -100,8 +99,8 @@ fn halfway(found: &Searched) -> Option<Hypothesis> {
         .cloned()
 }
 
-/// Looks for the terms that the model `handed_in` lacks on `records`; where none is found, that model or a better base
-/// comes back. `progress` is told what is being tried.
+/// Searches for terms missing from the model `handed_in` on `records`. Without a finding, that model or a
+/// better base is returned. `progress` receives messages.
 ///
 /// # Errors
 /// [`DiagnoseError`].
@@ -145,7 +144,7 @@ pub fn discover(
     let given = search.second_root(&bench.given, &root);
     let refitted = || Some(Hypothesis::new(judge.refitted(&bench.given).ok()?));
     let given = given.or_else(refitted);
-    // The catalogue's delay laws are no news: a base that lacks its own bends in its place.
+    // The catalogue's delay laws are no discovery: a base without the right law imitates it.
     let after_another_law = |base: &Hypothesis| search.after_another_law(base, &options.without);
     let leanest: Vec<Hypothesis> = [after_another_law(&root), Some(root.clone())]
         .into_iter()
@@ -168,7 +167,7 @@ pub fn discover(
     let mut found = Vec::new();
     let mut smallest = None;
     let (mut looked_at, mut names) = (0, Vec::new());
-    // A term is how the response depends on something.
+    // A term describes how the response depends on a coordinate, which few records hardly show.
     let most = match says_little(records) {
         Some(_) => 0,
         None => options.terms,
@@ -195,7 +194,7 @@ pub fn discover(
             break;
         }
     }
-    // Beside the base that the first term needs: the best one without may have bent to stand in for it.
+    // Compared on the base that the first term needs: the best base without it may imitate the term.
     let lacking = found.first().map_or(&base.judged, |found| &found.without);
     let trace = missing(lacking.rmse())
         .then(|| {

@@ -1,4 +1,4 @@
-//! What a discovery hands over.
+//! The result of a discovery.
 
 use super::candidate::Candidate;
 use super::place::{Entry, Place};
@@ -17,131 +17,131 @@ use std::collections::BTreeMap;
 /// A point of a curve with its 95 % band, in the user's units.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CurvePoint {
-    /// The coordinate.
+    /// Value of the coordinate.
     pub x: f64,
     /// Lower end of the band.
     pub low: f64,
-    /// g there.
+    /// Value of g.
     pub value: f64,
     /// Upper end.
     pub high: f64,
 }
 
-/// A term that the records cannot tell from another.
+/// A term that is not distinguishable from another.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Alike {
     /// Where it acts.
     pub place: Place,
-    /// On what it depends.
+    /// The coordinate it depends on.
     pub coordinate: String,
 }
 
-/// How large a term would have to be to be seen at a place: rms of its values, from the
-/// easiest coordinate to the hardest.
+/// Detectable size of a term at a place: rms of its values, from the easiest coordinate to the hardest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Smallest {
-    /// Depending on the coordinate that shows best.
+    /// For the easiest coordinate.
     pub from: f64,
-    /// Depending on the one that shows worst of the better half.
+    /// For the hardest coordinate of the easier half.
     pub to: f64,
     /// The unit.
     pub unit: &'static str,
 }
 
-/// A term that was found. Serialises to an entry of `terms` of `discover --json`.
+/// A discovered term. Serialises to an entry of `terms` of `discover --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct FoundTerm {
     /// The name of its effect.
     pub effect: String,
     /// Where it acts.
     pub place: Place,
-    /// What it changes there, in words.
+    /// The quantity that it changes, in words.
     pub changes: &'static str,
-    /// On what it depends.
+    /// The coordinate it depends on.
     pub coordinate: String,
     /// Unit of the coordinate.
     pub coordinate_unit: &'static str,
-    /// What it takes of the excess of the held-out error, as a curve, %.
+    /// Share of the unexplained validation variance that the curve explains, %.
     pub excess_taken_percent: f64,
-    /// The same as it is handed over.
+    /// The same for the reported formula or curve.
     pub formula_taken_percent: f64,
-    /// p-value of its gain, times the number of curves that were looked at.
+    /// Family-wise p-value of its gain, over all curves screened.
     pub p_value: f64,
     /// The curve with its band.
     pub curve: Vec<CurvePoint>,
     /// Unit of the curve.
     pub unit: &'static str,
-    /// Effects of the catalogue that change the free run alike.
+    /// Effects of the catalogue with a similar change of the free run.
     pub resembles: Vec<String>,
-    /// The formula of the effect: an expression over its coordinate, or a table where no
-    /// formula does as well.
+    /// The formula of the effect: an expression in its coordinate, or a table if no formula fits equally
+    /// well.
     pub formula: String,
     /// Whether it is a formula rather than a table.
     pub is_formula: bool,
     /// Parameters of the formula.
     pub parameters: BTreeMap<String, ParameterEstimate>,
-    /// What else these records cannot tell from it.
+    /// Terms that are not distinguishable from it on these records.
     pub alike: Vec<Alike>,
-    /// In how many resamples of the held-out records this place and this coordinate come out best, %.
+    /// Share of bootstrap resamples of the validation records in which this place and coordinate fit best, %.
     pub stability_percent: f64,
     /// Its effect file.
     #[serde(skip)]
     pub file: String,
 }
 
-/// The outcome.
+/// The result of a discovery.
 #[derive(Clone, Debug)]
 pub struct Discovery {
     /// The terms in the order found.
     pub terms: Vec<FoundTerm>,
-    /// Held-out errors from the model as given to the last one.
+    /// Validation errors from the given model to the final one.
     pub ladder: Vec<Rung>,
-    /// For each place, how large a term would have to be to be seen.
+    /// For each place, the detectable size of a term.
     pub smallest_seen: BTreeMap<String, Smallest>,
-    /// How the errors were held out.
+    /// How the validation error was obtained.
     pub held_out_by: HeldOutBy,
-    /// Where the noise floor comes from.
+    /// Where the noise level comes from.
     pub noise_source: NoiseSource,
-    /// The noise floor on what was judged, y rms.
+    /// The noise level on the validation samples, y rms.
     pub noise_estimate: f64,
-    /// Curves that were looked at.
+    /// Number of curves screened.
     pub looked_at: usize,
-    /// The signal that would explain the misfit of the base without the first term, or of the best base where none was
-    /// found, at each place; none where nothing is left.
+    /// At each place, the signal that would explain the error of the base without the first term, or of the
+    /// best base if none was found; none if no error remains.
     pub trace: Option<Trace>,
-    /// The command that would tell the first term that is not alone from what is like it.
+    /// The command that would distinguish the first ambiguous term from its alternatives.
     pub separation: Option<Separation>,
-    /// A zero of the sensor that is not the same in all records: a term has to do more than imitate it.
+    /// The record-to-record offset of the sensor, if there is one: a term must explain more than this offset
+    /// does.
     pub moving_zero: Option<MovingZero>,
     /// The model with the terms.
     pub model: Model,
 }
 
-/// A term in the model that it was found for.
+/// A term that was found, with its model.
 #[derive(Clone)]
 pub(super) struct Found {
-    /// As it is handed over: a formula, or the curve.
+    /// The reported form: a formula, or the curve.
     pub(super) term: Term,
     /// Its curve, as fitted.
     pub(super) curve: Term,
     /// Standard errors of the curve's values.
     pub(super) errors: Vec<f64>,
-    /// The model with it.
+    /// The model with the term.
     pub(super) with: Hypothesis,
     /// The same base without it, refitted.
     pub(super) without: Judged,
     pub(super) p: f64,
-    /// Share of the excess that the curve takes …
+    /// Share of the unexplained variance that the curve explains.
     pub(super) taken: f64,
-    /// … and that the formula does.
+    /// Share of the unexplained variance that the formula explains.
     pub(super) formula_taken: f64,
     pub(super) resembles: Vec<String>,
     pub(super) alike: Vec<Alike>,
-    /// Those, in models …
+    /// Terms that are not distinguishable from it, each in its model.
     pub(super) rivals: Vec<Candidate>,
-    /// … that have these terms, found before, as well.
+    /// Earlier terms that the models of `rivals` contain too.
     pub(super) beside: Vec<Term>,
-    /// Share of the resamples in which it, or one like it, is the best.
+    /// Share of bootstrap resamples in which it or an equivalent term is the best.
     pub(super) stability: f64,
 }
 
@@ -168,7 +168,7 @@ impl Found {
     }
 }
 
-/// A found term as it is told; `written` is it as handed over, in the user's units.
+/// A found term for the report; `written` is the reported form in the user's units.
 pub(super) fn told(found: &Found, written: &Term, fitted: &Fit, units: &Units) -> FoundTerm {
     let entry = written.entry;
     let curve = found.curve(units);
@@ -215,7 +215,7 @@ pub(super) fn told(found: &Found, written: &Term, fitted: &Fit, units: &Units) -
     }
 }
 
-/// A rate and a sensitivity act in proportion to y as well.
+/// A rate and a sensitivity also act in proportion to y.
 pub(super) fn coordinate_words(entry: Entry, term: &Term) -> String {
     let own = term.coordinate.words();
     match entry {

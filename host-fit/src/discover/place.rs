@@ -1,25 +1,25 @@
-//! Where a term acts, and how it enters there.
+//! Places of a term, and its entry into the model there.
 
 use crate::terms::Units;
 use model_core::effect::Unit;
 use serde::Serialize;
 
-/// Where a term acts.
+/// The place where a term acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Place {
     /// The jet's strength.
     Jet,
-    /// The way from the jet to the flow.
+    /// The path from the jet to the flow.
     Delay,
-    /// What drives the flow.
+    /// The flow's own dynamics.
     Flow,
-    /// What the sensor shows.
+    /// The sensor's reading.
     Sensor,
 }
 
 impl Place {
-    /// As documents name it.
+    /// Its name in documents.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -31,25 +31,25 @@ impl Place {
     }
 }
 
-/// How a term enters at its place.
+/// The entry of a term at its place; g is the term's value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Entry {
-    /// The jet's strength times 1 + g.
+    /// The jet's strength, multiplied by 1 + g.
     Jet,
     /// The delay plus g, s.
     Delay,
-    /// The level that the flow tends to plus g, y.
+    /// The steady level of the flow plus g, y.
     Level,
-    /// The rate at which the flow goes back without jets, times 1 + g.
+    /// The relaxation rate of the flow without jets, multiplied by 1 + g.
     Rate,
     /// The reading plus g, y.
     Reading,
-    /// The reading times 1 + g.
+    /// The reading, multiplied by 1 + g.
     Sensitivity,
 }
 
 impl Entry {
-    /// All of them.
+    /// All entries.
     pub const ALL: [Self; 6] = [
         Self::Jet,
         Self::Delay,
@@ -59,7 +59,7 @@ impl Entry {
         Self::Sensitivity,
     ];
 
-    /// Where that is.
+    /// Its place.
     #[must_use]
     pub fn place(self) -> Place {
         match self {
@@ -70,7 +70,7 @@ impl Entry {
         }
     }
 
-    /// What g is.
+    /// The changed quantity in words.
     #[must_use]
     pub fn words(self) -> &'static str {
         match self {
@@ -93,17 +93,17 @@ impl Entry {
         }
     }
 
-    /// What an inner unit of g is in the user's.
+    /// One inner unit of g in the user's units.
     pub(super) fn scale(self, units: &Units) -> f64 {
         self.unit().scale(units.y, units.time, 1.0)
     }
 
-    /// Whether the base takes a constant g as well.
+    /// Whether the base already contains a constant g.
     pub(super) fn has_free_level(self) -> bool {
         !matches!(self, Self::Level | Self::Reading)
     }
 
-    /// How much a sample shows of g: a jet has to blow for it, and what multiplies y shows by the square of y.
+    /// Weight of a sample for estimating g: a jet must be blowing, and a factor on y counts with y².
     pub(super) fn shown_by(self, blowing: bool, y: f64) -> f64 {
         match self {
             Self::Jet => f64::from(u8::from(blowing)),
@@ -121,9 +121,8 @@ impl Entry {
         }
     }
 
-    /// The expression of an effect with this `g`; a delay of the model was made
-    /// shorter by `shift` seconds for it, and becomes `longest` at most. A full jet has
-    /// the strength `full`.
+    /// The expression of an effect with this `g`. The model's delay was shortened by `shift` seconds to make
+    /// room, and may become `longest` at most. A full jet has the strength `full`.
     pub(super) fn expression(self, g: &str, shift: f64, longest: f64, full: f64) -> String {
         match self {
             Self::Jet => format!("jet * (1.0 + ({g}))"),

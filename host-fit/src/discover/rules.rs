@@ -3,77 +3,81 @@
 use crate::rules;
 
 rules! {
-    /// When a term that no catalogue has is reported, and how its curve is drawn.
+    /// When a term outside the catalogue is reported, and how its curve is drawn.
     pub struct Rules in "discover";
 
-    /// Points of a curve, at most; they lie where the coordinate spends equal times.
-    points: usize = 8, "", "judgement: as many derivatives as one run carries";
-    /// A coordinate with fewer distinct points than this shows no curve.
+    /// Most points of a curve; they lie where the coordinate spends equal times.
+    points: usize = 8, "", "judgement: number of derivatives per run";
+    /// A coordinate with fewer distinct points than this is not screened.
     fewest_points: usize = 3, "", "judgement: two points are a line at best";
-    /// Points that a curve gets where it is steepest, if they pay …
+    /// Points inserted in one round where a curve is steepest, if they pay.
     inserted: usize = 3, "", "judgement: a step is found four times as closely";
-    /// … so often …
+    /// Rounds of inserting points.
     refinements: usize = 2, "rounds", "judgement";
-    /// … and how many it has then, at most.
-    most_points: usize = 11, "", "judgement: derivatives of one run, and half as many again";
+    /// Most points of a curve after insertion.
+    most_points: usize = 11, "", "judgement: 1.5 times the derivatives of one run";
     /// Share of the samples beyond the first and the last point.
     beyond: f64 = 0.01, "share of the samples", "judgement";
-    /// Points are at least this far apart.
+    /// Least distance of two points.
     apart: f64 = 0.05, "of the way from the first point", "judgement: rests and times since edges span three decades";
-    /// A curve is refitted if the screening promises this share of what a term must lower the error by.
-    promised: f64 = 0.5, "share", "judgement: first order promises less than a refit does";
-    /// Curves that are refitted for a few steps per round …
+    /// A curve is refitted if its predicted gain is this share of the practical margin.
+    promised: f64 = 0.5, "share", "judgement: the first-order gain is smaller than that of a refit";
+    /// Curves that are fitted for a few iterations per round.
     tried: usize = 10, "", "judgement";
-    /// … so many beside each base that is leaner than the best …
+    /// The same beside each base of lower order than the best.
     tried_leaner: usize = 4, "", "judgement";
-    /// … no more of them of one place and one kind of coordinate than this …
-    of_a_kind: usize = 2, "", "judgement: memories of neighbouring lengths promise alike";
-    /// … and how many of them are followed to the end, beside the best one of each place and each base.
+    /// At most so many of them have the same place and kind of coordinate.
+    of_a_kind: usize = 2, "", "judgement: memories of neighbouring lengths have similar gains";
+    /// Curves refitted in full, beside the best of each place and each base.
     finished: usize = 4, "", "judgement";
-    /// Of those, for how many the flow's own lags are searched again, beside the best one of each place and each base.
+    /// Candidates for which the flow's lags are searched again, beside the best of each place and each base.
     settled: usize = 2, "", "judgement: each takes as long as `identify`";
-    /// How often the coordinate of the best one at a place is chosen anew beside its lags.
-    rounds: usize = 2, "", "judgement: the second found nothing new on any rig yet";
-    /// … where it is no further than this behind the best of all with it.
-    in_reach: f64 = 1.5, "times the best error", "judgement: lags took a hot jet from 1.5 times the floor to 1.05";
-    /// The best of a place is compared as a formula too where it is no further than this behind the best of all.
-    contends: f64 = 1.5, "times the best error", "straight lines through a square of y left 1.066, the wrong place 1.025";
-    /// A term that leaves no more than this leaves nothing for another one.
-    at_the_floor: f64 = 1.02, "times the noise level", "a sensor that stood in for a hot jet left 1.09, the jet 1.05 as a curve";
+    /// Rounds of choosing the coordinate of the best candidate at a place again beside its lags.
+    rounds: usize = 2, "", "judgement: the second round has found nothing new so far";
+    /// A candidate is followed in those rounds if its error is within this factor of the best.
+    in_reach: f64 = 1.5, "times the best error", "judgement: with its lags a hot jet improved from 1.5 to 1.05 × the noise level";
+    /// The best candidate of a place is compared as a formula too if its error is within this factor of the
+    /// best.
+    contends: f64 = 1.5, "times the best error", "for a quadratic term the curve had 1.066 × the noise level, a wrong place 1.025";
+    /// A model within this factor of the noise level gets no further term.
+    at_the_floor: f64 = 1.02, "times the noise level", "a wrong sensor term had 1.09 × the noise level, the true jet term 1.05 as a curve";
     /// Curves at one place whose errors differ by less than this are the same curve.
-    twins: f64 = 0.001, "share of the rms error", "two names of one signal differ by rounding";
-    /// A term must lower the held-out error of the best base without it by this fraction.
+    twins: f64 = 0.001, "share of the rms error", "equal coordinates differ by rounding only";
+    /// A term must lower the validation error of the best base without it by this fraction.
     worthwhile: f64 = 0.015, "share of the rms error", "as for effects of the catalogue";
-    /// … and, where the noise floor is known, take this share of its excess at least.
-    least_share: f64 = 0.25, "share of the model error above the noise", "as for the stand-ins of `diagnose`; a rig that drifted as a whole had 19 % taken by a delay";
-    /// A base that leaves less than this is near the floor: a term has to take `most_of_it` there, and neither the sensor's sensitivity nor
-    /// time in the record is told, as levels that scatter and zeros that drift look like them.
-    near_the_floor: f64 = 1.10, "times the noise level", "`floor_margin` of `diagnose`: nulls of nine families stay below it";
-    /// Share of the best base's excess that a term has to take there, and wherever the sensor's zero moves from record to record.
-    most_of_it: f64 = 0.75, "share of the model error above the noise", "curves through zeros that drift or wander took 50 to 70 %, terms that were there 80 % and more in 16 of 17";
-    /// Level of the whole search, with all curves that were looked at.
-    level_of_search: f64 = 0.02, "p-value", "as for effects of the catalogue: three false terms in a hundred are too many";
-    /// Level of comparisons of two curves.
+    /// If the noise level is known, a term must explain this share of the unexplained variance.
+    least_share: f64 = 0.25, "share of the model error above the noise", "as for the surrogates of `diagnose`; on a drifting rig a wrong delay term explained 19 %";
+    /// A base below this factor is near the noise level: a term must then explain `most_of_it`, and
+    /// sensitivity and time in the record are not reported, because record-to-record scatter and drift look
+    /// like them.
+    near_the_floor: f64 = 1.10, "times the noise level", "`floor_margin` of `diagnose`: null cases of nine families stay below it";
+    /// Share of the unexplained variance that a term must explain near the noise level, and wherever the
+    /// sensor has a record-to-record offset.
+    most_of_it: f64 = 0.75, "share of the model error above the noise", "curves that imitate an offset drift explained 50 to 70 %, true terms at least 80 % in 16 of 17 cases";
+    /// Family-wise level over all curves screened.
+    level_of_search: f64 = 0.02, "p-value", "as for effects of the catalogue: at most 3 % false terms";
+    /// Level of the comparison of two curves.
     level: f64 = 0.05, "p-value", "convention";
     /// A term is stable if it wins in this share of the bootstrap resamples.
     stable: f64 = 0.9, "share of the resamples", "judgement";
-    /// Held-out errors that differ by less than this are the same for any purpose.
-    alike: f64 = 0.01, "share of the rms error", "judgement: twice what is asked of effects; a curve has more freedom";
-    /// A formula may leave this much more than the curve it stands for.
+    /// Validation errors that differ by less than this are equal in practice.
+    alike: f64 = 0.01, "share of the rms error", "judgement: twice the margin of effects, because a curve has more freedom";
+    /// A formula may have this much more error than the curve it replaces.
     formula: f64 = 0.01, "share of the rms error", "judgement";
-    /// An effect of the catalogue resembles a curve if what both change in the free run correlates so well.
+    /// An effect of the catalogue resembles a curve if their changes of the free run correlate at least so
+    /// much.
     resembles: f64 = 0.9, "", "judgement";
-    /// A trace has so many knots a record, at most.
+    /// Most knots of a trace per record.
     knots: usize = 100, "", "judgement: for the time it takes";
-    /// How much its prior wants a trace small, beside smooth.
-    smallness: f64 = 0.01, "", "judgement: bends of ten knots count as much as size";
-    /// A place is said to be the one from this probability on.
+    /// Weight of smallness against smoothness in the prior of a trace.
+    smallness: f64 = 0.01, "", "judgement: the bend over ten knots has the same weight as the size";
+    /// A place is reported from this posterior probability on.
     likely: f64 = 0.9, "probability", "convention";
-    /// A delay may become this much longer.
+    /// Most by which a delay may be lengthened.
     longest_delay_s: f64 = 0.1, "s at 1 kHz", "judgement: three times the delays of the rigs at hand";
-    /// A fading time is fitted with a curve up to so many times shorter or longer than it was looked for …
-    time_of_a_curve: f64 = 1.7, "", "half of the step to the next; a memory of y that shrank freely stood in for y";
-    /// … and with a formula from there on.
+    /// A filter time constant is fitted with a curve within this factor of its grid value.
+    time_of_a_curve: f64 = 1.7, "", "half a grid step; with a larger range a memory of y shrinks to y itself";
+    /// A filter time constant is fitted with a formula within this factor.
     time_of_a_formula: f64 = 10.0, "", "judgement";
     /// Largest change that is searched, relative or in units of y.
     largest: f64 = 5.0, "", "judgement";

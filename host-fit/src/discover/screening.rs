@@ -1,5 +1,5 @@
-//! Which curves are worth a refit: every way to enter a place by every coordinate,
-//! to first order, beside everything that the base can do.
+//! First-order screening of curves: every entry times every coordinate, beside everything that the base can
+//! imitate.
 
 use super::RULES;
 use super::coordinate::{Coordinate, coordinates, remembered};
@@ -14,34 +14,33 @@ use rayon::prelude::*;
 
 /// A curve that was screened.
 pub(super) struct Screened {
-    /// With the values that the screening promises.
+    /// The term with the predicted values.
     pub(super) term: Term,
-    /// Half the logarithm of what it leaves of the held-out mean square error, and the
-    /// price of its points: below 0 is worth it.
+    /// ½ ln of the predicted validation mean square over the present one, plus the penalty of its points;
+    /// negative if it pays.
     pub(super) score: f64,
-    /// Share of the held-out error energy that it takes.
+    /// Explained share of the validation error energy.
     pub(super) held_out: f64,
-    /// Size of a change, rms of its values, that would have been worth it.
+    /// Rms value that the term would need to be worth reporting.
     pub(super) smallest: f64,
 }
 
-/// The command is on above this, inner units.
+/// The command counts as on above this, inner units.
 pub(super) const ON: f64 = 0.5;
-/// Times of coordinates are multiples of the flow's, which is taken within these bounds, s at 1 kHz.
+/// Bounds of the flow's time constant, of which those of coordinates are multiples, s at 1 kHz.
 const FASTEST_S: f64 = 0.005;
 const SLOWEST_S: f64 = 0.2;
-/// A time that was found is looked for again at so many times it.
+/// Factors on a found time constant for a finer grid around it.
 const NEARBY: [f64; 6] = [0.5, 0.63, 0.79, 1.26, 1.59, 2.0];
-/// Times of the first look lie two to three apart; a closer one looks at these times them too.
+/// Factors that refine the first grid of time constants, whose steps are two to three.
 const BETWEEN: [f64; 2] = [0.63, 1.59];
-/// Samples that show where a coordinate spends its time.
+/// Samples used for the distribution of a coordinate.
 const SHOWN: usize = 20_000;
 
-/// The values of a coordinate over the records, as a model sees them; `None` if it
-/// cannot be had there.
+/// The values of a coordinate over the records in a run of the model; `None` if it is not defined there.
 fn values_of(coordinate: &Coordinate, model: &Model, records: &[&Record]) -> Option<Vec<Vec<f64>>> {
     let mut probe = model.clone();
-    // It comes after the probe and would be added to it.
+    // The offset acts after the probe and would be added to it.
     probe.effects.retain(|added| added.name != ZERO_OFFSET.name);
     let mut text = format!(
         "name = \"probe-of-a-coordinate\"\nplace = \"sensor\"\nsummary = \"a coordinate\"\nexpression = \"{}\"\n",
@@ -73,7 +72,7 @@ pub(super) fn reference(coordinate: &Coordinate, records: &[&Record]) -> Option<
     Some(values().sum::<f64>() / values().count().max(1) as f64)
 }
 
-/// Between which of its values a coordinate has equal weight, and which of these is nearest to the middle.
+/// Quantiles of a coordinate with equal weights between them, and the index of the one nearest to the median.
 fn points(mut weighted: Vec<(f64, f64)>) -> Option<(Vec<f64>, usize)> {
     weighted.retain(|(x, weight)| x.is_finite() && *weight > 0.0);
     weighted.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -90,7 +89,8 @@ fn points(mut weighted: Vec<(f64, f64)>) -> Option<(Vec<f64>, usize)> {
     if high - low <= 1e-6 * low.abs().max(high.abs()).max(1e-6) {
         return None;
     }
-    // Rests of a fraction of a second and one of ten: what is apart is a matter of place.
+    // Rests of a fraction of a second and of ten seconds occur together: the least distance of points is
+    // relative to the position.
     let least = (0.01 * (at(0.5) - low)).max(1e-6 * (high - low));
     let count = RULES.points;
     let are_apart = |a: f64, b: f64| b - a > (RULES.apart * (a - low)).max(least);
@@ -102,7 +102,7 @@ fn points(mut weighted: Vec<(f64, f64)>) -> Option<(Vec<f64>, usize)> {
             x.push(place);
         }
     }
-    // Rests that are the same all through a record take several of them, and others lie in between.
+    // A rest that is constant throughout a record spans several quantiles; values between get points too.
     let from = |x: f64| weighted.partition_point(|(own, _)| *own <= x);
     let to = |x: f64| weighted.partition_point(|(own, _)| *own < x);
     let before = |index: usize| index.checked_sub(1).map_or(0.0, |last| up_to[last]);
@@ -131,7 +131,7 @@ fn points(mut weighted: Vec<(f64, f64)>) -> Option<(Vec<f64>, usize)> {
     Some((x, nearest))
 }
 
-/// By how much the model's own delay is made shorter for a term, s: a delay may shrink as well.
+/// Reduction of the model's own delay for a term, s: room for a delay that shrinks.
 pub(super) fn room(entry: Entry, model: &Model) -> f64 {
     match entry {
         Entry::Delay => {
@@ -143,19 +143,19 @@ pub(super) fn room(entry: Entry, model: &Model) -> f64 {
     }
 }
 
-/// A model that curves are screened beside.
+/// A model on which curves are screened.
 pub(super) struct Context<'a> {
     screen: Screen<'a>,
     model: &'a Model,
     learning: Vec<&'a Record>,
     /// Length of the longest record, s.
     longest: f64,
-    /// Which term is looked for.
+    /// Number of the term that is searched.
     number: usize,
 }
 
 impl<'a> Context<'a> {
-    /// `None` if the model diverges.
+    /// Prepares the model; `None` if it diverges.
     pub(super) fn new(search: &Search<'a>, model: &'a Model, number: usize) -> Option<Self> {
         let learning = search.judge.learning(0);
         let longest = learning.iter().map(|r| r.len()).max().unwrap_or(0) as f64;
@@ -168,12 +168,12 @@ impl<'a> Context<'a> {
         })
     }
 
-    /// Every curve that enters in one of these ways, the most promising first.
+    /// Every curve with one of these entries, the most promising first.
     pub(super) fn all(&self, entries: &[Entry]) -> Vec<Screened> {
         self.curves(self.coordinates(), entries)
     }
 
-    /// The same with times in smaller steps.
+    /// The same with a finer grid of time constants.
     pub(super) fn closer(&self, entries: &[Entry]) -> Vec<Screened> {
         let mut all = self.coordinates();
         let between: Vec<_> = all
@@ -184,7 +184,7 @@ impl<'a> Context<'a> {
         self.curves(all, entries)
     }
 
-    /// A coordinate with its time multiplied by each of these, where the records are long enough.
+    /// A coordinate with its time constant multiplied by each factor, where the records are long enough.
     fn times(&self, coordinate: &Coordinate, factors: &[f64]) -> Vec<Coordinate> {
         let longest = remembered(self.longest);
         let others = factors
@@ -202,7 +202,7 @@ impl<'a> Context<'a> {
         coordinates(time_constant, self.longest, &channels)
     }
 
-    /// The same term with its time nearby, where that was chosen.
+    /// The same term with neighbouring time constants, if those were chosen from a grid.
     pub(super) fn near(&self, term: &Term) -> Vec<Screened> {
         if term.fading.is_some() {
             return Vec::new();
@@ -210,19 +210,19 @@ impl<'a> Context<'a> {
         self.curves(self.times(&term.coordinate, &NEARBY), &[term.entry])
     }
 
-    /// What a term changes in the free run, to first order.
+    /// First-order change of the free run by a term.
     pub(super) fn direction(&self, term: &Term) -> Option<Vec<f64>> {
         let reference = reference(&term.coordinate, &self.learning);
         let with = term.added_to(self.model, reference)?;
         Some(self.screen.tangent(&with, &term.name())?.direction)
     }
 
-    /// The screening itself.
+    /// The screening of the model.
     pub(super) fn screen(&self) -> &Screen<'a> {
         &self.screen
     }
 
-    /// What noise alone, as `last` leaves it, would make of the best of all curves.
+    /// Bootstrap distribution of the best curve's gain under noise alone, taken from the residual of `last`.
     pub(super) fn chance(&self, last: &Model, held_out: &HeldOut) -> Option<Chance> {
         let noise = Noise::new(&self.screen, last, held_out.block(), 0)?;
         let shares = self.each(self.coordinates(), &Entry::ALL, |(term, with)| {
@@ -241,7 +241,7 @@ impl<'a> Context<'a> {
         curves
     }
 
-    /// What is made of every curve, and of the model with it, that the records show.
+    /// Applies a function to every curve that the records define, with the model that contains it.
     fn each<T: Send>(
         &self,
         coordinates: Vec<Coordinate>,
@@ -254,7 +254,7 @@ impl<'a> Context<'a> {
             };
             let shown = |entry: &Entry| {
                 let coordinate = match (&coordinate, entry.place()) {
-                    // The sensor sees the reading.
+                    // The sensor's coordinate is the reading.
                     (Coordinate::Y, Place::Sensor) => Coordinate::Reading,
                     (other, _) => other.clone(),
                 };
@@ -266,7 +266,7 @@ impl<'a> Context<'a> {
         each.flatten().collect()
     }
 
-    /// A curve of zeros over what the coordinate shows there, and the model with it.
+    /// A curve of zeros over the coordinate's range, and the model with it.
     fn curve(
         &self,
         entry: Entry,
@@ -283,7 +283,7 @@ impl<'a> Context<'a> {
         let stride = shown.len().div_ceil(SHOWN).max(1);
         let (x, pinned) = points(shown.into_iter().step_by(stride).collect())?;
         let shift = room(entry, self.model);
-        // The sensor's zero is a constant reading.
+        // A constant reading is the sensor's offset.
         let zero = entry == Entry::Reading && self.model.has_effect(ZERO_OFFSET.name);
         let pinned = (zero || entry.has_free_level()).then_some(pinned);
         let term = Term {
@@ -314,7 +314,7 @@ impl<'a> Context<'a> {
         } = self.screen.tangent(with, &term.name())?;
         let cost = coefficients.len() as f64;
         let size = (coefficients.iter().map(|c| c * c).sum::<f64>() / cost).sqrt();
-        // What would have been worth it takes so much of the error.
+        // Share of the error energy that a reportable term explains.
         let wanted = 1.0 - (1.0 - RULES.worthwhile).powi(2);
         let smallest = size * (wanted / learned.max(1e-12)).sqrt();
         Some(Screened {
@@ -326,7 +326,7 @@ impl<'a> Context<'a> {
     }
 }
 
-/// The first so many, no more of a kind than rules allow.
+/// The first `most` candidates, limited per kind by the rules.
 pub(super) fn diverse(all: Vec<Screened>, most: usize) -> Vec<Screened> {
     let mut kept: Vec<Screened> = Vec::new();
     for one in all {
@@ -342,8 +342,8 @@ pub(super) fn diverse(all: Vec<Screened>, most: usize) -> Vec<Screened> {
 mod tests {
     use super::*;
 
-    /// Square waves keep one rest for long; what random commands show in between gets points too, and what shows
-    /// nothing gets none.
+    /// Square waves have one rest duration; the durations of random commands between get points too, and
+    /// unused ranges get none.
     #[test]
     fn points_lie_between_rests_that_take_most_of_the_time() {
         let mut shown = vec![(0.05, 1.0); 4000];

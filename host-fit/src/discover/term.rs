@@ -1,4 +1,4 @@
-//! A term as an effect file: a curve through points, or a formula.
+//! A discovered term as an effect file: a piecewise-linear curve or a formula.
 
 use super::RULES;
 use super::coordinate::{Coordinate, FADING};
@@ -10,11 +10,10 @@ use crate::terms::Units;
 use crate::user_effect::{Definition, DefinitionError};
 use std::fmt::Write as _;
 
-/// How g depends on its coordinate.
+/// The function g of the coordinate.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Shape {
-    /// Straight lines between points. Where the base takes a constant g as well, one
-    /// value is kept at 0.
+    /// Piecewise linear. Where the base already contains a constant g, one value is fixed at 0.
     Points {
         x: Vec<f64>,
         g: Vec<f64>,
@@ -29,25 +28,25 @@ pub(super) enum Shape {
     },
 }
 
-/// A term that no catalogue has.
+/// A term outside the catalogue.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Term {
     pub(super) entry: Entry,
     pub(super) coordinate: Coordinate,
     pub(super) shape: Shape,
-    /// Between which its coordinate's fading time is fitted, s, where it is one of its parameters.
+    /// Search interval of the coordinate's filter time constant, s, if that is a parameter.
     pub(super) fading: Option<[f64; 2]>,
-    /// The command is on above this.
+    /// The command counts as on above this.
     pub(super) on: f64,
-    /// By how much the model's own delay is shorter, s: room for a delay that shrinks.
+    /// Reduction of the model's own delay, s: room for a delay that shrinks.
     pub(super) shift: f64,
-    /// Size of a time, s.
+    /// Inner unit of time, s.
     pub(super) time: f64,
-    /// Which term of its kind it is.
+    /// Number of the term among those of its kind.
     pub(super) number: usize,
 }
 
-/// A parameter of an effect file, and what it is scaled with.
+/// A parameter of an effect file and its unit conversion.
 struct Parameter {
     name: String,
     value: f64,
@@ -57,17 +56,17 @@ struct Parameter {
 }
 
 impl Term {
-    /// Whether both enter alike and depend on the same but for a time.
+    /// Whether both have the same entry and the same coordinate up to its time constant.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         self.entry == other.entry && self.coordinate.slug() == other.coordinate.slug()
     }
 
-    /// Whether it depends on a time that was chosen, and is none of its parameters.
+    /// Whether its coordinate has a time constant that was chosen from a grid and is not fitted.
     pub(super) fn has_chosen_time(&self) -> bool {
         self.coordinate.has_time() && self.fading.is_none()
     }
 
-    /// The same with its coordinate's fading time, where it has one, fitted up to `factor` times shorter or longer.
+    /// The same with the coordinate's filter time constant as a parameter within `factor`, if it has one.
     pub(super) fn with_free_time(self, factor: f64) -> Self {
         let time = self.coordinate.fading();
         Self {
@@ -76,7 +75,7 @@ impl Term {
         }
     }
 
-    /// Standard errors of the values of a curve that is part of a fitted model, 0 where it is pinned.
+    /// Standard errors of the values of a curve in a fitted model; 0 where a value is fixed.
     pub(super) fn errors(&self, fitted: &Fit) -> Vec<f64> {
         let Shape::Points { g, pinned, .. } = &self.shape else {
             return Vec::new();
@@ -144,7 +143,7 @@ impl Term {
         }
     }
 
-    /// g as an expression.
+    /// g as an expression in an effect file.
     pub(super) fn formula(&self) -> String {
         let x = self.coordinate.expression();
         match &self.shape {
@@ -217,8 +216,8 @@ impl Term {
         self.parameters().iter().map(|p| p.value).collect()
     }
 
-    /// The same curve with more points where it is steepest beyond its standard `errors`, and without those that are
-    /// on a line with their neighbours where they would be too many; `None` if it is none.
+    /// The same curve with more points where it is steepest relative to its standard `errors`; points
+    /// collinear with their neighbours are removed if there are too many. `None` if nothing changes.
     pub(super) fn finer(&self, errors: &[f64]) -> Option<Self> {
         let Shape::Points { x, g, pinned } = &self.shape else {
             return None;
@@ -282,7 +281,7 @@ impl Term {
         other
     }
 
-    /// Its effect file; every line of `comment` comes first.
+    /// Its effect file, starting with the lines of `comment`.
     pub(super) fn file(&self, comment: &str) -> String {
         let longest = self.shift + RULES.longest_delay_s * self.time;
         let mut text = String::new();
@@ -333,8 +332,8 @@ impl Term {
         Definition::from_toml(&self.file(""), &self.name())
     }
 
-    /// The model with it; `reference` is that of its channel. `None` if the model has
-    /// an effect of its name.
+    /// The model with the term; `reference` is that of its channel. `None` if the model has an effect of the
+    /// same name.
     pub(super) fn added_to(&self, model: &Model, reference: Option<f64>) -> Option<Model> {
         let mut model = model.clone();
         let definition = self.definition().ok()?;
@@ -357,7 +356,7 @@ impl Term {
         model
     }
 
-    /// The term as a model has it.
+    /// The term with the values of a model that contains it.
     pub(super) fn in_model(&self, model: &Model) -> Self {
         let name = self.name();
         let own = model.effects.iter().find(|added| added.name == name);
@@ -400,14 +399,14 @@ mod tests {
         let other = free.with_values(&[0.2, 0.4, 0.35]);
         assert_eq!(other.coordinate, Coordinate::MemoryOfU(0.35));
         assert_eq!(other.values(), [0.2, 0.4, 0.35]);
-        // The range stays where it was looked for, and goes out with its unit.
+        // The search interval stays unchanged and is converted with its unit.
         assert_eq!(other.fading, Some([0.1, 0.4]));
         let slow = Units {
             time: 10.0,
             ..Units::NONE
         };
         assert_eq!(other.out(&slow).fading, Some([1.0, 4.0]));
-        // What is the same for any time has none to fit.
+        // A coordinate without a time constant has none to fit.
         let timeless = curve(&[0.0, 1.0], &[0.0, 1.0], None).with_free_time(2.0);
         assert_eq!((timeless.fading, timeless.values().len()), (None, 2));
     }
@@ -416,7 +415,7 @@ mod tests {
     fn a_curve_gets_points_where_it_is_steepest_beyond_its_errors() {
         let x: Vec<f64> = (0..8).map(f64::from).collect();
         let g = [0.0, 0.01, 0.0, 0.0, 0.0, -0.2, -0.2, -0.5];
-        // The last value is hardly known.
+        // The last value is poorly determined.
         let errors = [0.01, 0.01, 0.01, 0.01, 0.0, 0.01, 0.01, 0.3];
         let finer = curve(&x, &g, Some(4)).finer(&errors).expect("a curve");
         let Shape::Points { x, g, pinned } = &finer.shape else {
@@ -426,7 +425,8 @@ mod tests {
         assert_eq!(x[4..9], [4.0, 4.25, 4.5, 4.75, 5.0]);
         assert!((g[6] + 0.1).abs() < 1e-12);
         assert_eq!(*pinned, Some(4));
-        // The next time, points on a line with their neighbours make room, the pinned one and the ends never.
+        // In the next round, points collinear with their neighbours are removed, except the fixed one and the
+        // ends.
         let errors = [0.0; 11];
         let finest = finer.finer(&errors).expect("a curve");
         let Shape::Points { x, g, pinned } = &finest.shape else {

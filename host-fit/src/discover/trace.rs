@@ -1,11 +1,11 @@
-//! The trace of what is missing: for each place the signal w(t) that would explain the misfit.
+//! Input reconstruction: for each place, the signal w(t) that would explain the model error.
 //!
-//! w is straight between knots, and what it changes in the free run is J·w to first order, J from
-//! derivatives. With a Gaussian prior that wants w small and smooth, its mean and its band are those of a
-//! ridge regression, and how strong the prior is follows from the likelihood of the records with w
-//! integrated out (latent force models: Rogers & Friis 2022). The model's own parameters are free beside it,
-//! one set for all records: a base that was fitted without w leans against it. The same likelihood, compared
-//! between places, says where the misfit enters; errors that are correlated over c samples count as n/c.
+//! w is linear between knots and changes the free run by J·w to first order. With a Gaussian prior for a
+//! small and smooth w, the posterior mean and band are those of a ridge regression; the strength of the prior
+//! maximises the marginal likelihood (latent force models: Rogers & Friis 2022). The model's own parameters
+//! are free as well, one set for all records, because a base fitted without w is biased. The same marginal
+//! likelihood, compared between places, gives the probability of each; errors correlated over c samples count
+//! as n/c.
 
 use super::RULES;
 use super::place::{Entry, Place};
@@ -20,19 +20,19 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What is missing at every place, and which place it is.
+/// The reconstructed signals and the probability of each place.
 #[derive(Clone, Debug, Serialize)]
 pub struct Trace {
-    /// The place, if one is likely enough: see [`odds`](Self::odds).
+    /// The place, if it is probable enough: see [`odds`](Self::odds).
     pub place: Option<Place>,
-    /// Probability of each place, all alike before the records spoke.
+    /// Posterior probability of each place, with equal priors.
     pub odds: BTreeMap<&'static str, f64>,
-    /// The signals, record by record.
+    /// The signals of each record.
     #[serde(skip)]
     pub records: Vec<TracedRecord>,
 }
 
-/// What is missing in one record.
+/// The reconstructed signals of one record.
 #[derive(Clone, Debug)]
 pub struct TracedRecord {
     /// The record's name.
@@ -43,16 +43,16 @@ pub struct TracedRecord {
     pub signals: Vec<Signal>,
 }
 
-/// w at the knots, with its 95 % band, in the user's units.
+/// w at the knots with its 95 % band, in the user's units.
 #[derive(Clone, Debug, Default)]
 pub struct Signal {
     /// w.
     pub value: Vec<f64>,
-    /// Half the width of the band.
+    /// Half width of the band.
     pub half: Vec<f64>,
 }
 
-/// The ways to enter that are traced, one for each place.
+/// The entries that are reconstructed, one for each place.
 pub const TRACED: [Entry; 4] = [Entry::Jet, Entry::Delay, Entry::Level, Entry::Reading];
 
 impl Trace {
@@ -81,41 +81,40 @@ impl Trace {
     }
 }
 
-/// Knots that one run's expression holds.
+/// Number of knots that one run's expression can hold.
 const KNOTS_AT_ONCE: usize = 40;
 
-/// A record's regression at one place, in its own units.
+/// The regression of one record at one place, in inner units.
 struct Part {
     /// JᵀJ, row-major.
     gram: Vec<f64>,
     /// Jᵀe.
     right: Vec<f64>,
-    /// JᵀK by the columns of K, the derivatives by the model's own parameters.
+    /// JᵀK by the columns of K, the sensitivities of the model's own parameters.
     mixed: Vec<Vec<f64>>,
     /// KᵀK, row-major, and Kᵀe.
     own_gram: Vec<f64>,
     own_right: Vec<f64>,
-    /// Inverse covariance of w before the records spoke, but for its strength.
+    /// Prior precision of w up to its strength.
     prior: Vec<f64>,
     /// ln |prior|.
     log_prior: f64,
     knots: usize,
 }
 
-/// All records at one place under a prior of one strength.
+/// All records at one place for one strength of the prior.
 struct Explained {
-    /// ln of the likelihood.
+    /// ln of the marginal likelihood.
     log_likelihood: f64,
-    /// Variance of an independent error.
+    /// Variance per independent error.
     variance: f64,
     strength: f64,
-    /// Factor of what is known of the model's own parameters beside w, and their changes.
+    /// Posterior precision (Cholesky factor) of the model's own parameters beside w, and their changes.
     own: Cholesky,
     change: Vec<f64>,
 }
 
-/// The trace of what `judged` lacks; `None` where its free run diverges, or no place
-/// could be traced.
+/// The reconstruction for `judged`; `None` if its free run diverges or no place can be reconstructed.
 pub(super) fn trace(judge: &Judge, judged: &Judged, units: &Units) -> Option<Trace> {
     let model = judged.model();
     let records = judge.first_fold();
@@ -180,7 +179,7 @@ pub(super) fn trace(judge: &Judge, judged: &Judged, units: &Units) -> Option<Tra
     })
 }
 
-/// Where w may bend: half a time constant of the flow apart, in long records further.
+/// The knots of w, half a time constant of the flow apart; further apart in long records.
 fn knots(model: &Model, record: &Record) -> Vec<f64> {
     let period = record.sample_period_s;
     let length = record.len() as f64 * period;
@@ -191,7 +190,7 @@ fn knots(model: &Model, record: &Record) -> Vec<f64> {
     (0..=count).map(|i| i as f64 * apart).collect()
 }
 
-/// The model with w at some knots, and nothing beyond them; all w are 0.
+/// The model with w = 0 at some knots and outside them.
 fn with_signal(entry: Entry, model: &Model, knots: &[f64]) -> Option<Model> {
     let apart = knots.get(1).map_or(1.0, |next| next - knots[0]);
     let inside = knots
@@ -265,14 +264,14 @@ impl Part {
         })
     }
 
-    /// JᵀJ and the prior of that strength.
+    /// Posterior precision JᵀJ + prior at this strength.
     fn posterior(&self, strength: f64) -> Cholesky {
         let pairs = self.gram.iter().zip(&self.prior);
         let sum: Vec<f64> = pairs.map(|(gram, prior)| gram + strength * prior).collect();
         Cholesky::new(&sum, self.knots)
     }
 
-    /// Its signal, with twice its standard deviation.
+    /// Posterior mean with twice its standard deviation.
     fn signal(&self, explained: &Explained) -> Option<Signal> {
         let posterior = self.posterior(explained.strength);
         let mut right = self.right.clone();
@@ -308,7 +307,7 @@ impl Signal {
     }
 }
 
-/// Small and smooth: second differences, and a little of w itself.
+/// Prior precision: second differences, and a small weight on w itself.
 fn prior(n: usize) -> Vec<f64> {
     let mut prior = vec![0.0; n * n];
     for i in 0..n {
@@ -330,7 +329,7 @@ fn log_determinant(factor: &Cholesky, n: usize) -> f64 {
     -2.0 * known.map(f64::ln).sum::<f64>()
 }
 
-/// The strength of the prior under which the records are likeliest.
+/// The strength of the prior with the largest marginal likelihood.
 fn explained(parts: &[Part], energy: f64, independent: f64) -> Option<Explained> {
     let count: usize = parts.iter().map(|part| part.knots).sum();
     let trace = |part: &Part| {
@@ -382,7 +381,8 @@ mod tests {
     use crate::residual::plants::{base, records};
     use crate::terms::Bench;
 
-    /// Jets that tire as their plenum empties: the trace is at the jet, and below 0 while it blows for long.
+    /// A jet that weakens as its plenum empties: the signal is found at the jet, negative during long
+    /// blowing.
     #[test]
     fn a_droop_is_traced_to_the_jet() {
         let records = records(&["plenum-droop"], &[], 4);

@@ -1,14 +1,14 @@
-//! Commands that a valve can play.
+//! On/off commands within the limits of a valve.
 
 use super::{Limits, RULES};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// A command as openings in time.
+/// A command as a sequence of openings.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Openings {
     pub(super) description: String,
-    /// Dwells in turn, closed first, s.
+    /// Alternating durations, starting closed, s.
     dwells: Vec<f64>,
 }
 
@@ -27,7 +27,7 @@ impl Openings {
         u
     }
 
-    /// Repeats `dwells` (open first) until the tail begins.
+    /// Repeats `dwells` (open first) until the rest at the end.
     fn repeating(description: String, limits: &Limits, dwells: &[f64]) -> Self {
         let mut all = vec![limits.min_off_s];
         let mut at = limits.min_off_s;
@@ -49,7 +49,7 @@ impl Openings {
     }
 }
 
-/// `n` values from `low` to `high` in equal ratios.
+/// `n` values from `low` to `high` in geometric progression.
 fn geometric(low: f64, high: f64, n: u32) -> impl Iterator<Item = f64> {
     (0..n).map(move |i| low * (high / low).powf(f64::from(i) / f64::from(n - 1)))
 }
@@ -85,7 +85,7 @@ pub(super) fn families(limits: &Limits, rng: &mut ChaCha8Rng) -> Vec<Openings> {
     let long = RULES.longest_of_pair * duration;
     let rest = long.max(off);
     let [firsts, seconds, pauses] = RULES.pairs;
-    // A range of its own even where the shortest times are long.
+    // The range is non-empty even if the shortest times are long.
     for first in geometric(on, long.max(1.01 * on), firsts) {
         for second in geometric(on, long.max(1.01 * on), seconds) {
             let dwells: Vec<f64> = geometric(off, rest.max(1.01 * off), pauses)
@@ -111,7 +111,7 @@ pub(super) fn families(limits: &Limits, rng: &mut ChaCha8Rng) -> Vec<Openings> {
     plans
 }
 
-/// The plan with some dwells changed.
+/// The plan with some durations changed.
 pub(super) fn mutate(plan: &Openings, limits: &Limits, rng: &mut ChaCha8Rng) -> Openings {
     let mut changed = plan.clone();
     let share = rng.random_range(0.05..0.6);
@@ -126,7 +126,7 @@ pub(super) fn mutate(plan: &Openings, limits: &Limits, rng: &mut ChaCha8Rng) -> 
             *dwell = (*dwell * f64::exp(rng.random_range(-size..size))).max(shortest);
         }
     }
-    // What would run into the tail is left out; a plan ends with an opening.
+    // Openings within the final rest are left out; a plan ends with an opening.
     let end = (1.0 - RULES.rest) * limits.duration_s;
     let mut at = 0.0;
     let kept = changed.dwells.iter().take_while(|dwell| {

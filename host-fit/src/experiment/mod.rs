@@ -1,8 +1,7 @@
-//! The experiment that tells apart models which the data at hand cannot.
+//! Experiment design for model discrimination.
 //!
-//! T-optimality (Atkinson & Fedorov 1975): the command for which the models'
-//! free runs differ most against the noise, Σ(ŷ_A − ŷ_B)²/σ², within what the
-//! valve can do.
+//! T-optimality (Atkinson & Fedorov 1975): the command within the valve's limits that maximises the
+//! difference of the models' free runs relative to the noise, Σ(ŷ_A − ŷ_B)²/σ².
 
 mod command;
 mod rules;
@@ -24,7 +23,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use thiserror::Error;
 
-/// What the valve can do and how long a run may last.
+/// Limits of the valve and of the record length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Shortest opening, s.
@@ -36,7 +35,7 @@ pub struct Limits {
 }
 
 impl Default for Limits {
-    /// 20 ms either way, 10 s.
+    /// 20 ms on and off, 10 s.
     fn default() -> Self {
         Self {
             min_on_s: 0.02,
@@ -46,7 +45,7 @@ impl Default for Limits {
     }
 }
 
-/// A command that separates models, and by how much.
+/// A discriminating command with its separation of the models.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Experiment {
     /// The command in words.
@@ -55,8 +54,8 @@ pub struct Experiment {
     pub sample_period_s: f64,
     /// The command per sample, 0 or 1.
     pub u: Vec<f64>,
-    /// √(Σ(ŷ_A − ŷ_B)²/σ²) of the two models that are closest under it, in
-    /// standard deviations of white noise of the given size.
+    /// √(Σ(ŷ_A − ŷ_B)²/σ²) of the two closest models, in standard deviations of white noise of the given
+    /// size.
     pub separation_sigmas: f64,
     /// Root mean square difference of those two models over the noise, dB.
     pub separation_db: f64,
@@ -66,7 +65,7 @@ pub struct Experiment {
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum ExperimentError {
-    /// Nothing to separate.
+    /// Fewer than two models.
     #[error(
         "{0} model given; a separating experiment needs at least two. Give the models that fit the data equally well."
     )]
@@ -76,7 +75,7 @@ pub enum ExperimentError {
         "the models have different sample periods ({0} s and {1} s). Identify them from the same data set."
     )]
     Periods(f64, f64),
-    /// The limits leave no command.
+    /// No command satisfies the limits.
     #[error(
         "no command fits: min-on {min_on} s, min-off {min_off} s, duration {duration} s, noise {noise}. All must be positive and a run must hold at least four of the shortest pulses."
     )]
@@ -90,16 +89,16 @@ pub enum ExperimentError {
         /// Noise, y.
         noise: f64,
     },
-    /// Some model diverges under every command.
+    /// For every command some model diverges.
     #[error(
         "a model diverges under every command that was tried. Identify it again with fewer lags or with `--objective free-run`."
     )]
     Unstable,
 }
 
-/// Searches square waves, single pulses, pairs of pulses, random on/off
-/// sequences and variations of the best for the command under which `models`
-/// differ most; `noise_rmse` is the noise of the future record, in y.
+/// Searches square waves, single pulses, pairs of pulses, random on/off sequences and variations of the best
+/// for the command with the largest difference between `models`; `noise_rmse` is the expected noise level, in
+/// y.
 ///
 /// # Errors
 /// [`ExperimentError`].
@@ -226,7 +225,7 @@ impl Experiment {
         write_atomic(path, |file| {
             writeln!(file, "t,u")?;
             for (k, u) in self.u.iter().enumerate() {
-                // Whole sample periods, without the noise of binary fractions.
+                // Multiples of the sample period, rounded to remove binary representation errors.
                 let t = (k as f64 * self.sample_period_s * 1e9).round() / 1e9;
                 writeln!(file, "{t},{u}")?;
             }
@@ -272,7 +271,7 @@ mod tests {
             assert!(dwell >= if pair[0] == 1.0 { 50 } else { 30 }, "{dwell}");
             dwell = 1;
         }
-        // Better than the paper's square wave.
+        // Better than the square wave of the paper.
         let square: Vec<f64> = (0..6000).map(|k| f64::from(k % 250 < 125)).collect();
         let usual = separation(&models, &square) / 0.01;
         println!("{} (4 Hz 50 %: {usual:.0})", found.words());
@@ -297,7 +296,7 @@ mod tests {
             .expect("no noise")
             .experiment
             .separation_sigmas;
-        // So much noise leaves two standard deviations, and four.
+        // Noise levels at which the separation is two and four standard deviations.
         assert!(proposed(1e-6 * sigmas / 2.0).is_none());
         assert!(proposed(1e-6 * sigmas / 4.0).is_some());
     }

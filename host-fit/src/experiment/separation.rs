@@ -1,23 +1,23 @@
-//! Models that the records cannot tell apart, and the command that would.
+//! Models that are not distinguishable on the records, and the command that would discriminate them.
 
 use super::{Experiment, Limits, RULES, separating};
 use crate::model::Model;
 use serde::{Serialize, Serializer};
 
-/// How to tell apart what the data cannot. Serialises to `experiment` of `diagnose --json` and `discover --json`.
+/// A discriminating experiment. Serialises to `experiment` of `diagnose --json` and `discover --json`.
 #[derive(Clone, Debug)]
 pub struct Separation {
-    /// The effects that one of the models has and another has not.
+    /// The effects in which the models differ.
     pub effects: Vec<String>,
-    /// The models: the final one first.
+    /// The models, the final one first.
     pub models: Vec<Model>,
     /// The command that separates the models most.
     pub experiment: Experiment,
 }
 
 impl Separation {
-    /// The command that tells the first of `models` and the others apart within the default [`Limits`], at a noise of
-    /// `noise_rmse` (y, 0 or more); `None` if there are no others, or no command does.
+    /// The command that discriminates the first of `models` from the others within the default [`Limits`], at
+    /// a noise level of `noise_rmse` (y, 0 or more); `None` if there are no others, or no command does.
     #[must_use]
     pub fn of(
         models: Vec<Model>,
@@ -35,7 +35,7 @@ impl Separation {
         })
     }
 
-    /// What to play, in a sentence.
+    /// The command to play, in a sentence.
     #[must_use]
     pub fn words(&self) -> String {
         format!(

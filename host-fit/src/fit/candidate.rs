@@ -1,4 +1,4 @@
-//! A base model refitted, all of it, with one more effect.
+//! A base model with one more effect, all parameters refitted.
 
 use super::lean::{fresh_starts, settle_fixed_delay, with_law_of};
 use super::rules::RULES;
@@ -61,13 +61,13 @@ pub fn fit_with_effect(
         .map(|parameters| with(base, parameters))
         .collect();
     if spec.parameters.is_empty() {
-        // Nothing leads from a base that never saw the effect to one that has it.
+        // A minimum without the effect may be a bad start for the model with it: fresh starts are tried too.
         let fresh = fresh_starts(base, records);
         models.extend(fresh.iter().map(|base| with(base, &[])));
     }
     let mut tried = tried_briefly(models, records, options);
     if spec.place == Place::Jet {
-        // How the flow takes jets of part strength shows only once there are some.
+        // The response to jets of part strength can only be identified if an effect causes them.
         let regraded = tried.iter().take(RULES.regraded).flat_map(|fit| {
             let others = Grading::ALL.into_iter().filter(|g| *g != base.grading);
             others.map(|grading| Model {
@@ -95,7 +95,7 @@ pub fn fit_with_effect(
                 return with_law_of(&start.model, base, records).ok();
             }
             let fitted = fit(&start.model, records, options).ok()?;
-            // A fixed delay has no derivative, and the base's may stand in for the effect.
+            // A fixed delay has no derivative, and that of the base may imitate the effect.
             settle_fixed_delay(fitted, records, options).ok()
         })
         .collect();
@@ -108,8 +108,8 @@ pub fn fit_with_effect(
         })
 }
 
-/// Several starting points after a few steps each, best first. Fewer steps would
-/// tell thresholds from each other badly: what acts in steps is slow to show.
+/// Several starting points after a few iterations each, best first. Fewer iterations would rank thresholds
+/// poorly, because parameters that act in steps converge slowly.
 fn tried_briefly(models: Vec<Model>, records: &[&Record], options: &FitOptions) -> Vec<Fit> {
     let brief = FitOptions {
         iterations: RULES.brief,

@@ -1,11 +1,12 @@
-//! Covariances of fitted parameters that allow for residuals which are correlated over many samples, and for what no model has.
+//! Covariance of fitted parameters, robust to correlated residuals and unmodelled disturbances.
 //!
-//! Residuals of a free run are correlated, and standard errors that ignore it are several times too small. Two estimates stand beside each
-//! other, and for each coordinate the one counts that says more. Sums of J·r over blocks much longer than the memory of the noise are
-//! uncorrelated, and their outer products are cheap (batch means, the *sandwich*); they know of nothing that lasts longer than a block. And each
-//! record is left out in turn, to first order (the *jackknife*): records are the conditions, and what a model does not have shows as a parameter that
-//! each of them would have otherwise. Few records know that badly, which Student's t allows for (MacKinnon, Nielsen and Webb 2023,
-//! J. Econometrics 232:272, advise just this for few clusters).
+//! Free-run residuals are correlated; standard errors for white residuals are several times too small. Two
+//! robust estimates are computed, and the larger counts for each coordinate. Sums of J·r over blocks much
+//! longer than the correlation time are uncorrelated; their outer products give the *sandwich* estimate
+//! (batch means), which misses disturbances longer than a block. The *jackknife* over records, to first
+//! order, includes these, because each record would give different parameters. With few records it is
+//! uncertain, which Student's t allows for (MacKinnon, Nielsen and Webb 2023, J. Econometrics 232:272, advise
+//! this for few clusters).
 
 use super::levenberg::Part;
 use super::rules::RULES;
@@ -13,8 +14,9 @@ use crate::linalg::{dot, inverse_where_known};
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use std::ops::Range;
 
-/// Covariance of `n` coordinates, row-major, from the last linearisation and its JᵀJ, such that 1.96 standard errors to either
-/// side are an interval of 95 %; NaN on the diagonal where the records leave a coordinate unknown. `None` if a decomposition fails.
+/// Covariance of `n` coordinates, row-major, from the last linearisation and its JᵀJ, scaled so that ±1.96
+/// standard errors are a 95 % interval; NaN on the diagonal for coordinates that are not identifiable. `None`
+/// if a decomposition fails.
 pub(super) fn covariance(parts: &[Part], information: &[f64], n: usize) -> Option<Vec<f64>> {
     let (inverse, unknown) = inverse_where_known(information, n)?;
     let each = RULES
@@ -24,7 +26,7 @@ pub(super) fn covariance(parts: &[Part], information: &[f64], n: usize) -> Optio
     let [mut covariance, longer] = each;
     let wider = |i: usize| {
         let own = covariance[i * n + i];
-        // What the jackknife cannot tell is NaN, and does not count.
+        // Where the jackknife is undefined (NaN), it does not count.
         let most = own.max(longer[i * n + i]).max(left_out[i]);
         (most / own.max(f64::MIN_POSITIVE)).sqrt()
     };
@@ -40,7 +42,7 @@ pub(super) fn covariance(parts: &[Part], information: &[f64], n: usize) -> Optio
     Some(covariance)
 }
 
-/// (JᵀJ)⁻¹ S (JᵀJ)⁻¹ with S = Σ (J·r)(J·r)ᵀ over blocks, so many of each record.
+/// (JᵀJ)⁻¹ S (JᵀJ)⁻¹ with S = Σ (J·r)(J·r)ᵀ over `batches` blocks of each record.
 fn sandwich(parts: &[Part], batches: usize, inverse: &[f64], n: usize) -> Vec<f64> {
     let mut middle = vec![0.0; n * n];
     let mut count = 0;
@@ -55,7 +57,7 @@ fn sandwich(parts: &[Part], batches: usize, inverse: &[f64], n: usize) -> Vec<f6
             count += 1;
         }
     }
-    // The gradient is 0 at a minimum: of so many sums one is known.
+    // The gradient is 0 at a minimum: one degree of freedom less.
     let count = f64::from(count);
     middle
         .iter_mut()
@@ -64,8 +66,8 @@ fn sandwich(parts: &[Part], batches: usize, inverse: &[f64], n: usize) -> Vec<f6
     product(n, |i, k| half[i * n + k], |k, j| inverse[k * n + j])
 }
 
-/// Variances of the coordinates: by how much each moves, to first order, when one record is left out, or a piece of it where there are few. NaN
-/// where the others leave it unknown.
+/// Jackknife variances: the first-order change of each coordinate when one record is left out, or a piece of
+/// it if records are few. NaN where the remaining records do not identify it.
 fn jackknife(parts: &[Part], information: &[f64], n: usize) -> Vec<f64> {
     let each = RULES.left_out.div_ceil(parts.len().max(1));
     let groups: Vec<(&Part, Range<usize>)> = (parts.iter())
@@ -98,7 +100,7 @@ fn jackknife(parts: &[Part], information: &[f64], n: usize) -> Vec<f64> {
     sums.iter().map(|sum| scale * sum).collect()
 }
 
-/// J·r of a piece.
+/// J·r summed over a piece.
 fn score(part: &Part, piece: &Range<usize>) -> Vec<f64> {
     let residual = &part.residual[piece.clone()];
     let columns = part.jacobian.iter();
@@ -107,7 +109,7 @@ fn score(part: &Part, piece: &Range<usize>) -> Vec<f64> {
         .collect()
 }
 
-/// About so many equal pieces of so many samples.
+/// About `count` equal pieces of `samples` samples.
 fn pieces(samples: usize, count: usize) -> impl Iterator<Item = Range<usize>> {
     let length = (samples / count).max(1);
     (0..samples)
@@ -143,7 +145,8 @@ mod tests {
         (0..n * n).map(|at| cell(at / n, at % n)).collect()
     }
 
-    /// Eight records that are each off by a level of their own: blocks of a fortieth of them know forty times too much.
+    /// Eight records with an individual level each: treating blocks of a fortieth as independent would give
+    /// far too small an error.
     #[test]
     fn what_lasts_as_long_as_a_record_counts_as_one_draw() {
         let part = |k: usize| Part {
@@ -152,7 +155,8 @@ mod tests {
         };
         let parts: Vec<Part> = (0..8).map(part).collect();
         let variance = jackknife(&parts, &[32_000.0], 1)[0];
-        // Eight draws of 0.1, their mean known to 0.1/√7, and Student's t with 7 degrees of freedom.
+        // Eight draws with standard deviation 0.1: the mean has the standard error 0.1/√7, widened by
+        // Student's t with 7 degrees of freedom.
         let wider: f64 = 2.3646 / 1.96;
         assert!(
             (variance / (0.01 / 7.0) - wider * wider).abs() < 1e-3,
@@ -162,7 +166,8 @@ mod tests {
         assert!((counts[0] / variance - 1.0).abs() < 1e-9, "{counts:?}");
     }
 
-    /// What only one record tells is left to the blocks, and what none tells is not known.
+    /// A coordinate that only one record identifies gets its interval from blocks; one that no record
+    /// identifies gets none.
     #[test]
     fn what_one_record_alone_tells_has_an_interval_all_the_same() {
         let part = |tells: f64| Part {
@@ -180,7 +185,8 @@ mod tests {
         assert!(covariance[8].is_nan());
     }
 
-    /// A mean and a wave in records with noise of 30 ms and a level of their own, five at a time: the stated 95 % are the true ones.
+    /// A mean and a wave in five records with 30 ms correlated noise and individual levels: the 95 %
+    /// intervals have the stated coverage.
     #[test]
     fn intervals_from_five_records_hold_the_truth_as_often_as_they_say() {
         let mut rng = ChaCha8Rng::seed_from_u64(11);
@@ -221,7 +227,8 @@ mod tests {
                 held[i] += usize::from(found[i].abs() <= 1.96 * covariance[3 * i].sqrt());
             }
         }
-        // Binomial(300, 0.95): 285 ± 3.8. Blocks take levels for noise, which widens what levels do not touch.
+        // Binomial(300, 0.95): 285 ± 3.8. Blocks mistake the levels for noise, which widens the interval of
+        // the wave.
         let [mean, wave] = held;
         assert!(
             (274..=296).contains(&mean) && wave >= 274,

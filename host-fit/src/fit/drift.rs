@@ -1,14 +1,12 @@
-//! Rigs that integrate: their free run drifts, and a model fitted to where it has
-//! drifted after a whole record knows the drift of that record, not the rig.
-//! Free runs then start anew from the measurement every now and then.
+//! Restarts of free runs for integrating plants: their free run drifts, and an error over a whole record
+//! would measure the drift of that record rather than the plant.
 
 use super::rules::RULES;
 use crate::data::Record;
 use crate::model::{Model, Start};
 
-/// After how many samples free runs of `model` start anew; none if what happened
-/// at the beginning of a record is forgotten well before its end, or if the model
-/// starts from rest and not from the measurement.
+/// Number of samples after which free runs of `model` are restarted from the measurement. None if the model
+/// forgets its initial state well within a record, or starts from rest.
 #[must_use]
 pub fn restart_after(model: &Model, records: &[Record]) -> Option<usize> {
     let shortest = records.iter().map(Record::len).min()?;
@@ -20,7 +18,7 @@ pub fn restart_after(model: &Model, records: &[Record]) -> Option<usize> {
     (samples < shortest / 2).then_some(samples)
 }
 
-/// Whether what happened is still there after so many samples.
+/// Whether the initial state still matters after this many samples.
 fn remembers(model: &Model, samples: usize) -> bool {
     let left = |pole: f64| pole.powf(samples as f64);
     model
@@ -28,8 +26,8 @@ fn remembers(model: &Model, samples: usize) -> bool {
         .is_ok_and(|pole| left(pole) > RULES.drifts)
 }
 
-/// A record cut into pieces of so many scored samples, each of which follows the measurement through the samples before
-/// them; what is left over after the last whole one belongs to it.
+/// A record cut into pieces of so many scored samples. Each piece is preceded by samples in which the run
+/// follows the measurement; the remainder belongs to the last piece.
 pub(crate) fn pieces(record: &Record, samples: usize) -> Vec<Record> {
     let count = (record.len() / samples.max(1)).max(1);
     let end = |piece: usize| {

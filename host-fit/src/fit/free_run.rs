@@ -1,6 +1,5 @@
-//! Fits of a model's free run, ε of eq. (9): exact sensitivities of everything smooth
-//! by dual numbers, secants for what acts in steps, and standard errors that allow for
-//! correlated residuals.
+//! Fits to the free-run error ε of eq. (9): exact sensitivities by dual numbers for smooth parameters,
+//! secants for parameters that act in steps, and standard errors robust to correlated residuals.
 
 use super::covariance::{covariance, product};
 use super::level_scatter::LevelScatter;
@@ -15,12 +14,12 @@ use model_core::effect::Sign;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
-/// Derivatives carried by one run: eight …
+/// Derivatives per run.
 const FEW: usize = 8;
-/// … or all that are left, if that is no more than twelve.
+/// The last run carries all remaining derivatives, if they are at most this many.
 const MANY: usize = 12;
 
-/// How to fit.
+/// Options of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitOptions {
     /// Most iterations.
@@ -29,11 +28,11 @@ pub struct FitOptions {
     pub tolerance: f64,
     /// Whether the constant d may differ from 0.
     pub constant: bool,
-    /// Whether coefficients a, b, c and d move.
+    /// Whether the coefficients a, b, c and d are free.
     pub linear: bool,
-    /// Whether the delay law moves.
+    /// Whether the delay law is free.
     pub delay: bool,
-    /// How the level of a record scatters, where that is known: errors along y count for less then.
+    /// Scatter of a record's level, if known: errors along y then have less weight.
     pub level_scatter: Option<LevelScatter>,
 }
 
@@ -50,19 +49,19 @@ impl Default for FitOptions {
     }
 }
 
-/// What a fit gives.
+/// Result of a fit.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The model with its fitted parameters.
     pub model: Model,
-    /// Σ (y − y_sim)² over the records, errors along y weighed by how the level scatters.
+    /// Σ (y − y_sim)² over the records, errors along y weighted by the scatter of the level.
     pub sum_of_squares: f64,
-    /// Samples that were judged.
+    /// Number of scored samples.
     pub samples: usize,
-    /// Indices of the coordinates that moved.
+    /// Indices of the free coordinates.
     pub free: Vec<usize>,
-    /// Covariance of the free coordinates that allows for correlated residuals and for few records, such that 1.96 standard
-    /// errors to either side are an interval of 95 %, row-major; NaN on the diagonal for those that the records leave unknown.
+    /// Covariance of the free coordinates, robust to correlated residuals and few records: ±1.96 standard
+    /// errors is a 95 % interval. Row-major; NaN on the diagonal for coordinates that are not identifiable.
     pub covariance: Vec<f64>,
     /// Iterations made.
     pub iterations: usize,
@@ -71,8 +70,8 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// Mean square error over the samples that were judged: comparable between
-    /// models that need warm-ups of different lengths. Infinite if none was.
+    /// Mean square error over the scored samples, comparable between models with different warm-ups. Infinite
+    /// without samples.
     #[must_use]
     pub fn mean_square(&self) -> f64 {
         if self.samples == 0 {
@@ -91,7 +90,7 @@ impl Fit {
     }
 }
 
-/// How a coordinate is searched.
+/// How a coordinate is varied.
 #[derive(Clone, Copy, Debug)]
 struct Searched {
     index: usize,
@@ -100,7 +99,7 @@ struct Searched {
     high: f64,
     /// Half width of the secant, for coordinates that act in steps.
     secant: Option<f64>,
-    /// The index of a coordinate that moves against this one, so that their sum stays.
+    /// Index of a coordinate that changes by the opposite amount, so that their sum stays constant.
     against: Option<usize>,
 }
 
@@ -118,7 +117,7 @@ impl Searched {
             Some(parameter) => Self {
                 index,
                 logarithmic: parameter.is_logarithmic(),
-                // A sign that is physics is kept.
+                // A sign that has a physical meaning is kept.
                 low: match parameter.sign {
                     Sign::Positive => parameter.low.max(0.0),
                     Sign::Either => parameter.low,
@@ -145,7 +144,7 @@ impl Searched {
         moved.clamp(self.low, self.high)
     }
 
-    /// The lowest and highest step: to the bounds, and no leap in the dark.
+    /// Lowest and highest step: limited by the bounds and by the trust region.
     fn reach(&self, value: f64) -> (f64, f64) {
         if self.logarithmic {
             let to = |bound: f64| (bound / value).ln();
@@ -165,7 +164,7 @@ struct FreeRunProblem<'a> {
     signals: Vec<Signals<'a>>,
     measured: Vec<&'a [f64]>,
     axes: Vec<Searched>,
-    /// First samples that are not scored, per record.
+    /// Number of unscored samples at the start of each record.
     lead: Vec<usize>,
     rounding: Rounding,
     level_scatter: Option<LevelScatter>,
@@ -191,7 +190,7 @@ impl<'a> FreeRunProblem<'a> {
         })
     }
 
-    /// Samples that are judged.
+    /// Number of scored samples.
     fn samples(&self) -> usize {
         let each = self.measured.iter().zip(&self.lead);
         each.map(|(y, lead)| y.len().saturating_sub(*lead)).sum()
@@ -315,7 +314,7 @@ impl LeastSquares for FreeRunProblem<'_> {
         let each = |record: usize| {
             let (measured, lead) = (self.measured[record], self.lead[record]);
             let (mut sum, mut product, mut square) = (0.0, 0.0, 0.0);
-            // What lies along y is known at the end only.
+            // The part of the error along y is known only at the end of the record.
             let enough = match self.level_scatter {
                 Some(_) => f64::MAX,
                 None => enough,
@@ -329,7 +328,7 @@ impl LeastSquares for FreeRunProblem<'_> {
                         square += measured[k] * measured[k];
                     }
                 }
-                // NaN breaks off too.
+                // NaN stops as well.
                 if sum <= enough {
                     ControlFlow::Continue(())
                 } else {
@@ -369,13 +368,13 @@ impl LeastSquares for FreeRunProblem<'_> {
     }
 }
 
-/// Fits the parameters of `model` to `records` in free run, from where they are.
+/// Fits the parameters of `model` to the free-run error on `records`, starting from their present values.
 ///
-/// A rounded delay law is fitted without its rounding, which makes the free
-/// run smooth; the coefficients are then fitted again with it.
+/// A rounded delay law is fitted without rounding first, so that the free run is differentiable; the
+/// coefficients are then refitted with it.
 ///
 /// # Errors
-/// A missing channel, or a model whose free run diverges from the start.
+/// A missing channel, or a model whose free run diverges at the start.
 pub fn fit(model: &Model, records: &[&Record], options: &FitOptions) -> Result<Fit, SimulateError> {
     let rounded = matches!(&model.delay, Delay::Law(law) if !law.interpolated);
     if !rounded {
@@ -395,9 +394,9 @@ pub fn fit(model: &Model, records: &[&Record], options: &FitOptions) -> Result<F
     })
 }
 
-/// The free run of `model` over `record`, and its derivatives by the coordinates with
-/// these `indices` (see [`Model::coordinates`]), in their own units; `None` if it
-/// diverges or a channel is missing. Delays are taken as they are, without rounding.
+/// The free run of `model` over `record` and its derivatives with respect to the coordinates with these
+/// `indices` (see [`Model::coordinates`]), in their own units; `None` if it diverges or a channel is missing.
+/// Delays are not rounded.
 #[must_use]
 pub fn sensitivities(
     model: &Model,
@@ -408,7 +407,7 @@ pub fn sensitivities(
     let values = model.values();
     let mut run = Vec::with_capacity(record.len());
     let mut columns = Vec::with_capacity(indices.len());
-    // An empty chunk where nothing is wanted but the run.
+    // An empty chunk if only the run is wanted.
     let none: [&[usize]; 1] = [&[]];
     let chunks: Vec<&[usize]> = match indices {
         [] => none.to_vec(),
@@ -471,8 +470,8 @@ fn descend(
         minimise(problem, values, cost, options.iterations, options.tolerance)
     };
     let mut end = descent(&problem, values, cost);
-    // A sensor that shows the jets jumps where an edge crosses a sample: the error has steps along the delays,
-    // and the others may have a way down still.
+    // A reading with direct jet pickup jumps when an edge crosses a sample: the error is stepwise in the
+    // delays, but other parameters may still improve.
     for _ in 0..RULES.held_delays {
         if end.stop != FitStop::NoDescent {
             break;
@@ -506,7 +505,7 @@ fn descend(
     })
 }
 
-/// Covariance of the coordinates themselves from that of what is searched.
+/// Covariance of the coordinates, transformed from that of the varied quantities.
 fn in_values(searched: &[f64], axes: &[Searched], values: &[f64]) -> Vec<f64> {
     let n = axes.len();
     // ∂coordinate i/∂searched j.
@@ -519,9 +518,9 @@ fn in_values(searched: &[f64], axes: &[Searched], values: &[f64]) -> Vec<f64> {
     product(n, |i, k| half[i * n + k], |k, j| slope(j, k))
 }
 
-/// The coordinate that moves against the one with index `index`: a_1 against every
-/// other a_i. Oversampled rigs fix the sum of the a_i to many digits and what is
-/// left to fewer; damped in proportion to the former, the latter would never move.
+/// The coordinate that changes against the one with index `index`: a_1 against every other a_i. On
+/// oversampled plants the sum of the a_i is determined to many more digits than their differences; damping in
+/// proportion to the sum would freeze the differences.
 fn held_sum(model: &Model, index: usize) -> Option<usize> {
     // The constant comes before a_1.
     (2..=model.a.len()).contains(&index).then_some(1)
@@ -533,8 +532,7 @@ mod tests {
     use crate::data::Use;
     use crate::model::Start;
 
-    /// A motor's position at 1 kHz: a_1 + a_2 is 1 to many digits, and what the fit
-    /// is after, the damping, lies in the rest.
+    /// A motor's position at 1 kHz: a_1 + a_2 = 1 to many digits, and the damping lies in the difference.
     #[test]
     fn the_damping_of_an_oversampled_integrator_is_found() {
         let u: Vec<f64> = (0..4000)
@@ -566,8 +564,8 @@ mod tests {
         assert!(fitted.standard_error(1).is_some_and(|error| error < 1e-4));
     }
 
-    /// A fixed delay that the search hands over is a whole number of samples; there, the
-    /// free run has a kink, and the derivative must not be 0.
+    /// A fixed delay is a whole number of samples at the start, where the free run has a kink; its derivative
+    /// must not be 0.
     #[test]
     fn a_delay_leaves_the_whole_sample_that_it_set_out_from() {
         let u: Vec<f64> = (0..3000)

@@ -1,8 +1,8 @@
-//! The leanest bilinear model: one lag each, one input.
+//! The base model of the lowest order: bilinear, one lag each, one input.
 //!
-//! A model with many free lags imitates slow effects (theory 4.2: what is left
-//! of a plenum's droop behind 18 free coefficients is a twentieth). The leanest
-//! model has nothing to imitate with, so what it lacks stays visible.
+//! A high-order model imitates slow effects: 18 free coefficients leave a twentieth of a plenum's droop
+//! visible (theory 4.2). The lowest-order model cannot imitate, so that a missing effect stays visible in its
+//! residual.
 
 use super::rules::RULES;
 use super::starts::starts;
@@ -55,8 +55,8 @@ pub fn lean_base(given: &Model, records: &[&Record]) -> Result<Fit, SimulateErro
     }
 }
 
-/// Lean models with a fixed delay that know nothing but the level of y: delays
-/// spread evenly, and `given`'s own, with several time constants each.
+/// Starting models with a fixed delay that use only the level of y: equally spaced delays and that of
+/// `given`, with several time constants each.
 pub(super) fn fresh_starts(given: &Model, records: &[&Record]) -> Vec<Model> {
     let level = steady_level(records);
     let start = |delay: u16, time_constant: f64| {
@@ -89,9 +89,8 @@ pub(super) fn fresh_starts(given: &Model, records: &[&Record]) -> Vec<Model> {
     pairs.collect()
 }
 
-/// What |y| settles at under u = 1: the 95 % quantile of |y/u| while the input is
-/// at least half as strong as it ever is (under a weak one, y is still on its way
-/// down from a strong one).
+/// Steady |y| under u = 1: the 95 % quantile of |y/u| while the input is at least half of its maximum. Under
+/// a weaker input y may still be decaying from a stronger one.
 fn steady_level(records: &[&Record]) -> f64 {
     let samples = || {
         let pairs = records
@@ -109,7 +108,7 @@ fn steady_level(records: &[&Record]) -> f64 {
     ratios.get(at).copied().unwrap_or(1.0)
 }
 
-/// Moves a fixed first delay in ever smaller steps as long as the free run gains.
+/// Moves a fixed first delay in decreasing steps while the free-run error falls.
 ///
 /// # Errors
 /// As [`fit`].
@@ -122,7 +121,7 @@ pub fn settle_fixed_delay(
         iterations: RULES.settling,
         ..*options
     };
-    // A record that begins in mid-run is judged after the longest delay only.
+    // A record that starts in mid-run is scored after the longest delay only.
     let shortest = records.iter().map(|r| r.len()).min().unwrap_or(0);
     let most = i32::try_from(shortest / 4).unwrap_or(i32::MAX);
     for step in RULES.delay_steps.map(|step| step as i32) {
@@ -156,7 +155,7 @@ pub fn settle_fixed_delay(
     fit(&best.model, records, options)
 }
 
-/// The model with a delay law of the kind `given` has, from several starts.
+/// The model with the kind of delay law of `given`, fitted from several starts.
 pub(super) fn with_law_of(
     model: &Model,
     given: &Model,
@@ -187,7 +186,7 @@ pub(super) fn with_law_of(
                 delay,
                 ..model.clone()
             };
-            // A law from which the free run diverges is no place to start.
+            // A law with which the free run diverges is no starting point.
             fit(&model, records, &FitOptions::default()).ok()
         })
         .collect();

@@ -1,28 +1,30 @@
-//! Scatter of the level between repeats: the tunnel's speed never comes back exactly, and a mean over repeats
-//! keeps a share of that all through its record.
+//! Scatter of the level between repeats: operating conditions never repeat exactly, and an average over
+//! repeats retains part of that scatter throughout its record.
 //!
-//! A standard error that grows with y says that it is there, σ² = A + B·y². Noise that is only louder at a high level
-//! says so too, but equally in every record, as each has many independent samples of it; of what is drawn once
-//! a repeat a record has no more samples than repeats, and B differs from record to record.
+//! Standard errors that grow with y reveal it: σ² = A + B·y². Noise that is merely stronger at a high level
+//! gives the same B in every record, because each record has many independent samples of it. Scatter drawn
+//! once per repeat gives only as many samples as there are repeats, so that B varies from record to record.
 //!
-//! The error of a record is then g·y + noise with g drawn once. Generalised least squares weighs what lies along y by
-//! what it scatters: that part of errors and derivatives is shrunk, and sums of squares are taken of the rest as ever.
+//! The error of a record is then g·y + noise with one random g. Generalised least squares weights the
+//! component along y by the scatter's variance: that component of errors and derivatives is shrunk before
+//! sums of squares are formed.
 
 use super::rules::RULES;
 use crate::data::Record;
 use crate::linalg::dot;
 
-/// How the level of a record scatters, and the noise beside it.
+/// The relative scatter of a record's level, and the remaining noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevelScatter {
-    /// √B: standard deviation of a record's level, relative to itself.
+    /// √B: relative standard deviation of a record's level.
     pub deviation: f64,
-    /// A: variance of the noise beside it, y².
+    /// A: variance of the remaining noise, y².
     noise: f64,
 }
 
 impl LevelScatter {
-    /// What the standard errors of `records` say; none where the level does not scatter, or nobody knows.
+    /// Estimated from the standard errors of `records`; none if the level does not scatter or they do not
+    /// show it.
     #[must_use]
     pub fn of(records: &[Record]) -> Option<Self> {
         let each: Option<Vec<Growth>> = records.iter().map(Growth::of).collect();
@@ -40,13 +42,15 @@ impl LevelScatter {
         })
     }
 
-    /// What of the energy along y is left out, when its sum of squares is `square` of means over `stride` samples.
+    /// The part of the energy along y that is not counted, when the sum of squares of y is `square` over
+    /// means of `stride` samples.
     fn left_out(&self, square: f64, stride: usize) -> f64 {
         let scatter = self.deviation * self.deviation * square * stride as f64;
         scatter / (scatter + RULES.correlated * self.noise)
     }
 
-    /// The sum of squares of an error with `squares` and with `product` with a y of `square`.
+    /// The sum of squares of an error with energy `squares` and inner product `product` with a y of energy
+    /// `square`.
     pub(crate) fn sum_of_squares(&self, squares: f64, product: f64, square: f64) -> f64 {
         if square > 0.0 {
             squares - self.left_out(square, 1) * product * product / square
@@ -55,7 +59,7 @@ impl LevelScatter {
         }
     }
 
-    /// Shrinks what of `series` lies along `y`, both of them means over `stride` samples.
+    /// Shrinks the component of `series` along `y`, both as means over `stride` samples.
     pub(crate) fn shrink(&self, series: &mut [f64], y: &[f64], stride: usize) {
         let square = dot(y, y);
         if square > 0.0 {
@@ -67,7 +71,8 @@ impl LevelScatter {
         }
     }
 
-    /// Takes from the variances of a record what its level scatters by, leaving at least a small share of each.
+    /// Subtracts the scatter of the level from the variances of a record, leaving at least a small share of
+    /// each.
     pub(crate) fn take_from(&self, variances: &mut [f64], y: &[f64]) {
         for (variance, y) in variances.iter_mut().zip(y) {
             let rest = *variance - (self.deviation * y).powi(2);
@@ -76,17 +81,17 @@ impl LevelScatter {
     }
 }
 
-/// How the standard error of one record grows with y, by least squares.
+/// Growth of one record's standard error with y, by least squares.
 struct Growth {
     /// Mean σ².
     variance: f64,
     b: f64,
-    /// The share of σ² that B·y² is.
+    /// The share of B·y² in σ².
     share: f64,
 }
 
 impl Growth {
-    /// `None` without standard errors, or where y does not move.
+    /// `None` without standard errors, or if y is constant.
     fn of(record: &Record) -> Option<Self> {
         let (n, sd) = (record.len() as f64, record.y_sd.as_ref()?);
         let variances: Vec<f64> = sd.iter().map(|sd| sd * sd).collect();
@@ -107,8 +112,8 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// Means of 20 repeats with coloured noise; in some the level scatters from repeat to repeat, in others
-    /// the noise is louder where y is high.
+    /// Averages over 20 repeats with coloured noise; in some records the level scatters between repeats, in
+    /// others the noise is stronger at high y.
     fn records(scatter: f64, louder: f64) -> Vec<Record> {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let mut normal = move || (0..12).map(|_| rng.random_range(-0.5..0.5)).sum::<f64>();
@@ -159,8 +164,8 @@ mod tests {
         assert_eq!(LevelScatter::of(&records(0.0, 0.0)), None);
     }
 
-    /// What lies along y loses what scatter explains of it, what lies across stays; and the sum of squares is the same
-    /// from products as from the shrunk series.
+    /// The component along y loses the explained part, the orthogonal one is unchanged, and products and
+    /// shrunk series give the same sum of squares.
     #[test]
     fn only_what_lies_along_y_is_shrunk() {
         let y: Vec<f64> = (0..400).map(|k| f64::from(k % 2)).collect();
@@ -172,7 +177,7 @@ mod tests {
         let series: Vec<f64> = y.iter().zip(&across).map(|(a, b)| 3.0 * a + b).collect();
         let mut shrunk = series.clone();
         scatter.shrink(&mut shrunk, &y, 1);
-        // Scatter and noise weigh the same there: half of the energy stays.
+        // Scatter and noise have equal weights: half of the energy remains.
         assert!((shrunk[1] - 3.0 * 0.5_f64.sqrt()).abs() < 1e-12);
         assert!((shrunk[0] - 1.0).abs() < 1e-12);
         let sum = scatter.sum_of_squares(dot(&series, &series), dot(&series, &y), dot(&y, &y));

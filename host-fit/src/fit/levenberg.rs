@@ -1,27 +1,26 @@
-//! Levenberg–Marquardt within bounds, on sums of squares that come in parts.
+//! Levenberg–Marquardt with bounds, on sums of squares that come in parts.
 //!
-//! Damped by the diagonal of JᵀJ (Marquardt 1963); a coordinate that would leave its
-//! bounds is held there and the others are solved again. A [`LeastSquares`] problem
-//! linearises itself one part (one record) at a time, so that parts can be run side by
-//! side and a cost that is too high is given up early.
+//! Damping by the diagonal of JᵀJ (Marquardt 1963). A coordinate that would leave its bounds is held there
+//! and the others are solved again. A [`LeastSquares`] problem is linearised one part (record) at a time, so
+//! that parts run in parallel and a cost that is too high is abandoned early.
 
 use super::rules::RULES;
 use crate::linalg::{dot, solve_symmetric};
 
-// The way to a minimum, and no rules: other values take more iterations and end in the same place.
+// These constants change the number of iterations, not the minimum, and are therefore no rules.
 
 /// First damping, as a share of the diagonal of JᵀJ.
 const FIRST_DAMPING: f64 = 1e-3;
-/// Damping after a step that helped, as a share of what it was, and its least value.
+/// Factor on the damping after a successful step, and its least value.
 const LESS_DAMPING: f64 = 0.2;
 const LEAST_DAMPING: f64 = 1e-9;
-/// Damping after a step that did not help, as a multiple of what it was; beyond the
-/// largest value a step is too short to matter.
+/// Factor on the damping after an unsuccessful step, and its largest value, beyond which steps are
+/// negligible.
 const MORE_DAMPING: f64 = 6.0;
 const LARGEST_DAMPING: f64 = 1e8;
-/// Steps tried from one linearisation.
+/// Most steps tried from one linearisation.
 const TRIES: usize = 10;
-/// Added to the diagonal, so that a coordinate without influence stays where it is.
+/// Added to the diagonal, so that a coordinate without influence does not move.
 const FLOOR: f64 = 1e-12;
 
 /// Why a fit ended.
@@ -31,14 +30,14 @@ const FLOOR: f64 = 1e-12;
 pub enum FitStop {
     /// An iteration lowered the sum of squares by less than the tolerance.
     Converged,
-    /// The residual is orthogonal to everything that the free coordinates can do.
+    /// The residual is orthogonal to all derivatives of the free coordinates.
     Stationary,
     /// No coordinate is free to move.
     NothingToFit,
-    /// As many iterations as allowed.
+    /// The iteration limit was reached.
     IterationLimit,
-    /// No step lowers the sum of squares, and yet it is not stationary: it is rougher
-    /// than its derivatives say.
+    /// No step lowers the sum of squares although its gradient is not 0: it is rougher than its derivatives
+    /// indicate.
     NoDescent,
     /// The derivatives grow without bound.
     Diverged,
@@ -84,7 +83,7 @@ pub(crate) struct Part {
 pub(crate) trait LeastSquares {
     /// Number of coordinates that are searched.
     fn free(&self) -> usize;
-    /// Σ r² at `values`; infinite where the model diverges, and not summed beyond `enough`.
+    /// Σ r² at `values`; infinite where the model diverges. The sum may stop once it exceeds `enough`.
     fn cost(&self, values: &[f64], enough: f64) -> f64;
     /// All parts at `values`; `None` where the model diverges.
     fn linearise(&self, values: &[f64]) -> Option<Vec<Part>>;
@@ -94,14 +93,14 @@ pub(crate) trait LeastSquares {
     fn moved(&self, values: &[f64], step: &[f64]) -> Vec<f64>;
 }
 
-/// Where a minimisation ended.
+/// Result of a minimisation.
 pub(crate) struct Descent {
     pub(crate) values: Vec<f64>,
     pub(crate) cost: f64,
     pub(crate) iterations: usize,
     pub(crate) stop: FitStop,
-    /// The last linearisation and its JᵀJ (row-major); one iteration old where that
-    /// lowered the cost.
+    /// The last linearisation and its JᵀJ (row-major); from before the last iteration if that lowered the
+    /// cost.
     pub(crate) linearised: Option<(Vec<Part>, Vec<f64>)>,
 }
 
@@ -175,7 +174,7 @@ pub(crate) fn minimise(
     }
 }
 
-/// Whether the residual is orthogonal to every column of J along which the bounds leave room.
+/// Whether the residual is orthogonal to every column of J that the bounds leave free.
 fn is_stationary(a: &[f64], g: &[f64], reach: &[(f64, f64)], cost: f64) -> bool {
     let n = g.len();
     (0..n).all(|i| {
@@ -204,8 +203,8 @@ fn normal_equations(parts: &[Part], n: usize) -> (Vec<f64>, Vec<f64>) {
     (information, gradient)
 }
 
-/// The minimiser of ½ sᵀ·A·s − gᵀ·s within bounds: coordinates that would leave
-/// are held at their bound and the others solved again.
+/// The minimiser of ½ sᵀ·A·s − gᵀ·s within bounds: coordinates that would leave are held at their bound and
+/// the others solved again.
 fn bounded_step(a: &[f64], g: &[f64], reach: &[(f64, f64)]) -> Option<Vec<f64>> {
     let n = g.len();
     let mut held: Vec<Option<f64>> = vec![None; n];
@@ -242,7 +241,7 @@ mod tests {
     use super::*;
     use crate::linalg::inverse_where_known;
 
-    /// A curve through points, free of bounds unless given.
+    /// A curve fitted through points, unbounded by default.
     struct Curve {
         points: Vec<(f64, f64)>,
         /// The curve and its slopes along the parameters.
@@ -264,7 +263,7 @@ mod tests {
         fn cost(&self, values: &[f64], _: f64) -> f64 {
             self.sum(values)
         }
-        /// Two parts, to see that parts add up.
+        /// Two parts, to test the summation over parts.
         fn linearise(&self, values: &[f64]) -> Option<Vec<Part>> {
             let (first, second) = self.points.split_at(self.points.len() / 3);
             let part = |points: &[(f64, f64)]| {
@@ -298,7 +297,7 @@ mod tests {
         y: &'static [f64],
         x: &'static [f64],
         model: fn(&[f64], f64) -> (f64, Vec<f64>),
-        /// From far and from near.
+        /// Starts far from and near the solution.
         starts: [&'static [f64]; 2],
         certified: &'static [f64],
         deviations: &'static [f64],
@@ -478,7 +477,7 @@ mod tests {
             let (name, n) = (reference.name, reference.certified.len());
             let curve = curve(reference);
             for start in reference.starts {
-                // From far off two of the problems lead into flat country.
+                // From the far start two of the problems end on a plateau.
                 if matches!(name, "BoxBOD" | "MGH10") && start == reference.starts[0] {
                     continue;
                 }
@@ -510,7 +509,7 @@ mod tests {
         }
     }
 
-    /// With b1 held below its minimum the other parameter takes what is left.
+    /// With b1 bounded below its optimum, the other parameter compensates.
     #[test]
     fn a_bound_holds_one_coordinate_and_the_others_go_on() {
         let mut curve = curve(&REFERENCES[0]);

@@ -3,33 +3,36 @@
 use crate::rules;
 
 rules! {
-    /// How models are fitted in free run, and what a fit is good for.
+    /// Output-error fits: iterations, starting points and standard errors.
     pub struct Rules in "fit";
 
-    /// A fit without a better step has a minimum when the cosines between the residual and all derivatives are below this.
-    stationary: f64 = 1e-6, "cosine", "judgement; held by the tests of `levenberg.rs`";
+    /// A fit without a better step has converged if the cosines between the residual and all derivatives are
+    /// below this.
+    stationary: f64 = 1e-6, "cosine", "judgement; tested in `levenberg.rs`";
     /// Most iterations of a fit.
     iterations: usize = 30, "", "judgement";
     /// A fit ends when an iteration lowers the sum of squares by less than this.
-    tolerance: f64 = 1e-5, "share of the sum of squares", "judgement: far below what a diagnosis can tell";
-    /// Times that a fit which finds no way down goes on with its delays held.
+    tolerance: f64 = 1e-5, "share of the sum of squares", "judgement: far below the resolution of a diagnosis";
+    /// If a fit finds no descent, it continues with delays held, at most so many times.
     held_delays: usize = 3, "", "judgement: each has to lower the error";
-    /// Iterations that every starting point is followed for before the best are chosen.
-    brief: usize = 4, "", "campaign, seed 33000: after one iteration a hysteresis lost its thresholds, after four it is found";
-    /// Iterations for a delay that is tried one step further.
+    /// Iterations from every starting point before the best are chosen.
+    brief: usize = 4, "", "campaign, seed 33000: a hysteresis is found with four iterations and not with one";
+    /// Iterations after moving a fixed delay by one step.
     settling: usize = 3, "", "judgement";
-    /// The steps in which a fixed delay is moved.
+    /// Steps by which a fixed delay is moved.
     delay_steps: [f64; 4] = [8.0, 4.0, 2.0, 1.0], "samples", "halving";
-    /// Half width of the secant by which a parameter that acts in steps is differentiated.
+    /// Half width of the secant for parameters that act in steps.
     secant: f64 = 0.01, "share of its range", "judgement";
-    /// Farthest that a logarithmic parameter goes in one iteration.
+    /// Largest change of a logarithmic parameter in one iteration.
     leap: f64 = 2.0, "ln", "judgement: a factor of 7";
-    /// Standard errors are summed over so many blocks of a record; the block length that says more counts, as noise may wander slowly …
-    batches: [usize; 2] = [40, 10], "", "blocks of a fortieth alone: 94 of 126 intervals of 95 % held the truth";
-    /// … and records are left out in turn, or pieces of them where there are fewer records than this, as what no model has lasts as long as a record.
-    left_out: usize = 5, "records", "on 13 rigs of seed 313131 blocks up to whole records held 18 of 24 truths, this 22";
+    /// Standard errors are summed over so many blocks of a record. The block length with the larger error
+    /// counts, because noise may vary slowly.
+    batches: [usize; 2] = [40, 10], "", "with 40 blocks alone, 94 of 126 intervals of 95 % contained the truth";
+    /// Standard errors are at least those of the jackknife over records, or over pieces of them if there are
+    /// fewer records than this, because unmodelled disturbances may last as long as a record.
+    left_out: usize = 5, "records", "13 rigs of seed 313131: 22 of 24 intervals contain the truth, 18 without the jackknife";
 
-    /// Starting points that are followed to the end, beside the best with each response to jets of part strength.
+    /// Starting points that are fitted in full, beside the best with each response to jets of part strength.
     followed: usize = 2, "", "judgement, on the campaign's rigs";
     /// Starting points that are tried with each response to jets of part strength.
     regraded: usize = 4, "", "judgement, on the campaign's rigs";
@@ -37,38 +40,41 @@ rules! {
     most_starts: usize = 12, "", "judgement, on the campaign's rigs";
     /// Starting points of a delay law.
     law_starts: usize = 3, "", "judgement, on the campaign's rigs";
-    /// Time constants from which the leanest model sets out.
+    /// Initial time constants of the lowest-order model.
     time_constants_s: [f64; 3] = [0.02, 0.06, 0.2], "s", "judgement, in steps of 3";
-    /// Longest delay from which it sets out; there are eight up to it.
+    /// Longest of its eight initial delays.
     longest_start_s: f64 = 0.12, "s", "twice the paper's delay";
-    /// A signal whose largest value lies between this …
+    /// Lower limit of the largest value of a signal of order one, for which the catalogue's ranges hold;
+    /// other signals are scaled.
     order_one_low: f64 = 0.3, "", "judgement: friction gains lie between";
-    /// … and this is of order one, as the catalogue's ranges are; others are scaled.
+    /// Upper limit of the largest value of a signal of order one.
     order_one_high: f64 = 3.0, "", "judgement: friction gains lie between";
-    /// An input is strong above this share of its largest, and y/u is then near the level that it settles at.
+    /// An input above this share of its maximum is strong: y/u is then near its steady value.
     strong_input: f64 = 0.5, "share of the largest |u|", "judgement";
-    /// The percentile of y/u under a strong input that is taken for that level.
+    /// The percentile of y/u under a strong input that is taken as the steady value.
     settled_percentile: usize = 95, "%", "judgement: what is above is noise";
 
-    /// Scatter of the level between repeats is looked for in so many records …
-    records_of_scatter: usize = 3, "records", "judgement: from fewer nobody can say whether it differs between them";
-    /// … it counts where it is this share of the noise …
-    share_of_scatter: f64 = 0.05, "share of the variance", "judgement: below it, it matters nowhere";
-    /// … and differs so much from record to record: noise that is louder at a high level does not.
+    /// Scatter of the level between repeats is estimated from at least so many records.
+    records_of_scatter: usize = 3, "records", "judgement: its variation between records is not measurable with fewer";
+    /// Scatter of the level counts if it is at least this share of the noise.
+    share_of_scatter: f64 = 0.05, "share of the variance", "judgement: negligible below";
+    /// Scatter of the level must vary between records by this much; noise that is stronger at a high level
+    /// does not.
     scatter_differs: f64 = 0.12, "share of its mean", "20 repeats: 0.3; 10 000 samples of noise with 40 ms: 0.03";
-    /// Noise beside it is at least this share of the variance.
-    noise_beside_scatter: f64 = 0.1, "share of the variance", "judgement: a standard error of 20 repeats is off by a sixth";
-    /// That noise is correlated over so many samples.
-    correlated: f64 = 40.0, "samples", "a hot film's at 1 kHz; four times as many double what is left along y";
+    /// The remaining noise is at least this share of the variance.
+    noise_beside_scatter: f64 = 0.1, "share of the variance", "judgement: a standard error of 20 repeats has an error of 16 %";
+    /// Correlation length assumed for the remaining noise.
+    correlated: f64 = 40.0, "samples", "a hot film at 1 kHz; a value four times as large doubles the weight of errors along y";
 
-    /// A lean model with effects is kept when its error is within this factor of the given structure's.
+    /// A lowest-order model with effects is kept if its error is within this factor of the given structure's.
     as_good: f64 = 1.02, "times the rms error", "judgement";
 
-    /// Runs that a record of a drifting rig is cut into.
+    /// Number of runs that a record of a drifting plant is divided into.
     pieces: usize = 20, "", "judgement; EMPS in docs/hidden-effects.md";
-    /// A piece is at least so many times the longest lag or delay, and follows the measurement for one part in so many
-    /// before it is scored.
+    /// A piece is at least this multiple of the longest lag or delay, and one part in so many precedes
+    /// scoring.
     memories: usize = 8, "", "judgement";
-    /// A rig drifts when more than this of what happened is left after a whole record.
-    drifts: f64 = 0.37, "share", "judgement; held by `an_integrator_drifts_and_a_damped_rig_does_not`";
+    /// A plant counts as drifting if more than this share of an initial disturbance remains after a whole
+    /// record.
+    drifts: f64 = 0.37, "share", "judgement; tested in `an_integrator_drifts_and_a_damped_rig_does_not`";
 }

@@ -7,7 +7,7 @@ use super::structure::{ExponentialDelay, FACTOR_STEP, InputDelay, Series, Struct
 use crate::averages::{averaged_past, moving_average};
 use model_core::average::WINDOW;
 
-/// Strength with which samples enter a sum of products.
+/// Weights of the samples in a sum of products.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Weights {
     /// 1 inside the intervals of each record, 0 outside.
@@ -68,7 +68,7 @@ fn intersection(a: &[(usize, usize)], b: &[(usize, usize)]) -> Vec<(usize, usize
     common
 }
 
-/// Where two binary sequences differ: start, end and the sign of `to − from`.
+/// Intervals in which two binary sequences differ, each with the sign of `to − from`.
 pub(crate) fn difference(
     from: &[(usize, usize)],
     to: &[(usize, usize)],
@@ -99,13 +99,13 @@ pub(crate) struct FitSignals {
     pub(crate) y: Vec<Vec<f64>>,
     /// h̃_k from the measured output, samples; empty for fixed delays.
     pub(crate) base_delay: Vec<Vec<f64>>,
-    /// Its smallest and largest value in each stretch of [`STRETCH`] samples.
+    /// Smallest and largest of `base_delay` in each block of [`STRETCH`] samples.
     base_range: Vec<Vec<(f64, f64)>>,
     /// Where the input changes.
     pub(crate) edges: Vec<Vec<usize>>,
     /// Whether every input is 0 or 1.
     binary: bool,
-    /// Rows at the start of each record that are not fitted.
+    /// Number of rows at the start of each record that are not fitted.
     pub(crate) skipped: usize,
 }
 
@@ -210,9 +210,9 @@ impl FitSignals {
         Weights::Intervals(self.u.iter().enumerate().map(arrived).collect())
     }
 
-    /// For each edge of u the samples, `(first, end)`, at which it may arrive; in
-    /// ascending order. Before them it has not arrived, at the last of them it has:
-    /// elsewhere nothing changes.
+    /// For each edge of u the interval `(first, end)` of samples in which it may arrive, ascending: it has
+    /// not arrived before `first` and has arrived at `end`. Outside these intervals the arrived command is
+    /// constant.
     fn undecided(&self, record: usize, factor: f64, tick: i64, rows: usize) -> Vec<(usize, usize)> {
         let stretches = self.base_range.get(record).map(Vec::as_slice);
         let delays = |(low, high)| (delay_samples(factor, low), delay_samples(factor, high));
@@ -222,7 +222,7 @@ impl FitSignals {
         };
         let window = |edge: &usize| {
             let (mut first, mut last) = (edge + whole.0, edge + whole.1);
-            // The delays within the window are closer together than those of the record.
+            // The range of delays within the window is smaller than that of the whole record.
             if let Some(stretches) = stretches {
                 for _ in 0..REFINEMENTS {
                     if first == last || first >= rows {
@@ -291,10 +291,10 @@ pub(crate) fn core_law(law: &ExponentialDelay, factor: f64) -> CoreLaw {
     }
 }
 
-/// Samples that share one smallest and largest delay.
+/// Samples per block with a common range of delays.
 const STRETCH: usize = 16;
 
-/// How often a window is narrowed; more would rarely find anything.
+/// Number of refinements of an arrival interval; more rarely narrow it further.
 const REFINEMENTS: usize = 3;
 
 /// Smallest and largest of some delays.
@@ -355,8 +355,8 @@ mod tests {
         }
     }
 
-    /// A law steep enough, and factors large enough, that delays move by several
-    /// samples a sample and an edge arrives more than once.
+    /// A steep law with large factors, whose delay changes by several samples per sample, so that an edge
+    /// arrives more than once.
     #[test]
     fn narrowed_windows_miss_no_arrival() {
         let law = ExponentialDelay {

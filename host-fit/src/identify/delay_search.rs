@@ -83,7 +83,7 @@ pub(crate) fn search(
         interrupt,
     );
     if free.best.is_none() {
-        // Interrupted in the first stage: its best is the best so far.
+        // Interrupted in the first stage: its best point is the result.
         free.best = report.best.map(|best| {
             let delays = free_run.regression.layout.delays(&best.point);
             let value = match free_run.epsilon(&delays, f64::INFINITY) {

@@ -1,4 +1,4 @@
-//! Why an identification cannot be made, found out before the search or after it.
+//! Errors of an identification, detected before or after the search.
 
 use thiserror::Error;
 
@@ -20,7 +20,7 @@ pub enum IdentifyError {
         "the data set has no record with use \"identify\". Mark at least one record so in dataset.toml."
     )]
     NoRecords,
-    /// A structure that makes no sense.
+    /// An invalid structure.
     #[error("{what}. {remedy}")]
     Structure {
         /// What is wrong.
@@ -62,9 +62,9 @@ pub enum IdentifyError {
         /// `u` or `y`.
         signal: &'static str,
     },
-    /// The input never changes.
+    /// The command u never changes.
     #[error(
-        "the command u never changes in the identify records, so no input delay can be found. \
+        "the command u never changes in the identify records, so no input delay is identifiable. \
          Add a record with switching, or use --n3 0."
     )]
     ConstantInput,
@@ -89,7 +89,7 @@ pub enum IdentifyError {
 }
 
 impl IdentifyError {
-    /// The record that is at fault, if it is one alone.
+    /// The one record at fault, if the error is about a single record.
     #[must_use]
     pub fn record(&self) -> Option<&str> {
         match self {
@@ -99,7 +99,7 @@ impl IdentifyError {
     }
 }
 
-/// Refuses data and structures that no search can make a model of.
+/// Rejects data and structures from which no model can be identified.
 pub(crate) fn check(records: &[&Record], structure: &Structure) -> Result<(), IdentifyError> {
     let refuse = |what: String, remedy: &str| {
         Err(IdentifyError::Structure {
@@ -176,7 +176,7 @@ pub(crate) fn check(records: &[&Record], structure: &Structure) -> Result<(), Id
     }
     let constant = |r: &&Record| r.u.iter().all(|u| Some(u) == r.u.first());
     let same = records.iter().all(|r| r.u.first() == records[0].u.first());
-    // From rest, a command that is on from the start is a step.
+    // With rest before the record, a command that is on from the start is a step.
     let rises = structure.skipped() == 0
         && records
             .iter()

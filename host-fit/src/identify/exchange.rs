@@ -1,9 +1,8 @@
-//! Exchange steps for the one-step objective: the best single lag, pair of lags
-//! or input delay in place of present ones, judged for all lags at once.
+//! Exchange steps for the one-step objective: the best single lag, pair of lags or input delay in place of
+//! present ones, evaluated for all lags at once.
 //!
-//! With the other regressors factorised, what a new regressor explains is one
-//! forward substitution and one division; it runs over a whole row of the table,
-//! that is over all lags, at a time.
+//! With the other regressors factorised, the gain of a new regressor takes one forward substitution and one
+//! division, done for a whole row of the table (all lags) at a time.
 
 use super::arrival::Weights;
 use super::lagged_products::{ONE, TARGET, Table};
@@ -31,13 +30,13 @@ pub(crate) struct Slot {
     pub(crate) index: usize,
 }
 
-/// What all lags of a list would add to a set of regressors.
+/// The gain of every lag of a list beside a set of regressors.
 struct Projected {
     /// Per input of the block, per kept regressor: projections, one per lag.
     rows: Vec<Vec<Vec<f64>>>,
-    /// Per input: product with what is left of the target, one per lag.
+    /// Per input: product with the residual of the target, one per lag.
     target: Vec<Vec<f64>>,
-    /// Squared length left, one per lag, for blocks of one regressor.
+    /// Squared length after projection, one per lag, for blocks of one regressor.
     left: Vec<f64>,
 }
 
@@ -83,8 +82,8 @@ impl<'a> Exchange<'a> {
             if let Some((lag, residual)) = self.best_single(delays, *slot)
                 && residual < best * (1.0 - NEGLIGIBLE)
             {
-                // Smooth records are badly conditioned: what the update promises
-                // is believed only if the residual itself falls.
+                // Smooth records are badly conditioned: an update is accepted only if the recomputed residual
+                // falls.
                 let before = delays.clone();
                 set(delays, *slot, lag);
                 let reached = self.residual(delays);
@@ -156,10 +155,9 @@ impl<'a> Exchange<'a> {
         sort(delays);
     }
 
-    /// All slots that lags can go to.
+    /// All slots that can hold a lag.
     ///
-    /// Lags that had become equal are one in the list: the slots that this left
-    /// empty come after it, so that they can be filled again.
+    /// Equal lags are merged in the list; the freed slots follow it, so that they can be filled again.
     pub(crate) fn slots(&self, delays: &Delays) -> Vec<Slot> {
         let layout = &self.regression.layout;
         let slots = |list: List, lags: usize, wanted: usize| {
@@ -242,7 +240,7 @@ impl<'a> Exchange<'a> {
             let (left, target) = (a.left[c], a.target[0][c]);
             let alone = gain(target, left);
             for d in if same { c + 1..lags } else { 0..lags } {
-                // What the second adds once the first is in.
+                // The additional gain of the second lag beside the first.
                 let share = cross[d] / left;
                 let left_d = b.left[d] - share * cross[d];
                 let target_d = b.target[0][d] - share * target;
@@ -405,7 +403,7 @@ impl<'a> Exchange<'a> {
         Some(projected)
     }
 
-    /// What one lag explains through all inputs together.
+    /// The gain of one lag through all inputs together.
     fn block_gain(&self, projected: &Projected, inputs: &[usize], c: usize) -> Option<f64> {
         let q = inputs.len();
         let element = self.regression.layout.element(c as u16 + 1);
@@ -463,7 +461,7 @@ pub(crate) fn set(delays: &mut Delays, slot: Slot, lag: u16) {
     };
     match list.get_mut(slot.index) {
         Some(place) => *place = lag,
-        // A slot whose lag had become equal to another's.
+        // The slot is free because its lag had become equal to another.
         None => list.push(lag),
     }
 }
@@ -484,7 +482,7 @@ pub(crate) fn best_input(
     screened: &mut usize,
 ) -> Option<(i64, f64)> {
     let per_sample = regression.signals.ticks_per_sample();
-    // Without on/off edges a scan sums over all samples: go in whole samples first.
+    // Without on/off edges each point of a scan sums over all samples: whole samples first.
     let graded = matches!(regression.signals.arrived(0), Weights::Samples(_));
     let mut stride = (per_sample * if graded { 8.0 } else { 0.5 }).max(1.0) as i64;
     let (mut low, mut high) = bounds;
@@ -545,7 +543,7 @@ mod tests {
         Regression::new(&[Series { u: &u, y: &y }], &structure)
     }
 
-    /// Every exchange formula against plain evaluation of every candidate.
+    /// The exchange formulas agree with the evaluation of every candidate.
     #[test]
     fn singles_and_pairs_equal_trying_every_lag() {
         for (inputs, ticks) in [(1, vec![11]), (2, vec![5, 11])] {

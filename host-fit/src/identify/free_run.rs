@@ -15,7 +15,7 @@ pub(crate) struct FreeRun {
 }
 
 impl FreeRun {
-    /// ε of a candidate, not below `give_up_at` once that is known.
+    /// ε of a candidate; may stop with a value ≥ `give_up_at`.
     pub(crate) fn epsilon(&self, delays: &Delays, give_up_at: f64) -> Evaluation {
         let (solution, _) = self.regression.normal(delays).solve();
         let coefficients = Coefficients::new(&solution, delays);
@@ -26,7 +26,7 @@ impl FreeRun {
         {
             RunOutcome::Squared(sum) => Evaluation::Value(sum.sqrt()),
             RunOutcome::AtLeast(_) => Evaluation::AtLeast(give_up_at),
-            // One that diverges at the very end gets half, so that a search can leave the unstable region.
+            // Half the value if it diverges only at the end, so that a search can leave the unstable region.
             RunOutcome::Diverged(done) => {
                 Evaluation::Value(self.runner.diverged * (1.0 - 0.5 * done))
             }

@@ -9,7 +9,7 @@ use super::linearised::Linearised;
 use super::rules::RULES;
 use crate::search::{Around, Evaluator, Point, SearchStep, StopReason, Success};
 
-/// From the best of the predicted lags on, these steps are tried.
+/// Steps tried around the best of the predicted lags.
 const AROUND: [i32; 6] = [-1, 1, -2, 2, -4, 4];
 
 /// Search step: exchanges lags where the linearised free run predicts the best.
@@ -43,8 +43,7 @@ fn settled(best: Success, around: &Around<'_>) -> (Point, Option<Success>) {
     (best.point.clone(), better.then_some(best))
 }
 
-/// Sweeps over all slots from a candidate until a sweep gains little, or until
-/// `hopeless` says that it is not worth going on.
+/// Sweeps over all slots until the gain of a sweep is small or `hopeless` returns true.
 fn descend(
     evaluator: &mut Evaluator<'_, FreeRun>,
     mut best: Success,
@@ -74,7 +73,7 @@ fn descend(
                 .map(|lag| with_lag(evaluator.problem(), &delays, slot, *lag))
                 .collect();
             let found = best_of(evaluator, &trials, &mut best)?;
-            // Walk on from the best lag of the slot, whether it is new or not.
+            // Continue from the best lag of the slot, new or not.
             let mut lag = match found {
                 Some(at) => minima[at],
                 None => lag_in(&delays, slot),
@@ -106,7 +105,7 @@ fn descend(
     Ok(best)
 }
 
-/// Evaluates all points and keeps the best; gives the place of a better one.
+/// Evaluates all points; returns the best if it improves.
 fn best_of(
     evaluator: &mut Evaluator<'_, FreeRun>,
     points: &[Point],
@@ -143,8 +142,7 @@ fn lag_in(delays: &Delays, slot: Slot) -> u16 {
     list.get(slot.index).copied().unwrap_or(1)
 }
 
-/// The deepest minima of the predicted ε over the lag in a slot, as far as they
-/// are below a value.
+/// The deepest local minima over the lag of the predicted ε in a slot, below a threshold.
 fn predicted_minima(
     problem: &FreeRun,
     linearised: &mut Linearised,
@@ -205,17 +203,16 @@ fn walk_inputs(
     Ok(best)
 }
 
-/// Search step: a variable neighbourhood search whose kicks are informed. From a
-/// local optimum a few lags go to other minima of the prediction, so that most
-/// kicks lead to models that do not diverge, and a descent follows. Gives up
-/// after `patience` fruitless kicks or `most` kicks in all.
+/// Search step: a variable neighbourhood search with informed kicks. A few lags of a local optimum move to
+/// other minima of the prediction, which mostly avoids diverging models, and a descent follows. Ends after
+/// `patience` kicks without improvement or `most` kicks in all.
 pub(crate) struct FreeKickStep {
     patience: usize,
     most: usize,
     fruitless: usize,
     kicks: usize,
     screened: usize,
-    /// The incumbent's linearisation, for all kicks from it.
+    /// The linearisation at the incumbent, reused for all kicks.
     linearised: Option<(Point, Linearised)>,
 }
 

@@ -1,12 +1,10 @@
-//! Free runs of candidates, fast: the innermost loop of the free-run search.
+//! Fast free runs of candidates: the inner loop of the free-run search.
 //!
-//! The recursion is that of `model-core`, taken in blocks of samples. A lag
-//! longer than the block reads outputs that are known before it begins, so its
-//! terms are added to all samples of the block at once; only the short lags go
-//! sample by sample. Where the delay decides whether an edge has arrived, a block
-//! is run with the delay of its first sample and, should the delay have moved
-//! within it, again sample by sample. Terms are added in another order than in
-//! `model-core`: the last bits differ, which a search does not see.
+//! The recursion of `model-core`, in blocks of samples. Lags longer than the block read outputs known before
+//! it, so their terms are added to all its samples at once; short lags are added sample by sample. If the
+//! delay decides whether an edge has arrived, a block is run with the delay of its first sample, and again
+//! sample by sample if the delay changes within it. The order of additions differs from `model-core`: the
+//! last bits differ, which does not affect a search.
 
 use model_core::delay::DelayLaw as _;
 
@@ -20,14 +18,14 @@ use model_core::average::WINDOW;
 /// Samples computed together at most.
 const BLOCK: usize = 32;
 
-/// What a simulation came to.
+/// Result of a simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum RunOutcome {
     /// Σ (y − y_sim)² over all records.
     Squared(f64),
-    /// Given up once the sum had reached this.
+    /// Stopped when the sum reached this value.
     AtLeast(f64),
-    /// Left all bounds, with this share of the samples done.
+    /// Diverged after this share of the samples.
     Diverged(f64),
 }
 
@@ -50,8 +48,8 @@ pub(crate) struct FreeRunner {
     samples: usize,
 }
 
-/// Lags behind the newest output and what multiplies them: the newest output itself,
-/// the others shorter than a block, and those that are known before a block begins.
+/// Lags behind the newest output with their multipliers: the newest output itself, lags shorter than a block,
+/// and lags known before a block begins.
 struct Terms {
     newest: f64,
     near: Vec<(usize, f64)>,
@@ -117,12 +115,11 @@ impl Recursion {
         }
     }
 
-    /// Computes the `count` values that follow place `at`, at most [`BLOCK`].
-    /// `arrived` are the commands of each input at these steps.
+    /// Computes the `count` (at most [`BLOCK`]) values that follow position `at`; `arrived` are the commands
+    /// of each input at these steps.
     ///
-    /// All that does not wait for the value before is summed for the whole block first;
-    /// what is left for each step is one multiplication and one addition, and the few
-    /// terms of lags within the block.
+    /// Terms that do not depend on values of the block are summed for the whole block first. Each step then
+    /// takes one multiply-add and the few lags within the block.
     #[inline(always)]
     fn run(&self, outputs: &mut [f64], at: usize, count: usize, arrived: &[[f64; BLOCK]]) {
         let mut known = [self.constant; BLOCK];
@@ -179,7 +176,7 @@ impl Arrival {
         }
     }
 
-    /// The delay in samples where it follows the value given.
+    /// The delay in samples for a value of the signal that it depends on.
     #[inline(always)]
     fn delay(&self, follows: f64) -> usize {
         match &self.law {
@@ -189,7 +186,7 @@ impl Arrival {
     }
 }
 
-/// Where the delay decides whether an edge has arrived, in ascending order.
+/// Intervals in which the delay decides whether an edge has arrived, ascending.
 fn undecided(edges: &[usize], arrivals: &[Arrival]) -> Vec<(usize, usize)> {
     let mut all: Vec<(usize, usize)> = arrivals
         .iter()
@@ -202,14 +199,14 @@ fn undecided(edges: &[usize], arrivals: &[Arrival]) -> Vec<(usize, usize)> {
     all
 }
 
-/// Largest |y| of the records, whatever its unit.
+/// Largest |y| of the records.
 fn largest_output(signals: &FitSignals) -> f64 {
     let outputs = signals.y.iter().flatten();
     let largest = outputs.fold(0.0f64, |m, y| m.max(y.abs()));
     largest.max(f64::MIN_POSITIVE)
 }
 
-/// ε of a candidate that diverges at once: beyond that of any that does not.
+/// ε assigned to a candidate that diverges at once: larger than that of any bounded run.
 pub(crate) fn diverged_value(signals: &FitSignals) -> f64 {
     1e9 * largest_output(signals)
 }
@@ -265,7 +262,7 @@ struct BlockRun<'a> {
 const AVERAGED: usize = WINDOW as usize - 1;
 
 impl BlockRun<'_> {
-    /// What the delay follows at the step that place `at` holds, given ỹ's sum.
+    /// The signal on which the delay depends at position `at`, given the sum of ỹ.
     #[inline(always)]
     fn follows(&self, outputs: &[f64], at: usize, sum: f64) -> f64 {
         let follows = if self.runner.structure.averaged {
@@ -276,7 +273,7 @@ impl BlockRun<'_> {
         follows.max(0.0)
     }
 
-    /// The delays of all inputs there.
+    /// The delays of all inputs at that value.
     #[inline(always)]
     fn delays(&self, follows: f64, delays: &mut [usize]) {
         for (delay, arrival) in delays.iter_mut().zip(self.arrivals) {
@@ -317,7 +314,7 @@ impl pulp::NullaryFnOnce for BlockRun<'_> {
             }
             let undecided = undecided(&self.signals.edges[record], self.arrivals);
             let mut undecided = undecided.into_iter().peekable();
-            // Until here one sample is taken at a time, because the delay moves.
+            // Up to this position samples are computed one by one, because the delay changes.
             let mut singly = 0;
             let mut k = 0;
             while k < samples {
@@ -370,7 +367,7 @@ impl pulp::NullaryFnOnce for BlockRun<'_> {
                 let next = &mut outputs[at + 1..at + 1 + count];
                 let known = measured.get(k + 1..).unwrap_or_default();
                 let unjudged = self.signals.skipped.saturating_sub(k + 1);
-                // Until the past is recorded the run follows the measurement.
+                // During the lead-in the run is set to the measurement.
                 let follow = next.iter_mut().zip(known).take(unjudged);
                 follow.for_each(|(n, y)| *n = *y);
                 if beyond(next, *bound) {
@@ -394,7 +391,7 @@ impl pulp::NullaryFnOnce for BlockRun<'_> {
     }
 }
 
-/// Numbers taken side by side, so that sums do not wait for each other.
+/// Partial sums computed in parallel.
 const LANES: usize = 8;
 
 #[inline(always)]
@@ -426,15 +423,15 @@ fn squared_distance(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
-/// Whether any value is farther from 0 than `bound`, or none at all.
+/// Whether any value exceeds `bound` in magnitude or is NaN.
 #[inline(always)]
 fn beyond(values: &[f64], bound: f64) -> bool {
-    // Without a way out the loop runs on the vector unit.
+    // A loop without an early exit is vectorised.
     let inside = values.iter().fold(true, |all, y| all & (y.abs() <= bound));
     !inside
 }
 
-/// The command from step `k` on as it is `delay` samples later; 0 before it begins.
+/// The command from step `k` on, delayed by `delay` samples; 0 before it begins.
 #[inline(always)]
 fn copy_late(u: &[f64], k: usize, delay: usize, late: &mut [f64]) {
     let missing = delay.saturating_sub(k).min(late.len());

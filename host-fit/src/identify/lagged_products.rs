@@ -1,12 +1,11 @@
-//! Tables of lagged products: every sum a regression on lagged outputs can need.
+//! Tables of lagged products: every sum that a regression on lagged outputs needs.
 //!
-//! The regressors of eqs. (3) and (4) are outputs y_{k−m}, alone or times the
-//! arriving command d_k. All inner products between them are
-//! P_w(i, j) = Σ_k w_k y_{k+1−i} y_{k+1−j} with w = 1 or products of d. For w
-//! made of intervals an entry follows from its neighbour along the diagonal, by what
-//! the ends of the intervals let in and out: the cost of a table is
-//! O(lags² × edges + lags × samples). Other weights go through a matrix product over all
-//! samples. After that a regression costs look-ups, however long the records are.
+//! The regressors of eqs. (3) and (4) are outputs y_{k−m}, alone or times the arriving command d_k. All inner
+//! products between them are P_w(i, j) = Σ_k w_k y_{k+1−i} y_{k+1−j} with w = 1 or products of d. If w
+//! consists of intervals, an entry follows from its neighbour on the diagonal by the samples that enter and
+//! leave at the ends of the intervals: a table costs O(lags² × edges + lags × samples). Other weights take a
+//! matrix product over all samples. A regression is then a matter of look-ups, whatever the length of the
+//! records.
 
 use super::arrival::Weights;
 use crate::linalg::{self, dot};
@@ -105,15 +104,14 @@ impl LaggedOutputs {
         }
     }
 
-    /// Shifting both elements of an entry by a sample shifts the intervals of its sum:
-    /// along a diagonal the entries differ only by what the ends of the intervals let
-    /// in and out. Row 0 is summed directly, and what the ends do is one product of a
-    /// matrix that has a row for each of them.
+    /// Shifting both elements of an entry by a sample shifts the intervals of its sum: along a diagonal the
+    /// entries differ only by the samples that enter and leave at the ends. Row 0 is summed directly; the
+    /// changes are one matrix product with a row for each end.
     fn table_from_intervals(&self, intervals: &[Vec<(usize, usize)>]) -> Table {
         // Of the elements 1 + i: row i stands for y_{k+1−i}.
         let shifts = self.size - 1;
         let (mut first_row, mut first_sum) = (vec![0.0; shifts], 0.0);
-        // Of each end: the outputs y_{n−i} from i = 0 on, newest last, and what it does.
+        // For each end: the outputs y_{n−i} from i = 0 on, newest last, and its sign.
         let mut ends: Vec<(&[f64], f64)> = Vec::new();
         for (padded, intervals) in self.padded.iter().zip(intervals) {
             for &(start, end) in intervals {

@@ -1,4 +1,4 @@
-//! How a point of the search stands for the delays of a model.
+//! The mapping between a point of the search and the delays of a model.
 
 use model_core::recursion::LagConvention;
 
@@ -141,7 +141,7 @@ impl Layout {
         point
     }
 
-    /// One name for all points with the same delays.
+    /// The canonical point among all with the same delays.
     pub(crate) fn canonical(&self, point: &[i64]) -> Point {
         let delays = self.delays(point);
         let mut key: Point = delays.state.iter().map(|x| i64::from(*x)).collect();

@@ -1,12 +1,10 @@
-//! What the free run of a changed model would come to, without running it.
+//! Prediction of the free run of a changed model without running it.
 //!
-//! Around an incumbent with coefficients θ the simulated output moves, to first
-//! order, by Σ_i Δθ_i s_i, where the sensitivity s_i is the incumbent's own
-//! recursion driven by regressor i taken at the simulated output (the exact
-//! Gauss–Newton direction). This holds for lags that the incumbent does not use
-//! as well: their θ is 0. With the products of all sensitivities in one table,
-//! ε of any exchange of lags is predicted by a quadratic form in the
-//! least-squares coefficients of the candidate, in microseconds.
+//! Around an incumbent with coefficients θ the simulated output changes to first order by Σ_i Δθ_i s_i. The
+//! sensitivity s_i is the incumbent's recursion driven by regressor i at the simulated output (the exact
+//! Gauss–Newton direction), which is defined for unused lags as well (θ = 0). With the inner products of all
+//! sensitivities in a table, ε of any exchange of lags is a quadratic form in the least-squares coefficients
+//! of the candidate, computed in microseconds.
 
 use super::arrival::FitSignals;
 use super::coefficients::Coefficients;
@@ -16,11 +14,10 @@ use super::layout::{Column, Delays, Layout};
 use super::regression::Regression;
 use crate::linalg;
 
-/// One sample in so many enters the products. Odd, so that patterns of two
-/// samples are seen.
+/// Decimation of the samples in the products. Odd, so that patterns of period two are sampled.
 const STRIDE: usize = 41;
 
-/// Sensitivities run side by side.
+/// Sensitivities that are computed in parallel.
 const LANES: usize = 32;
 
 /// One record of the run that is linearised.
@@ -41,7 +38,7 @@ struct Filter<'a> {
     first_element: usize,
     block: usize,
     first: usize,
-    /// What the recursion puts out, `LANES` a step; zeros for as long as the longest lag go before.
+    /// Outputs of the recursion, `LANES` per step; preceded by zeros for the longest lag.
     outputs: &'a mut [f32],
     /// The first of the columns to fill, and the distance to the next.
     sampled: &'a mut [f64],
@@ -77,7 +74,7 @@ impl Filter<'_> {
         let samples = self.outputs.len() / LANES - reach;
         let gate = self.block.checked_sub(1).and_then(|l| arrived.get(l));
         let mut rows = rows.iter().enumerate().peekable();
-        // The recursion's terms, with the products as they are at the arriving commands `at`.
+        // The terms of the recursion, with the products at the arriving commands `at`.
         let mut terms: Vec<(usize, f32)> = state.to_vec();
         let mut at: Vec<f32> = vec![0.0; arrived.len()];
         for k in 0..samples {
@@ -116,7 +113,7 @@ impl Filter<'_> {
             let drive = S::as_mut_simd_f32s(drive).0;
             let past = S::as_simd_f32s(past).0;
             let steps_back = |m: usize| &past[past.len() - (1 + m) * REGISTERS..][..REGISTERS];
-            // Two sums for each register, so that additions do not wait for each other.
+            // Two sums per register, so that additions do not wait for each other.
             let mut sums = [simd.splat_f32s(0.0); REGISTERS];
             let mut others = sums;
             let pairs = terms.chunks_exact(2);
@@ -152,7 +149,7 @@ pub(crate) struct Linearised {
     rows: usize,
     /// The sensitivities at the sampled rows of all records, column by column.
     sampled: Vec<f64>,
-    /// Products of a column with all others, where they were asked for.
+    /// Products of a column with all others; computed on demand.
     products: Vec<Option<Vec<f64>>>,
     /// Squared lengths of the columns.
     squared: Vec<f64>,

@@ -1,4 +1,4 @@
-//! The delays as a search problem: the one-step objective and its search steps.
+//! The one-step objective as a function of the delays, with its search steps.
 
 use std::sync::atomic::Ordering;
 
@@ -44,10 +44,10 @@ impl Problem for OneStep {
     }
 }
 
-/// Brings a candidate to where no single exchange of a lag and no other delay
-/// of one input lowers the one-step residual. Returns the squared norm.
+/// Moves a candidate to a point where no exchange of a single lag and no other delay of one input lowers the
+/// one-step residual. Returns the squared norm.
 ///
-/// `reach` limits how far input delays may move from where they are, in samples.
+/// `reach` limits the moves of input delays, in samples.
 pub(crate) fn settle(
     regression: &mut Regression,
     delays: &mut Delays,
@@ -118,8 +118,8 @@ pub(crate) fn exchange_pairs(
     Ok((point, success))
 }
 
-/// Search step: from a local optimum, replaces a few lags at random, settles
-/// again, and gives up after `patience` fruitless kicks.
+/// Search step: from a local optimum, replaces a few lags at random, descends again, and ends after
+/// `patience` kicks without improvement.
 pub(crate) struct KickStep {
     patience: usize,
     fruitless: usize,
@@ -176,7 +176,7 @@ impl SearchStep<OneStep> for KickStep {
     }
 }
 
-/// Replaces `strength` lags by random ones, and now and then an input delay.
+/// Replaces `strength` lags by random ones, and sometimes an input delay.
 pub(crate) fn kick(
     regression: &Regression,
     delays: &mut Delays,

@@ -1,10 +1,10 @@
-//! What an identification is asked for.
+//! Options of an identification.
 
 use super::rules::RULES;
 use super::structure::Structure;
 use crate::search::Settings;
 
-/// What the search of the delays minimises.
+/// The objective of the delay search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Objective {
     /// Norm of the one-step prediction errors.
@@ -24,7 +24,7 @@ impl Objective {
     }
 }
 
-/// How to identify.
+/// Options of an identification.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IdentifyOptions {
     /// Sizes and conventions of the model.
@@ -33,7 +33,7 @@ pub struct IdentifyOptions {
     pub objective: Objective,
     /// Budget, seed and threads of the search.
     pub search: Settings,
-    /// Fruitless restarts after which the search ends; 0 for a single descent.
+    /// Restarts without improvement after which the search ends; 0 for a single descent.
     pub patience: usize,
     /// Whether the coefficients are refined on the free run after a search with
     /// [`Objective::FreeRun`].

@@ -14,13 +14,13 @@ pub struct Refinement {
     /// ε over the validate records before and after, if there are any.
     #[serde(rename = "validate_epsilon")]
     pub validate: Option<(f64, f64)>,
-    /// Whether the refined coefficients are those of the returned model: the
-    /// held-out ε fell or, without validation records, the one fitted.
+    /// Whether the refined coefficients were kept: the validation ε fell or, without validation records, the
+    /// estimation ε.
     pub kept: bool,
 }
 
-/// Refines the coefficients on the identify records; keeps them in `model` if
-/// the held-out ε falls. `None` if the free run cannot be judged.
+/// Refines the coefficients on the identify records; keeps them in `model` if the validation ε falls. `None`
+/// if the free run diverges.
 pub(crate) fn refine(model: &mut Model, data: &[Record]) -> Option<Refinement> {
     let records = model.targets(data);
     let (identify, validate): (Vec<&Record>, Vec<&Record>) =
@@ -34,7 +34,7 @@ pub(crate) fn refine(model: &mut Model, data: &[Record]) -> Option<Refinement> {
     let after = epsilon(&refined, &identify)?;
     let held_out = match validate.is_empty() {
         true => None,
-        // A model that diverges on held-out records is no improvement.
+        // A model that diverges on validation records is no improvement.
         false => Some((
             epsilon(model, &validate).unwrap_or(f64::INFINITY),
             epsilon(&refined, &validate).unwrap_or(f64::INFINITY),

@@ -9,9 +9,9 @@ use super::structure::{Series, Structure};
 use crate::data::memory::{self, TooMuch};
 use crate::linalg::{self, Cholesky};
 
-/// Tables kept; the longest unused goes first. One of 500 lags takes 2 MB.
+/// Number of cached tables; the least recently used is dropped. One of 500 lags takes 2 MB.
 const TABLES_KEPT: usize = 48;
-/// Tables that are in memory beside those that are kept: the plain one, and two matrices that a new one is made of.
+/// Tables in memory beside the cached ones: the unweighted one, and two matrices needed to build one.
 const TABLES_BESIDE: u64 = 3;
 
 /// Bytes of one table.
@@ -35,11 +35,10 @@ pub(crate) fn fits_in_memory(structure: &Structure) -> Result<(), TooMuch> {
     memory::allow(needed, &what, "give a smaller --max-lag or --n3")
 }
 
-/// A table serves a neighbouring input delay if about this many samples differ.
+/// A table is reused for a neighbouring input delay if at most about this many samples differ.
 const SAMPLES_PATCHED: usize = 3000;
 
-/// Which weights a table is for: the arriving command of one input or the
-/// product of two, by the inputs' ticks.
+/// The weights of a table: the arriving command of one input or the product of two, by the inputs' ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Which {
     /// Weight 1.
@@ -117,7 +116,7 @@ impl Regression {
         let layout = Layout::new(structure);
         let signals = FitSignals::new(records, structure);
         let longest = structure.convention.behind_newest(structure.longest_lag);
-        // No more than half of the memory, but what a candidate needs.
+        // At most half of the memory, but at least what one candidate needs.
         let fitting =
             usize::try_from(memory::limit() / 2 / table_bytes(longest)).unwrap_or(TABLES_KEPT);
         let most = fitting.clamp(

@@ -3,46 +3,47 @@
 use crate::rules;
 
 rules! {
-    /// What kind of records a model is identified on, and what it is good for.
+    /// Records for identification, and quality criteria of the model.
     pub struct Rules in "identify";
 
-    /// A candidate of the search is given up when its free run goes beyond this: much sooner than a run has diverged.
-    hopeless: f64 = 10.0, "times the largest |y|", "judgement: candidates that swing so far are never the best";
-    /// A model whose validation FIT is this much below that of its own records has more lags than they can tell.
+    /// The simulation of a candidate stops when its free run exceeds this, long before it would count as
+    /// diverged.
+    hopeless: f64 = 10.0, "times the largest |y|", "judgement: such candidates are never the best";
+    /// A model whose validation FIT is this much below its estimation FIT is reported as over-fitted.
     overfitted_points: f64 = 12.0, "points of FIT", "judgement: on the flow simulation sixteen lags lose 28 to 34, two lags 7 to 11";
 
-    /// Longest lag and input delay …
+    /// Longest lag and input delay.
     longest_lag: u16 = 500, "samples", "the paper";
-    /// … in records of so many times that length; in shorter ones the lags are shorter.
+    /// Records shorter than this multiple of the longest lag get shorter lags.
     longest_lag_fits: usize = 4, "times", "judgement";
-    /// Patience of a search, in which the numbers of kicks are counted.
-    patience: usize = 3, "", "chosen on sets 1 to 3 of docs/search.md";
-    /// A one-step search kicks this often per unit of patience before it gives up …
-    kicks: usize = 6, "kicks", "chosen on sets 1 to 3 of docs/search.md";
-    /// … a free-run search this often …
-    free_kicks: usize = 8, "kicks", "chosen on sets 1 to 3 of docs/search.md";
-    /// … and at most this often, fruitless or not.
-    most_free_kicks: usize = 12, "kicks", "chosen on sets 1 to 3 of docs/search.md";
-    /// A kick moves the input delays, too, with this probability …
-    kicked_inputs: f64 = 0.3, "", "chosen on sets 1 to 3 of docs/search.md";
-    /// … after which a one-step search looks for them this far …
-    kick_reach: f64 = 12.0, "samples", "chosen on sets 1 to 3 of docs/search.md";
-    /// … and a free-run search moves them this far at most.
-    free_kick_reach: f64 = 5.0, "samples", "chosen on sets 1 to 3 of docs/search.md";
-    /// Lags that a kick of the free-run search replaces …
-    kicked_lags: usize = 2, "lags", "chosen on sets 1 to 3 of docs/search.md";
-    /// … by others further away than this.
+    /// Patience of a search, the unit of the numbers of kicks.
+    patience: usize = 3, "", "tuned on sets 1 to 3 of docs/search.md";
+    /// Kicks without improvement per unit of patience that end a one-step search.
+    kicks: usize = 6, "kicks", "tuned on sets 1 to 3 of docs/search.md";
+    /// Kicks without improvement per unit of patience that end a free-run search.
+    free_kicks: usize = 8, "kicks", "tuned on sets 1 to 3 of docs/search.md";
+    /// Most kicks of a free-run search per unit of patience.
+    most_free_kicks: usize = 12, "kicks", "tuned on sets 1 to 3 of docs/search.md";
+    /// Probability that a kick also moves the input delays.
+    kicked_inputs: f64 = 0.3, "", "tuned on sets 1 to 3 of docs/search.md";
+    /// After such a kick a one-step search scans the input delays within this distance.
+    kick_reach: f64 = 12.0, "samples", "tuned on sets 1 to 3 of docs/search.md";
+    /// Largest move of input delays in a kick of the free-run search.
+    free_kick_reach: f64 = 5.0, "samples", "tuned on sets 1 to 3 of docs/search.md";
+    /// Lags that a kick of the free-run search replaces.
+    kicked_lags: usize = 2, "lags", "tuned on sets 1 to 3 of docs/search.md";
+    /// Least distance of a lag that replaces another in such a kick.
     kick_distance: u16 = 4, "samples", "a descent reaches as far";
-    /// Lags whose predicted error is lowest are simulated first, so many of a slot …
+    /// Number of predicted minima per slot that are simulated.
     minima: usize = 7, "lags", "judgement";
-    /// … if the prediction is below this.
+    /// A predicted minimum is simulated if it is below this.
     promising: f64 = 1.01, "times the best error", "judgement";
-    /// Steps in which input delays are walked.
+    /// Steps of the line search over input delays.
     input_moves: [f64; 9] = [0.02, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0, 6.0, 12.0], "samples", "a grid in steps of 2 to 5";
-    /// They are walked where a descent comes this close.
+    /// Input delays are searched when a descent comes this close to the best.
     close: f64 = 1.01, "times the best error", "judgement";
-    /// A sweep that gains less than this ends a descent.
+    /// A descent ends with a sweep that gains less than this.
     small_gain: f64 = 1e-3, "share of the error", "judgement";
-    /// A descent is given up when its n-th sweep ends this much over n above the best.
+    /// A descent is given up if its error after sweep n exceeds the best by more than this over n.
     falling_behind: f64 = 0.05, "share of the best error", "judgement";
 }

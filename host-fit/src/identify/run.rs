@@ -51,22 +51,23 @@ pub struct Identified {
     pub pole_on: f64,
 }
 
-/// Who watches an identification: the numbers of its search, and the model behind them.
+/// Observer of an identification: progress of the search, and the model behind it.
 pub trait Watcher: Progress {
-    /// The model that is best so far, after each report. It is made when it is asked for, in the search's own time.
+    /// Receives the best model so far after each report. The model is built only when the closure is called,
+    /// in the time of the search.
     fn model(&self, _best: &dyn Fn() -> Option<Model>) {}
 }
 
-/// Nobody watches.
+/// No observer.
 impl Watcher for () {}
 
-/// Shows the best point of a search as a model.
+/// Converts the best point of a search to a model.
 struct Shown<'a> {
     to: &'a dyn Watcher,
     series: &'a [Series<'a>],
     records: &'a [&'a Record],
     options: &'a IdentifyOptions,
-    /// The search has the other one for itself; made once somebody looks.
+    /// A regression of its own, since the search owns the other; built at first use.
     regression: OnceLock<Regression>,
 }
 
@@ -212,7 +213,7 @@ mod tests {
     use model_core::recursion::LagConvention;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    /// A first-order flow with a product term, from the recursion written out here.
+    /// A first-order flow with a product term, computed by its recursion.
     fn record(name: &str, role: Use, period: usize, seed: u32) -> Record {
         let n = 2500;
         let u: Vec<f64> = (0..n)
@@ -274,7 +275,7 @@ mod tests {
         }
     }
 
-    /// The reported norm is that of the definition, for both lag conventions.
+    /// The reported norm equals its definition, for both lag conventions.
     #[test]
     fn the_reported_norms_follow_from_the_model_alone() {
         for (convention, shift) in [(LagConvention::OneStep, 1), (LagConvention::Literal, 0)] {
@@ -322,7 +323,7 @@ mod tests {
         }
     }
 
-    /// ε inside the search is that of the model's own free run.
+    /// ε inside the search equals that of the model's own free run.
     #[test]
     fn the_search_simulates_what_the_model_simulates() {
         let law = super::super::ExponentialDelay {

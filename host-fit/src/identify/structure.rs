@@ -1,4 +1,4 @@
-//! What is to be identified: sizes, delays and conventions of a model.
+//! The structure to be identified: sizes, delays and conventions of a model.
 
 use model_core::recursion::LagConvention;
 

@@ -1,12 +1,12 @@
-//! What the numbers of a model file may be: the ranges that bound the memory and the time that a model takes.
+//! Valid ranges of the numbers in a model file; they limit memory and time.
 //!
-//! | number | range | bounds |
+//! | number | range | limits |
 //! |---|---|---|
 //! | sample period | 1 ns to 10⁹ s, as of records | times in samples |
 //! | lags, delays (also those of a law), window | up to 65 535 samples | memory: 0.5 MB a signal |
 //! | times of effects | 0 to 10⁹ s | |
 //! | times of a law | up to 2³¹ − 1 samples | sums of two in 32 bits |
-//! | what a board reckons with | what single precision holds | |
+//! | numbers used on a board | range of single precision | |
 
 use super::{Delay, Law};
 use crate::data::PERIODS_S;
@@ -14,7 +14,7 @@ use model_core::effect::{Parameter, Unit};
 use std::fmt::{Debug, Display};
 use std::ops::RangeInclusive;
 
-/// A key and what is wrong with its value.
+/// A key and the problem with its value.
 pub(super) type Fault = (String, String);
 
 /// Longest memory of a model, samples: lags and delays are 16-bit numbers on the board, and nothing else is longer.
@@ -42,7 +42,7 @@ pub(super) fn within<T: PartialOrd + Display + Debug>(
     Err((key.to_owned(), problem))
 }
 
-/// Whether the sample period is one.
+/// Checks the sample period.
 pub(super) fn period(seconds: f64) -> Result<(), Fault> {
     let [shortest, longest] = PERIODS_S;
     if seconds <= 0.0 || !seconds.is_finite() {
@@ -52,13 +52,13 @@ pub(super) fn period(seconds: f64) -> Result<(), Fault> {
     within("sample_period_s", seconds, shortest..=longest, "s")
 }
 
-/// Whether the averaging window is one.
+/// Checks the averaging window.
 pub(super) fn window(samples: u32) -> Result<(), Fault> {
     within("structure.window", samples, 2..=LONGEST.into(), "samples")
 }
 
-/// Whether a parameter of an effect or a delay law, under `key`, can be what it is said to be. The range that a search
-/// keeps to is for signals of order 1; this is what holds for signals of any size.
+/// Checks a parameter of an effect or delay law under `key` against its physical range. The card's search
+/// range assumes signals of order 1; this range holds for any size.
 pub(super) fn parameter(key: &str, card: &Parameter, value: f64) -> Result<(), Fault> {
     if card.low >= 0.0 && value < 0.0 {
         let problem = format!("{value:?} is negative, and it cannot be");
@@ -74,7 +74,7 @@ pub(super) fn parameter(key: &str, card: &Parameter, value: f64) -> Result<(), F
     }
 }
 
-/// Whether the delays are such that the command which they reach back to can be kept.
+/// Checks that the command history for the delays fits into memory.
 pub(super) fn delay(delay: &Delay, period_s: f64) -> Result<(), Fault> {
     let Delay::Law(law) = delay else {
         return Ok(());
@@ -93,7 +93,7 @@ pub(super) fn delay(delay: &Delay, period_s: f64) -> Result<(), Fault> {
     Err((format!("delay.{key}"), problem))
 }
 
-/// Whether the times of a law can be counted, and whether a board can hold its numbers.
+/// Checks the times and numbers of a law.
 pub(super) fn law(law: &Law) -> Result<(), Fault> {
     let count = |key: &str, value: u32| within(&format!("law.{key}"), value, 0..=LONGEST_LAW, "");
     let hold = |hold: &model_core::control::HoldTimes| {
@@ -135,12 +135,12 @@ pub(super) fn law(law: &Law) -> Result<(), Fault> {
     }
 }
 
-/// Whether single precision, in which a board reckons, holds the value.
+/// Checks that single precision, used on a board, can represent the value.
 fn single(key: &str, value: f64) -> Result<(), Fault> {
     if (value as f32).is_finite() {
         return Ok(());
     }
-    let problem = format!("{value:?} is no number that a board (single precision) can hold");
+    let problem = format!("{value:?} is outside single precision, in which the board calculates");
     Err((key.to_owned(), problem))
 }
 
@@ -149,12 +149,12 @@ mod tests {
     use super::super::{Maximise, Model};
     use model_core::control::HoldTimes;
 
-    /// A file with everything in it that has a range.
+    /// A file with every number that has a range.
     fn text() -> String {
         include_str!("../../../tests/data/hostile/model.toml").to_owned()
     }
 
-    /// One of each kind: what memory or time is sized by, what is negative, what a board cannot hold.
+    /// One case of each kind: sizes of memory or time, negative values, values beyond single precision.
     #[test]
     fn every_number_has_its_range_and_is_refused_with_its_key() {
         assert!(Model::from_toml(&text(), "m").is_ok());

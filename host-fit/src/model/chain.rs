@@ -1,4 +1,4 @@
-//! The effects of a model, chosen at run time: of the catalogue and users' own.
+//! The effects of a model, composed at run time from the catalogue and the user's own.
 
 use super::{Added, Model};
 use crate::user_effect::{UserEffect, UserState};
@@ -27,8 +27,7 @@ pub enum HostState<T: Real> {
 }
 
 impl<T: Real> HostEffect<T> {
-    /// Prepares an effect that `model` has; `None` if neither the catalogue nor
-    /// the model's definitions know it.
+    /// Prepares an effect of `model`; `None` if neither the catalogue nor the model's definitions contain it.
     #[must_use]
     pub fn new(
         model: &Model,
@@ -87,7 +86,7 @@ impl<T: Real> Effect<T> for HostEffect<T> {
     }
 }
 
-/// Effects one after the other.
+/// Effects applied one after the other.
 #[derive(Clone, Debug)]
 pub struct Chain<T: Real> {
     effects: Vec<HostEffect<T>>,

@@ -1,15 +1,15 @@
-//! What of the command is no jet and what is a full one.
+//! The command range: no jet and full jet.
 
 use serde::{Deserialize, Serialize};
 
-/// The commands of no jet and of a full one, in the unit of u. A model works in shares of a full jet,
-/// (u − off)/(full − off).
+/// The commands of no jet and of a full jet, in the unit of u. A model works with fractions of a full jet, (u
+/// − off)/(full − off).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CommandRange {
     /// The command of no jet, finite.
     pub off: f64,
-    /// The command of a full jet, finite and another one.
+    /// The command of a full jet, finite and different from `off`.
     pub full: f64,
 }
 
@@ -20,19 +20,19 @@ impl Default for CommandRange {
 }
 
 impl CommandRange {
-    /// Commands that are shares of a full jet as they are: 0 and 1 for an on/off actuator.
+    /// Commands that are already fractions of a full jet: 0 and 1 for an on/off actuator.
     pub const UNIT: Self = Self {
         off: 0.0,
         full: 1.0,
     };
 
-    /// Whether commands are shares of a full jet as they are.
+    /// Whether commands are already fractions of a full jet.
     #[must_use]
     pub fn is_unit(&self) -> bool {
         *self == Self::UNIT
     }
 
-    /// The share of a full jet that a command of `u` asks for.
+    /// The fraction of a full jet for a command `u`.
     #[must_use]
     pub fn share(&self, u: f64) -> f64 {
         if self.is_unit() {
@@ -41,7 +41,7 @@ impl CommandRange {
         (u - self.off) / (self.full - self.off)
     }
 
-    /// The command of a `share` of a full jet.
+    /// The command for a fraction `share` of a full jet.
     #[must_use]
     pub fn command(&self, share: f64) -> f64 {
         self.off + share * (self.full - self.off)

@@ -40,7 +40,7 @@ impl PartialEq for TransportLaw {
     }
 }
 
-/// What a delay law is told: it needs the sample period only.
+/// The setting of a delay law: only the sample period matters.
 pub(super) fn setting<T: Real>(period: T) -> Setting<T> {
     Setting {
         period,
@@ -50,14 +50,14 @@ pub(super) fn setting<T: Real>(period: T) -> Setting<T> {
 }
 
 impl TransportLaw {
-    /// The law, ready to be asked, with a sample period of `period_s` s.
+    /// The law prepared for a sample period of `period_s` s.
     #[must_use]
     pub fn transport(&self, period_s: f64) -> Option<AnyTransport<f64>> {
         AnyTransport::new(self.spec.name, &self.parameters, &setting(period_s))
     }
 
-    /// The shortest and the longest delay of the law, samples; where it has no
-    /// such bounds, that of the natural flow.
+    /// The shortest and the longest delay of the law, samples; without bounds, the delay of the flow without
+    /// jets.
     #[must_use]
     pub fn range(&self, period_s: f64) -> [f64; 2] {
         let Some(law) = self.transport(period_s) else {
@@ -66,7 +66,7 @@ impl TransportLaw {
         law.bounds().unwrap_or_else(|| [law.delay(0.0); 2])
     }
 
-    /// Whether it holds edges of the command back, so that jets are not on/off any more.
+    /// Whether it delays edges of the command separately, so that jets are no longer on/off.
     #[must_use]
     pub fn shapes_command(&self) -> bool {
         self.spec.law.is_some_and(|law| law.shapes_command)
@@ -81,7 +81,7 @@ impl Delay {
         factors: Vec<f64>,
         interpolated: bool,
     ) -> Self {
-        // A law that no line of the catalogue names has a card all the same.
+        // A law outside the catalogue has a card as well.
         let spec = effects::law(L::SPEC.name).unwrap_or(const { &L::SPEC });
         Self::Law(TransportLaw {
             spec,
@@ -131,8 +131,8 @@ impl Delay {
         }
     }
 
-    /// The longest delay, samples, at a sample period of `period_s` s. An edge
-    /// that is held back ends within a sample, not on it.
+    /// The longest delay, samples, at a sample period of `period_s` s. A separately delayed edge ends within
+    /// a sample, not on it.
     #[must_use]
     pub(super) fn longest(&self, period_s: f64) -> f64 {
         match self {
@@ -149,8 +149,8 @@ impl Delay {
         }
     }
 
-    /// The first input's delay where the averaged output is `output`, samples:
-    /// the mean of rising and falling edges.
+    /// The first input's delay at the averaged output `output`, samples: the mean of rising and falling
+    /// edges.
     #[must_use]
     pub fn present(&self, output: f64, period_s: f64) -> f64 {
         match self {

@@ -26,7 +26,7 @@ impl<'de> Deserialize<'de> for DelayTable {
     }
 }
 
-/// What a law is called in a file: its name without "-delay".
+/// The name of a law in files: its name without "-delay".
 pub(super) fn name_of(spec: &Spec) -> &'static str {
     spec.name.strip_suffix("-delay").unwrap_or(spec.name)
 }
@@ -54,7 +54,7 @@ impl DelayTable {
         Self(pairs)
     }
 
-    /// The delays of a model with so many inputs, or what is wrong with which key.
+    /// The delays of a model with so many inputs, or the wrong key with its problem.
     pub(super) fn into_delay(mut self, inputs: usize) -> Result<Delay, Fault> {
         let law = self.take("law");
         let Some(name) = law.as_ref().and_then(toml::Value::as_str) else {
@@ -101,7 +101,7 @@ impl DelayTable {
         Some(self.0.swap_remove(index).1)
     }
 
-    /// One value for each input; none if there is no such key.
+    /// One value for each input; none without the key.
     fn array<T>(
         &mut self,
         key: &str,

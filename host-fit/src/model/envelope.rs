@@ -1,11 +1,10 @@
-//! What a model was trained on, and when it is asked for more.
+//! The training range of a model, and the check whether a run leaves it.
 
 use super::{Model, RULES, Training};
 use crate::data::Record;
 
 impl Training {
-    /// Ranges of y, duty and on-times over `records`; everything else is left
-    /// as it is by default.
+    /// Ranges of y, duty and on-times over `records`; everything else has its default.
     #[must_use]
     pub fn envelope(records: &[&Record]) -> Self {
         let span = |values: &mut dyn Iterator<Item = f64>| {
@@ -43,14 +42,14 @@ fn duty(u: &[f64]) -> f64 {
     u.iter().sum::<f64>() / u.len().max(1) as f64
 }
 
-/// Lengths of the stretches of `u` at 1, samples.
+/// Durations of on-times in `u`, samples.
 fn runs_on(u: &[f64]) -> impl Iterator<Item = usize> {
     u.chunk_by(|a, b| a == b)
         .filter(|run| run.first() == Some(&1.0))
         .map(<[f64]>::len)
 }
 
-/// Lengths of the stretches of `u` below 1 between two at 1, samples.
+/// Durations of off-times in `u` between two on-times, samples.
 fn gaps_between(u: &[f64]) -> impl Iterator<Item = usize> {
     let first = u.iter().position(|u| *u == 1.0).unwrap_or(u.len());
     let last = u.iter().rposition(|u| *u == 1.0).unwrap_or(first);
@@ -61,7 +60,7 @@ fn gaps_between(u: &[f64]) -> impl Iterator<Item = usize> {
 }
 
 impl Training {
-    /// The shortest time between two switches of the valve in the records, s; `None` where they tell nothing of it.
+    /// The shortest time between two switches in the records, s; `None` if unknown.
     #[must_use]
     pub fn shortest_time_s(&self) -> Option<f64> {
         let times = [self.on_time_range_s, self.off_time_range_s];
@@ -71,9 +70,8 @@ impl Training {
 }
 
 impl Model {
-    /// In what the command `u` or the model's answer `y` lies beyond the
-    /// records that the model was fitted to: one sentence each, none if
-    /// nothing does or if nothing is known of the training.
+    /// In which respect the command `u` or the model's response `y` leaves the training range: one sentence
+    /// each, empty if inside or if the range is unknown.
     #[must_use]
     pub fn outside_training(&self, u: &[f64], y: &[f64]) -> Vec<String> {
         let training = &self.training;
@@ -99,7 +97,7 @@ impl Model {
                 shortest = shortest.min(n as f64 * period);
                 longest = longest.max(n as f64 * period);
             }
-            // Half a sample for what rounding does to the bounds.
+            // Half a sample of tolerance for rounded limits.
             if shortest < low - 0.5 * period {
                 said.push(format!(
                     "blowing for {shortest:.3} s, the shortest in the records is {low:.3} s"
@@ -130,7 +128,7 @@ mod tests {
         assert_eq!(training.duty_range, [0.625, 0.625]);
         assert!((training.on_time_range_s[0] - 0.2).abs() < 1e-12);
         assert!((training.on_time_range_s[1] - 0.3).abs() < 1e-12);
-        // The rest before the first pulse and after the last is no gap.
+        // Rests before the first and after the last pulse are not counted.
         assert!((training.off_time_range_s[0] - 0.1).abs() < 1e-12);
         assert_eq!(training.off_time_range_s[0], training.off_time_range_s[1]);
         assert_eq!(

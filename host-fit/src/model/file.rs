@@ -72,7 +72,7 @@ struct File {
     lag_convention: LagConvention,
     #[serde(default)]
     start: Start,
-    /// The commands of no jet and of a full one; left out where they are 0 and 1.
+    /// The commands of no jet and of a full jet; omitted if they are 0 and 1.
     #[serde(default, skip_serializing_if = "CommandRange::is_unit")]
     command: CommandRange,
     structure: StructureTable,
@@ -80,7 +80,7 @@ struct File {
     delay: DelayTable,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     effect: Vec<EffectTable>,
-    /// The user's own effects, whole: a model file stands alone.
+    /// The user's own effects in full, so that a model file is self-contained.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     definition: Vec<Source>,
     #[serde(default)]
@@ -89,7 +89,7 @@ struct File {
     law: Option<Law>,
 }
 
-/// How a file calls it.
+/// Names in files.
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "LagConvention", rename_all = "kebab-case")]
 enum Convention {
@@ -97,7 +97,7 @@ enum Convention {
     OneStep,
 }
 
-/// How a file calls it.
+/// Names in files.
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "Grading", rename_all = "kebab-case")]
 enum JetResponse {
@@ -175,7 +175,7 @@ impl Model {
                 ),
             }
         };
-        // The version first: other versions may have other keys.
+        // The version is checked first: other versions may have other keys.
         let table: toml::Table = toml::from_str(text).map_err(syntax)?;
         if let Some(found) = table
             .get("format_version")
@@ -207,7 +207,7 @@ impl Model {
     #[must_use]
     pub fn to_toml(&self) -> String {
         let text = toml::to_string_pretty(&File::from_model(self));
-        // Numbers, strings and tables of them can always be written.
+        // Numbers, strings and tables can always be serialised.
         text.unwrap_or_default()
     }
 
@@ -262,7 +262,7 @@ impl File {
         }
     }
 
-    /// The model, or the key and what is wrong with it.
+    /// The model, or the wrong key with its problem.
     fn into_model(self, definitions: Vec<&'static Definition>) -> Result<Model, (String, String)> {
         fn wrong<T>(key: &str, problem: String) -> Result<T, (String, String)> {
             Err((key.to_owned(), problem))
@@ -382,7 +382,7 @@ impl File {
             let added = table.into_added(&model)?;
             if model.has_effect(&added.name) {
                 let key = format!("effect.{}", added.name);
-                return wrong(&key, "it is there twice; an effect acts once".into());
+                return wrong(&key, "the effect is listed twice; list it once".into());
             }
             model.effects.push(added);
         }
@@ -510,7 +510,7 @@ mod tests {
         }
     }
 
-    /// A seed is a whole 64-bit number, and TOML's integers end before.
+    /// A seed has 64 bits, TOML's integers 63.
     #[test]
     fn every_seed_survives_its_file() {
         for seed in [0, 7, 1 << 53, (1 << 63) - 1, 1 << 63, u64::MAX] {
@@ -538,7 +538,7 @@ mod tests {
             model.add(spec, &values, None);
         }
         assert_eq!(model.effect_names(), order);
-        // By hand, as it comes.
+        // In arbitrary order, as in a file edited by hand.
         model.effects.reverse();
         let read = Model::from_toml(&model.to_toml(), "m").expect("whole");
         assert_eq!(read.effect_names(), order);

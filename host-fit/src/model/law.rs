@@ -16,7 +16,7 @@ pub enum Law {
     Maximise(Maximise),
 }
 
-/// How [`HoldTimes`] stand in a file.
+/// [`HoldTimes`] in a file.
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "HoldTimes", deny_unknown_fields)]
 struct HoldTable {
@@ -43,7 +43,7 @@ pub struct Track {
     /// Allowed share of air in 1/1000, and samples of blowing saved up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub air: Option<[u32; 2]>,
-    /// Samples ahead at which predictions are judged.
+    /// Prediction horizon of the bias estimate, samples.
     pub lead: u16,
     /// Samples from an opening command to half the jet.
     pub opening: u16,
@@ -57,17 +57,17 @@ pub struct Track {
     pub bias_rate: f64,
     /// Integral action, 1 per sample.
     pub integral_rate: f64,
-    /// How far the averaged prediction error may be from what is believed of it, y; files without it have 0.
+    /// Dead band of the averaged prediction error, y; 0 in files without it.
     #[serde(default)]
     pub play: f64,
-    /// What is left of the integral's rate in the long run, above 0 and at most 1; files without it keep the whole.
+    /// Final rate of the integral relative to its first, above 0 and at most 1; 1 in files without it.
     #[serde(default = "whole")]
     pub settled: f64,
     /// Limit of bias and integral, y.
     pub correction_limit: f64,
     /// Limit of a residual, y.
     pub residual_limit: f64,
-    /// Trials of the law in which attachment was lost: it was written all the same.
+    /// Trials in which attachment was lost, if the law was written with `--force`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lost: Vec<String>,
 }
@@ -87,15 +87,15 @@ pub struct Maximise {
     /// Shortest on and off times.
     #[serde(with = "HoldTable")]
     pub hold: HoldTimes,
-    /// Price of steady blowing, y, for which it is the best.
+    /// Price of steady blowing for which it is optimal, y.
     pub air_price: f64,
-    /// Trials of the law in which attachment was lost: it was written all the same.
+    /// Trials in which attachment was lost, if the law was written with `--force`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lost: Vec<String>,
 }
 
 impl Track {
-    /// The law in numbers of type `T`.
+    /// The law with numbers of type `T`.
     #[must_use]
     pub fn tracking<T: Real>(&self) -> Tracking<T> {
         let number = T::from_f64;
@@ -149,7 +149,7 @@ impl Law {
         }
     }
 
-    /// The same law, which says in which trials attachment was lost.
+    /// The same law with the trials in which attachment was lost.
     #[must_use]
     pub fn which_lost(mut self, trials: Vec<String>) -> Self {
         match &mut self {
@@ -159,7 +159,7 @@ impl Law {
         self
     }
 
-    /// The key that makes no sense and why, if one does.
+    /// The first invalid key with its problem.
     pub(super) fn fault(&self) -> Option<(String, String)> {
         let fault = |key: &str, problem: &str| Some((format!("law.{key}"), problem.to_owned()));
         match self {

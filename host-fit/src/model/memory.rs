@@ -1,13 +1,12 @@
-//! What a model has to remember, and what it has to be told besides the command.
+//! Memory and inputs of a model.
 //!
-//! The one place that knows: the simulator, the design of laws and the generated
-//! code all keep what is said here.
+//! Single source for the simulator, the design of laws and the generated code.
 
 use super::{Added, Delay, Model};
 use model_core::Real;
 use model_core::effect::Place;
 
-/// Words of the board's memory for commands hold this many samples.
+/// Samples per word of the board's command memory.
 const BITS: usize = 32;
 
 /// The memory of a model.
@@ -18,11 +17,9 @@ pub struct Footprint {
     pub outputs: usize,
     /// Jet strengths kept, samples: more than the longest input delay.
     pub jets: usize,
-    /// Whether jets take strengths between on and off; one bit a sample serves
-    /// where they do not.
+    /// Whether jets have strengths between on and off; otherwise one bit per sample is enough.
     pub graded: bool,
-    /// Measured channels that the effects need, in the order in which they are
-    /// passed.
+    /// Measured channels of the effects, in the order in which they are passed.
     pub channels: Vec<Channel>,
 }
 
@@ -31,18 +28,18 @@ pub struct Footprint {
 pub struct Channel {
     /// Its name in records and model files.
     pub name: String,
-    /// Its usual value, in its unit: 1 where the model file says nothing.
+    /// Its reference value, in its unit; 1 if the model file has none.
     pub reference: f64,
 }
 
 impl Model {
-    /// What the model has to remember.
+    /// Memory of the model.
     #[must_use]
     pub fn memory(&self) -> Footprint {
         self.memory_for(self.longest_delay())
     }
 
-    /// The same where input delays may become as long as `delay` samples.
+    /// The same for input delays up to `delay` samples.
     #[must_use]
     pub fn memory_for(&self, delay: usize) -> Footprint {
         let window = self.averaging.window as usize;
@@ -55,8 +52,7 @@ impl Model {
         let names = self.effects.iter().map(|added| added.name.as_str());
         Footprint {
             outputs: (self.longest_lag() + 1).max(window).max(2),
-            // A sample to interpolate to, one for what single precision may round
-            // up, and the newest itself.
+            // One sample for interpolation, one for rounding up in single precision, and the newest one.
             jets: delay + 3 + averaged,
             graded: matches!(&self.delay, Delay::Law(law) if law.shapes_command())
                 || names.into_iter().any(shapes_jet),
@@ -86,7 +82,7 @@ impl Footprint {
         self.jets.div_ceil(BITS)
     }
 
-    /// The usual values of the channels.
+    /// The reference values of the channels.
     #[must_use]
     pub fn references<T: Real>(&self) -> Vec<T> {
         let each = self.channels.iter();
@@ -109,7 +105,7 @@ mod tests {
         };
         model.averaging.window = 250;
         let memory = model.memory();
-        // Lag 300 of the one-step convention is 299 behind the newest.
+        // Lag 300 of the one-step convention is 299 samples behind the newest.
         assert_eq!((memory.outputs, memory.jets), (300, 63));
         assert_eq!((memory.graded, memory.words()), (false, 2));
         model.averaging.averaged_model = true;

@@ -34,23 +34,22 @@ use model_core::recursion::{Grading, LagConvention};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// A bilinear model, eqs. (3), (4), (14) or (15), with its effects and with
-/// what is known of its origin.
+/// A bilinear model, eqs. (3), (4), (14) or (15), with its effects and training record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     /// Sample period T, s.
     pub sample_period_s: f64,
-    /// What lags mean.
+    /// Meaning of the lags.
     pub convention: LagConvention,
     /// Averages.
     pub averaging: Averaging,
-    /// How a free run begins.
+    /// Initial state of a free run.
     pub start: Start,
     /// The commands of no jet and of a full one.
     pub command: CommandRange,
     /// The response to jets of part strength.
     pub grading: Grading,
-    /// d, what drives the flow without jets; 0 in the paper.
+    /// d, the constant drive of the flow without jets; 0 in the paper.
     pub constant: f64,
     /// τ_i, samples.
     pub state_lags: Vec<u16>,
@@ -64,11 +63,12 @@ pub struct Model {
     pub c: Vec<f64>,
     /// Input delays.
     pub delay: Delay,
-    /// Effects in the order of the physics, delay laws not among them.
+    /// Effects in physical order, without delay laws.
     pub effects: Vec<Added>,
-    /// At which reading the sensor counts as calibrated for effects that are added, y; none for 1. No part of a model file.
+    /// Reading at which the sensor counts as calibrated for added effects, y; none for 1. Not part of a model
+    /// file.
     pub calibrated_at: Option<f64>,
-    /// The user's own effects that the model knows, whether it has them or not.
+    /// The user's own effects that are available to the model, used or not.
     pub definitions: Vec<&'static Definition>,
     /// What the model was trained on.
     pub training: Training,
@@ -76,7 +76,7 @@ pub struct Model {
     pub law: Option<Law>,
 }
 
-/// A model has an effect of the same name, defined otherwise.
+/// A model has a different effect of the same name.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error(
     "the model has an effect `{name}` that is defined otherwise. \
@@ -87,15 +87,15 @@ pub struct DefineError {
     pub name: String,
 }
 
-/// How a free run begins.
+/// Initial state of a free run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Start {
-    /// Everything was 0 before the record (the paper).
+    /// Rest: everything was 0 before the record (the paper).
     #[default]
     Rest,
-    /// What was before the record is its first values, or what is known of them. The first samples of a record that
-    /// begins in mid-run follow the measurement (see [`preparation`](crate::preparation)).
+    /// Constant at the first values of the record, or at the known values before it. The first samples of a
+    /// record that starts in mid-run follow the measurement (see [`preparation`](crate::preparation)).
     Measured,
 }
 
@@ -110,24 +110,25 @@ pub struct Added {
     /// The measured channel it uses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channel: Option<String>,
-    /// The reference of that channel, in its unit, or where the sensor was calibrated, y; see [`reference`](Self::reference).
+    /// The reference of that channel, in its unit, or the calibration reading of the sensor, y; see
+    /// [`reference`](Self::reference).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference: Option<f64>,
 }
 
 impl Added {
-    /// What stands for a reference that nobody gave: effects divide by theirs.
+    /// Default of a missing reference; not 0, because effects divide by it.
     pub(crate) const NO_REFERENCE: f64 = 1.0;
 
-    /// The reference of the effect's channel, in its unit, or where the sensor was
-    /// [calibrated](Spec::calibrated), y; 1 where nobody gave it.
+    /// The reference of the effect's channel, in its unit, or the [calibration](Spec::calibrated) reading of
+    /// the sensor, y; 1 by default.
     #[must_use]
     pub fn reference(&self) -> f64 {
         self.reference.unwrap_or(Self::NO_REFERENCE)
     }
 }
 
-/// What the model was trained on: predictions outside are extrapolations.
+/// The training range of a model: predictions outside are extrapolations.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Training {
@@ -143,16 +144,16 @@ pub struct Training {
     pub data_hash: String,
     /// Version of the tool.
     pub tool_version: String,
-    /// The seed; one that TOML's integers cannot hold (above 2⁶³ − 1) stands in a file as text.
+    /// The seed; one above 2⁶³ − 1, the largest TOML integer, is text in a file.
     #[serde(with = "seed")]
     pub seed: u64,
-    /// Objective the delays were searched with, and its value.
+    /// Objective of the delay search.
     pub objective: String,
     /// Its value.
     pub objective_value: f64,
     /// FIT of the free run over the identify records, %.
     pub identify_fit_percent: f64,
-    /// Effects of the model that describe part of a misfit without being proven.
+    /// Effects of the model that are surrogates.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stand_ins: Vec<String>,
     /// FIT of the free run over the validate records, %; NaN is written as absent.
@@ -161,7 +162,7 @@ pub struct Training {
 }
 
 impl Default for Model {
-    /// One lag each, no delay, coefficients of 0, at 1 kHz: a frame to fill in.
+    /// A template: one lag each, no delay, zero coefficients, 1 kHz.
     fn default() -> Self {
         Self {
             sample_period_s: 0.001,
@@ -190,7 +191,7 @@ impl Default for Model {
 }
 
 impl Model {
-    /// Names of the effects, the delay law among them, in the order of the physics.
+    /// Names of the effects, delay law included, in physical order.
     #[must_use]
     pub fn effect_names(&self) -> Vec<String> {
         let jet = |added: &&Added| self.place_of(added) == Some(Place::Jet);
@@ -210,8 +211,7 @@ impl Model {
         names
     }
 
-    /// Whether an effect called `name` was added, a nuisance included; the delay law does
-    /// not count.
+    /// Whether an effect called `name` was added, disturbance terms included; the delay law does not count.
     #[must_use]
     pub fn has_effect(&self, name: &str) -> bool {
         self.effects.iter().any(|added| added.name == name)
@@ -221,18 +221,18 @@ impl Model {
         self.spec(&added.name).map(|spec| spec.place)
     }
 
-    /// Every effect that the model could have: the catalogue, then the user's own.
+    /// Every effect that can be added: the catalogue, then the user's own.
     pub fn candidates(&self) -> impl Iterator<Item = &'static Spec> {
         let own = self.definitions.iter().map(|definition| definition.spec());
         SPECS.iter().chain(own)
     }
 
-    /// Everything that the model could have: the candidates, and the nuisances.
+    /// All candidates and disturbance terms.
     fn known(&self) -> impl Iterator<Item = &'static Spec> {
         self.candidates().chain(NUISANCES)
     }
 
-    /// The effect called `name`: of the catalogue, the user's own, or a nuisance.
+    /// The effect called `name`: of the catalogue, the user's own, or a disturbance term.
     #[must_use]
     pub fn spec(&self, name: &str) -> Option<&'static Spec> {
         self.known().find(|spec| spec.name == name)
@@ -245,12 +245,11 @@ impl Model {
         own.find(|definition| definition.spec().name == name)
     }
 
-    /// Makes a user's own effect known to the model, so that it can be added.
-    /// One of the same name takes the place of the other, unless the model has
-    /// that effect.
+    /// Makes a user effect available to the model. An existing one of the same name is replaced, unless the
+    /// model uses it.
     ///
     /// # Errors
-    /// [`DefineError`] if the model has another effect of that name.
+    /// [`DefineError`] if the model uses another effect of that name.
     pub fn define(&mut self, definition: &'static Definition) -> Result<(), DefineError> {
         let name = definition.spec().name;
         match self.definition(name) {
@@ -267,7 +266,7 @@ impl Model {
         Ok(())
     }
 
-    /// Whether data with this sample period, s, are sampled as the model is.
+    /// Whether data with this sample period, s, match the model's.
     #[must_use]
     pub fn is_sampled_at(&self, period_s: f64) -> bool {
         (period_s / self.sample_period_s - 1.0).abs() <= RULES.same_period
@@ -294,12 +293,12 @@ impl Model {
     #[must_use]
     pub fn longest_delay(&self) -> usize {
         let longest = self.delay.longest(self.sample_period_s);
-        // Files with longer ones are refused; a search may stray there.
+        // Longer ones in files are rejected; a search may exceed the limit.
         longest.clamp(0.0, bounds::LONGEST.into()).round() as usize
     }
 
-    /// Takes delays between samples, so that a fit can move them: y moves by several
-    /// times the noise from sample to sample after an edge.
+    /// Makes delays unrounded, so that a fit can vary them: after an edge, y changes by several times the
+    /// noise per sample.
     pub(crate) fn delay_between_samples(&mut self) {
         match &mut self.delay {
             Delay::Law(law) => law.interpolated = true,
@@ -311,8 +310,7 @@ impl Model {
         }
     }
 
-    /// Makes all delays longer by so many samples, or shorter, in as far as a law has
-    /// a level.
+    /// Lengthens all delays by so many samples (or shortens them), if the law has a constant part.
     pub(crate) fn delay_later(&mut self, samples: f64) {
         match &mut self.delay {
             Delay::Fixed { delays } => {
@@ -335,7 +333,7 @@ impl Model {
         }
     }
 
-    /// Rounds delays to samples, as eqs. (3) and (4) have them.
+    /// Rounds delays to samples, as in eqs. (3) and (4).
     pub(crate) fn delay_on_samples(&mut self) {
         let Delay::Law(law) = &mut self.delay else {
             return;
@@ -366,14 +364,14 @@ impl Model {
         names
     }
 
-    /// Adds an effect with the values `parameters`, where the physics has its
-    /// place: of the catalogue, or a user's own that was [defined](Self::define). A delay law replaces the one there is.
+    /// Adds an effect with the values `parameters` at its physical position: of the catalogue, or a
+    /// [defined](Self::define) user effect. A delay law replaces the present one.
     pub fn add(&mut self, spec: &'static Spec, parameters: &[f64], reference: Option<f64>) {
         if spec.place == Place::Delay {
             self.delay = Delay::Law(TransportLaw {
                 spec,
                 parameters: parameters.to_vec(),
-                // Inputs keep their delays relative to the first.
+                // The ratios of the inputs' delays are kept.
                 factors: self.delay.factors(),
                 interpolated: true,
             });
@@ -388,8 +386,8 @@ impl Model {
         self.order_effects();
     }
 
-    /// Brings the effects in the order of the physics: by place; of the flow, what resists a motion after what
-    /// drives it; otherwise as the catalogue has them, the user's after those, nuisances last.
+    /// Sorts the effects into physical order: by place; in the flow, driving before resisting ones; otherwise
+    /// catalogue order, then the user's, disturbance terms last.
     pub(crate) fn order_effects(&mut self) {
         let order: Vec<_> = self.known().collect();
         let rank = |added: &Added| {

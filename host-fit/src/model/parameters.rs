@@ -1,11 +1,11 @@
-//! A model's parameters as one vector, for whoever searches or differentiates.
+//! A model's parameters as one vector, for optimisation and differentiation.
 
 use super::{Added, Delay, Model};
 use model_core::Real;
 use model_core::effect::{Influence, Parameter};
 use model_core::effects::ZERO_OFFSET;
 
-/// What a coordinate of the parameter vector is.
+/// Kind of a coordinate of the parameter vector.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kind {
     /// d, a_i, b_l or c_jl: the recursion is linear in it.
@@ -21,7 +21,7 @@ pub enum Kind {
 pub struct Coordinate {
     /// Readable name: `a1`, `c21`, `valve-lag.opening_time`.
     pub name: String,
-    /// What it is.
+    /// Its kind.
     pub kind: Kind,
 }
 
@@ -35,7 +35,7 @@ impl Coordinate {
         }
     }
 
-    /// Whether a free run has a derivative in it.
+    /// Whether the free run is differentiable with respect to it.
     #[must_use]
     pub fn is_smooth(&self) -> bool {
         self.parameter()
@@ -48,8 +48,7 @@ impl Model {
         self.spec(name).map_or(&[], |spec| spec.parameters)
     }
 
-    /// What the coordinates of the parameter vector are: d, a, b, c (by
-    /// columns), the delay law's, then each effect's.
+    /// The coordinates of the parameter vector: d, a, b, c (by columns), the delay law's, then each effect's.
     #[must_use]
     pub fn coordinates(&self) -> Vec<Coordinate> {
         let linear = |name: String| Coordinate {
@@ -91,8 +90,8 @@ impl Model {
         values
     }
 
-    /// What the sensor shows at rest, in units of y, among the values of a parameter vector in the order of
-    /// [`coordinates`](Self::coordinates); 0 for a model without a zero.
+    /// The sensor's offset, in units of y, within a parameter vector in the order of
+    /// [`coordinates`](Self::coordinates); 0 for a model without one.
     #[must_use]
     pub fn zero_among<T: Real>(&self, values: &[T]) -> T {
         let Some(own) = self.effects.iter().position(|e| e.name == ZERO_OFFSET.name) else {

@@ -1,12 +1,11 @@
-//! How long a model remembers.
+//! Memory length of a model.
 
 use super::Model;
 use crate::linalg::{NotConverged, largest_pole};
 
 impl Model {
-    /// The largest pole magnitude of the recursion with all jets off, or all on:
-    /// what is left of an effect on y after another sample, once all else is
-    /// forgotten; 0 without state lags.
+    /// The largest pole modulus of the recursion with all jets off, or on: the factor by which a disturbance
+    /// of y decays per sample in the long run; 0 without state lags.
     ///
     /// # Errors
     /// [`NotConverged`] when the eigenvalue iteration fails.
@@ -31,9 +30,8 @@ impl Model {
         weights
     }
 
-    /// How long the flow takes without jets to forget all but 1/e, s: what one
-    /// step of Newton's from a pole of 1 finds, exact for a slow flow. Infinite
-    /// for one that does not forget.
+    /// Time constant of the flow without jets, s: one Newton step from a pole of 1, accurate for a slow flow.
+    /// Infinite for an integrator.
     pub(crate) fn time_constant(&self) -> f64 {
         let reach = |lag: &u16| (self.convention.behind_newest(*lag) + 1) as f64;
         let own = || self.state_lags.iter().zip(&self.a);
@@ -60,7 +58,7 @@ mod tests {
         };
         let first_order = flow(&[1], &[(-0.01_f64).exp()]).time_constant();
         assert!((first_order - 0.1).abs() < 1e-3, "{first_order}");
-        // Half of it comes back 20 ms later: as slow as the pole of the whole.
+        // Half of the relaxation acts 20 ms later: the time constant is that of the whole.
         let lagged = flow(&[1, 21], &[0.988, 0.010]);
         let pole = lagged.largest_pole(false).expect("a pole");
         let slow = -0.001 / pole.ln();

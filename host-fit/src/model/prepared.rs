@@ -1,4 +1,4 @@
-//! A model in numbers of one type, ready to run.
+//! A model in one number type, ready to run.
 
 use super::delay::setting;
 use super::{Chain, Delay, HostEffect, Model};
@@ -9,7 +9,7 @@ use model_core::effects::{AnyTransport, AnyTransportState};
 use model_core::model::{Averaging, Parts};
 use model_core::recursion::{Bilinear, Grading, LagConvention, Pace};
 
-/// A model prepared to run in numbers of type `T`.
+/// A model prepared for running with numbers of type `T`.
 #[derive(Clone, Debug)]
 pub struct Prepared<T: Real> {
     convention: LagConvention,
@@ -21,16 +21,16 @@ pub struct Prepared<T: Real> {
     a: Vec<T>,
     b: Vec<T>,
     c: Vec<T>,
-    /// `None` only while it is made.
+    /// `None` only during construction.
     pace: Option<Pace<T>>,
     delay: AnyDelay<T>,
-    /// Whether the delay follows ỹ.
+    /// Whether the delay depends on ỹ.
     follows: bool,
     effects: Chain<T>,
 }
 
 impl<T: Real> Prepared<T> {
-    /// Whether the delay follows the averaged output ỹ of eq. (1): of other models it need not be kept.
+    /// Whether the delay depends on the averaged output ỹ of eq. (1); otherwise ỹ need not be computed.
     #[inline]
     pub(crate) fn follows_average(&self) -> bool {
         self.follows
@@ -68,17 +68,16 @@ impl<T: Real> Parts<T> for Prepared<T> {
     }
 }
 
-/// What becomes of a delay law between two samples.
+/// Treatment of delays between samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rounding {
-    /// As the model says: rounded to whole samples, eq. (4), or interpolated.
+    /// As in the model: rounded to whole samples, eq. (4), or interpolated.
     Samples,
-    /// The input is interpolated in any case: the model made smooth, for a
-    /// search in the law's parameters.
+    /// Always interpolated: makes the free run differentiable in the law's parameters.
     None,
 }
 
-/// Input delays of any kind, chosen at run time.
+/// Input delays, their kind chosen at run time.
 #[derive(Clone, Debug)]
 pub enum AnyDelay<T: Real> {
     /// Constant whole samples.
@@ -91,7 +90,7 @@ pub enum AnyDelay<T: Real> {
         factors: Vec<T>,
         /// Whether its delays are rounded to whole samples.
         rounded: bool,
-        /// For each input the nearest and the farthest sample that it can point at, where that is known.
+        /// For each input the nearest and the farthest sample that it can read, if known.
         ranges: Vec<Option<(usize, usize)>>,
     },
 }
@@ -140,17 +139,17 @@ impl<T: Real> DelayLaw<T> for AnyDelay<T> {
     }
 }
 
-/// The nearest and the farthest sample that an input with this factor can point at, rounded or between
-/// samples; `None` where the law has no such bounds.
+/// The nearest and the farthest sample that an input with this factor can read, rounded or not; `None` for a
+/// law without bounds.
 fn range<T: Real>(law: &AnyTransport<T>, factor: f64) -> Option<(usize, usize)> {
     let [shortest, longest] = law.bounds()?.map(|delay| factor * delay.value());
     let known = shortest >= 0.0 && longest.is_finite();
-    // One sample more on either side: single precision may round across a whole one.
+    // One more sample on either side, because single precision may round across a whole one.
     known.then(|| ((shortest as usize).saturating_sub(1), longest as usize + 2))
 }
 
 impl Model {
-    /// The model in numbers of type `T`, as it is.
+    /// The model with numbers of type `T`.
     #[must_use]
     pub fn prepare<T: Real>(&self) -> Prepared<T> {
         let values: Vec<T> = self.values().into_iter().map(T::from_f64).collect();
@@ -184,7 +183,7 @@ impl Model {
                         factors: factors.collect(),
                         rounded: !chosen.interpolated && rounding == Rounding::Samples,
                     },
-                    // A law that is in no catalogue: `Delay::of` and files know none.
+                    // Not reachable: `Delay::of` and files allow only laws of the catalogue.
                     None => AnyDelay::Fixed(FixedDelay {
                         delays: vec![0; chosen.factors.len()],
                     }),

@@ -1,6 +1,6 @@
-//! White noise plus noise of first order with memory, and the filter that makes it white.
+//! Noise colour: white noise plus first-order coloured noise, with its whitening filter.
 
-/// ε = w + v: w white, v of first order with memory.
+/// ε = w + v: w white, v first-order autoregressive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Colour {
     /// Share of v in the variance of a sample, from 0 to 1.
@@ -9,20 +9,21 @@ pub struct Colour {
     pub pole: f64,
 }
 
-/// The filter for one record.
+/// The whitening filter of one record.
 #[derive(Clone, Debug)]
 pub struct Filter {
-    /// 1 / standard deviation of the samples.
+    /// Reciprocal standard deviation of each sample.
     weights: Vec<f64>,
-    /// Gain of the prediction, per sample, until it stands still …
+    /// Gain of the one-step predictor per sample, up to its steady state.
     gains: Vec<f64>,
-    /// … and 1 / standard deviation of the innovation.
+    /// Reciprocal standard deviation of each innovation, up to the steady state.
     roots: Vec<f64>,
     pole: f64,
     log_determinant: f64,
 }
 
-/// The gain stands still where its change is below this: no digit of a whitened sample depends on what follows.
+/// The predictor is in steady state when its gain changes by less than this; the rest is below double
+/// precision.
 const STILL: f64 = 1e-14;
 
 impl Colour {
@@ -68,13 +69,13 @@ impl Colour {
 }
 
 impl Filter {
-    /// A series of the record, so that its noise is white and of variance 1.
+    /// Whitens a series of the record: white noise of variance 1.
     #[must_use]
     pub fn whiten(&self, series: &[f64]) -> Vec<f64> {
         let (mut gains, mut roots) = (self.gains.iter(), self.roots.iter());
         let (mut gain, mut root, mut prediction) = (0.0, 1.0, 0.0);
         let each = series.iter().zip(&self.weights).map(|(x, weight)| {
-            // The last values stay.
+            // The steady-state values are used from here on.
             gain = *gains.next().unwrap_or(&gain);
             root = *roots.next().unwrap_or(&root);
             let innovation = x * weight - prediction;

@@ -4,27 +4,27 @@ use super::{Colour, EFFECTS, NoiseModel, Series, random_effects, woodbury_of};
 use crate::linalg::dot;
 use rayon::prelude::*;
 
-/// Shares of coloured noise that are tried …
+/// Grid of shares of coloured noise.
 const SHARES: [f64; 6] = [0.1, 0.25, 0.5, 0.75, 0.9, 0.98];
-/// … and its times of memory, samples: a grid, refined below.
+/// Grid of correlation times, samples; refined below.
 const MEMORIES: [f64; 7] = [2.0, 5.0, 12.0, 30.0, 80.0, 200.0, 500.0];
-/// The steps in logit share and ln memory are halved from those of the grid to this share of them.
+/// Smallest step in logit share and ln correlation time, relative to the grid's.
 const FINEST: f64 = 0.05;
-/// Rounds of the fixed point of the variances (EM): each gains less than the one before.
+/// Most EM iterations for the variances; the gains decrease.
 const ROUNDS: usize = 60;
 
-/// What the likelihood needs of one record under one colour.
+/// Sufficient statistics of one record under one colour.
 struct Summary {
     samples: f64,
     /// ln det of the covariance of ε.
     log_determinant: f64,
-    /// r·r, Zᵀr and ZᵀZ, whitened.
+    /// r·r, Zᵀr and ZᵀZ of the whitened series.
     square: f64,
     products: [f64; EFFECTS],
     gram: [[f64; EFFECTS]; EFFECTS],
 }
 
-/// What parameters have to gain to be kept, nats.
+/// Gain in log-likelihood that a parameter must exceed to be kept, nats.
 #[derive(Clone, Copy)]
 struct Price {
     colour: f64,
@@ -40,20 +40,21 @@ struct Best {
 }
 
 impl NoiseModel {
-    /// The noise of `errors` that a good model leaves. With `measured`, their variances are known and ε is no less than they say;
-    /// otherwise they are in proportion only. Colour and random effects are kept where they pay by BIC.
+    /// The noise model of the `errors` that a good model leaves. With `measured`, the variances are known and
+    /// the scale of ε is at least 1; otherwise only their ratios are known. Colour and random effects are
+    /// kept if they pay by BIC.
     #[must_use]
     pub fn of(errors: &[Series], measured: bool) -> Self {
         let samples: f64 = errors.iter().map(|e| e.residual.len() as f64).sum();
         let price = Price {
-            // Two parameters more have to gain ln n.
+            // Two more parameters must gain ln n.
             colour: samples.max(1.0).ln(),
             random_effect: 0.5 * (errors.len().max(1) as f64).ln().max(1.0),
         };
         Self::estimated(errors, measured, price)
     }
 
-    /// The noise under which `errors` are most likely, with all its parameters: nothing has to pay.
+    /// The maximum-likelihood noise model of `errors` with all its parameters, without penalties.
     #[must_use]
     pub fn most_likely(errors: &[Series], measured: bool) -> Self {
         let free = Price {
@@ -82,9 +83,9 @@ impl NoiseModel {
     }
 }
 
-/// The best colour on a grid that is refined around its best point.
+/// The best colour by grid search with refinement.
 fn coloured(errors: &[Series], least: f64, price: Price) -> (Colour, Best) {
-    // Logit of the share and ln of the memory: even steps of both.
+    // Equal steps in the logit of the share and in ln of the correlation time.
     let colour = |[share, memory]: [f64; 2]| Colour {
         share: 1.0 / (1.0 + (-share).exp()),
         pole: (-1.0 / memory.exp()).exp(),
@@ -108,7 +109,7 @@ fn coloured(errors: &[Series], least: f64, price: Price) -> (Colour, Best) {
     };
     let mut step = 1.0;
     while step > FINEST {
-        // Share and memory stand for each other along a ridge: corners too.
+        // Share and correlation time are correlated along a ridge: diagonal neighbours are tried too.
         let around = (0..9).map(|at| [f64::from(at / 3) - 1.0, f64::from(at % 3) - 1.0]);
         let next = around.map(|[s, m]| [best.0[0] + s * step, best.0[1] + m * step]);
         match evaluate(next.collect()).into_iter().max_by(better) {
@@ -120,8 +121,8 @@ fn coloured(errors: &[Series], least: f64, price: Price) -> (Colour, Best) {
     (colour(point), best)
 }
 
-/// The likelihood under a colour, its scale and variances of random effects at their best; those that gain less than half of ln(number of
-/// records) are 0.
+/// The log-likelihood under a colour, maximised over the scale and the variances of the random effects.
+/// Variances that gain less than half of ln(number of records) are set to 0.
 fn likelihood(errors: &[Series], colour: Colour, least: f64, price: Price) -> Best {
     let summaries: Vec<Summary> = errors.iter().map(|e| Summary::of(e, colour)).collect();
     let mut kept = [false; EFFECTS];
@@ -144,15 +145,15 @@ fn likelihood(errors: &[Series], colour: Colour, least: f64, price: Price) -> Be
     }
 }
 
-/// Scale and variances by expectation and maximisation: each effect's variance is the mean square of what the records show of
-/// it, and of what they leave open.
+/// Scale and variances by expectation maximisation: each variance is the mean over records of the squared
+/// posterior mean plus the posterior variance.
 fn maximised(summaries: &[Summary], kept: [bool; EFFECTS], least: f64) -> Best {
     let samples: f64 = summaries.iter().map(|s| s.samples).sum();
     let records = summaries.len().max(1) as f64;
     let square: f64 = summaries.iter().map(|s| s.square).sum();
     let floor = |scale: f64| scale.max(least).max(f64::MIN_POSITIVE);
     let mut scale = floor(square / samples.max(1.0));
-    // To set out from: what the records show of each effect by itself.
+    // Initial values: each random effect estimated by itself.
     let mut variances: [f64; EFFECTS] = std::array::from_fn(|i| {
         let each = summaries.iter().filter(|s| s.gram[i][i] > 0.0);
         let shown: f64 = each.map(|s| (s.products[i] / s.gram[i][i]).powi(2)).sum();
@@ -209,13 +210,14 @@ impl Summary {
         -0.5 * ((self.square - along) / scale + covariance)
     }
 
-    /// Mean and variance of the record's random effects given its error, and the expected Σ of what ε leaves, whitened.
+    /// Posterior mean and variance of the record's random effects, and the expected sum of squares of the
+    /// whitened ε.
     fn posterior(
         &self,
         scale: f64,
         variances: [f64; EFFECTS],
     ) -> ([f64; EFFECTS], [f64; EFFECTS], f64) {
-        // Covariance scale·L·Lᵀ of the effects given the error.
+        // Posterior covariance scale·L·Lᵀ of the effects.
         let (factor, _) = woodbury_of(&self.gram, variances.map(|v| v / scale));
         let cell = |i: usize, j: usize| {
             (0..EFFECTS)

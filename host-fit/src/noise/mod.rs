@@ -1,10 +1,11 @@
-//! What records are disturbed by: one noise model for all that weighs errors.
+//! The noise model that all likelihoods use.
 //!
-//! The error of record g is r_g = b_g·1 + d_g·t + a_g·f_g + ε_g (docs/theory.md 4.4), f_g the run of the model. Offset b, drift d
-//! and level a are drawn once a record: Gaussian random effects, marginalised by Woodbury's identity of rank 3. Errors along
-//! them count as far as records scatter there, errors beside them in full. ε is white noise plus noise of first order with
-//! memory, in proportion to the standard errors of the samples. The innovations of a Kalman filter of one state are white;
-//! that filter is linear, and one pass serves errors and derivatives.
+//! The error of record g is r_g = b_g·1 + d_g·t + a_g·f_g + ε_g (docs/theory.md 4.4), with f_g the free run
+//! of the model. Offset b, drift d and level a are Gaussian random effects per record, marginalised by
+//! Woodbury's identity of rank 3: errors along them are weighted by the record-to-record scatter, other
+//! errors in full. ε is white noise plus first-order coloured noise, in proportion to the standard errors of
+//! the samples. A scalar Kalman filter whitens it; the filter is linear, so errors and derivatives are
+//! whitened alike.
 
 mod colour;
 mod estimate;
@@ -16,38 +17,38 @@ use crate::linalg::dot;
 /// Random effects of a record: offset, drift, level.
 const EFFECTS: usize = 3;
 
-/// The error of one record, and what is known of its noise.
+/// The error of one record with its noise variances.
 #[derive(Clone, Debug)]
 pub struct Series {
     /// Measurement minus model, y.
     pub residual: Vec<f64>,
     /// Variance of the measurement noise per sample, y²; as many values, all above 0.
     pub variance: Vec<f64>,
-    /// The free run of the model, which the level's random effect is in proportion to, y. Not the measurement: that holds the
-    /// noise itself, and an effect along it would explain the noise away.
+    /// Free run of the model, to which the level's random effect is proportional, y. The measurement would
+    /// not do: it contains the noise, which the effect would then absorb.
     pub run: Vec<f64>,
 }
 
 /// The noise model of a set of records.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NoiseModel {
-    /// Variance of ε over that of the samples, at least 1 where standard errors are measured.
+    /// Variance of ε relative to the samples' variances; at least 1 where standard errors are measured.
     pub scale: f64,
     /// The spectrum of ε.
     pub colour: Colour,
-    /// Variance of a record's offset, y².
+    /// Variance of the record-to-record offset, y².
     pub offset: f64,
-    /// Variance of a record's drift from its begin to its end, y².
+    /// Variance of the drift from a record's start to its end, y².
     pub drift: f64,
-    /// Variance of a record's level over the level itself.
+    /// Variance of the relative level of a record.
     pub level: f64,
 }
 
 impl NoiseModel {
-    /// Scale, share and memory of the colour, and the random effects.
+    /// Number of parameters: scale, share and correlation time of the colour, and the random effects.
     pub const PARAMETERS: usize = 3 + EFFECTS;
 
-    /// The metric of a record whose samples have these variances, all above 0, and with this run of the model.
+    /// The metric of a record with these sample variances (all above 0) and this free run.
     #[must_use]
     pub fn metric(&self, variance: &[f64], run: &[f64]) -> Metric {
         let filter = self.colour.filter(variance);
@@ -64,7 +65,7 @@ impl NoiseModel {
         }
     }
 
-    /// ln of the probability density of these errors, but for −½·n·ln 2π.
+    /// Log-likelihood of these errors, without the constant −½·n·ln 2π.
     #[must_use]
     pub fn log_likelihood(&self, errors: &[Series]) -> f64 {
         let each = errors.iter().map(|error| {
@@ -75,7 +76,7 @@ impl NoiseModel {
     }
 }
 
-/// Offset, drift and level as columns, whitened.
+/// Offset, drift and level as whitened columns.
 fn random_effects(filter: &Filter, run: &[f64]) -> [Vec<f64>; EFFECTS] {
     let n = run.len();
     let last = n.saturating_sub(1).max(1) as f64;
@@ -97,7 +98,7 @@ fn woodbury(
     woodbury_of(&gram, variances)
 }
 
-/// The same from ZᵀZ. By columns: with C·Cᵀ = 1 + D^½ ZᵀZ D^½, L = D^½ C⁻ᵀ.
+/// The same from ZᵀZ, column by column: with C·Cᵀ = 1 + D^½ ZᵀZ D^½, L = D^½ C⁻ᵀ.
 fn woodbury_of(
     gram: &[[f64; EFFECTS]; EFFECTS],
     variances: [f64; EFFECTS],
@@ -117,7 +118,7 @@ fn woodbury_of(
         }
     }
     let log_determinant = (0..EFFECTS).map(|i| 2.0 * lower[i][i].ln()).sum();
-    // The columns of C⁻¹, of which L = D^½ C⁻ᵀ is the transpose, scaled.
+    // The columns of C⁻¹; L = D^½ C⁻ᵀ is the scaled transpose.
     let columns: [[f64; EFFECTS]; EFFECTS] = std::array::from_fn(|column| {
         let mut solved = [0.0; EFFECTS];
         for i in column..EFFECTS {
@@ -131,7 +132,7 @@ fn woodbury_of(
     (factor, log_determinant)
 }
 
-/// How far errors of one record are from none: the inverse of its noise covariance.
+/// The inverse noise covariance of one record, as a metric for its errors.
 #[derive(Clone, Debug)]
 pub struct Metric {
     filter: Filter,
@@ -146,9 +147,9 @@ pub struct Metric {
 /// An error or a derivative in this metric.
 #[derive(Clone, Debug)]
 pub struct Whitened {
-    /// What the filter makes of it, unit variance per sample …
+    /// The whitened series, unit variance per sample.
     series: Vec<f64>,
-    /// … and what of that lies along the random effects.
+    /// Components of the whitened series along the random effects.
     along: [f64; EFFECTS],
 }
 
@@ -175,7 +176,7 @@ impl Metric {
         }
     }
 
-    /// ln of the probability density of an error, but for −½·n·ln 2π.
+    /// Log-likelihood of an error, without the constant −½·n·ln 2π.
     #[must_use]
     pub fn log_likelihood(&self, residual: &[f64]) -> f64 {
         let whitened = self.whiten(residual);

@@ -6,7 +6,7 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
     (0..12).map(|_| rng.random_range(-0.5..0.5)).sum()
 }
 
-/// What one record is disturbed by.
+/// Disturbances of one synthetic record.
 #[derive(Clone, Copy, Default)]
 struct Disturbed {
     share: f64,
@@ -14,7 +14,7 @@ struct Disturbed {
     offset: f64,
     drift: f64,
     level: f64,
-    /// The noise over what its standard errors say.
+    /// Standard deviation of the noise relative to the stated standard errors.
     louder: f64,
 }
 
@@ -29,7 +29,7 @@ fn records(rng: &mut ChaCha8Rng, count: usize, n: usize, how: Disturbed) -> Vec<
         let mut slow = how.share.sqrt() * normal(rng);
         let (mut series, mut run, mut variance) = (Vec::new(), Vec::new(), Vec::new());
         for k in 0..n {
-            // The standard error depends on the level, as it does on a rig.
+            // The standard error depends on the level, as on a real rig.
             let y = 0.5 + 0.5 * (k as f64 / 130.0).sin();
             let sd = 0.01 * (1.0 + 0.4 * y);
             slow = pole * slow + (how.share * (1.0 - pole * pole)).sqrt() * normal(rng);
@@ -121,7 +121,7 @@ fn offsets_drifts_and_levels_of_records_are_found_with_their_variance() {
         ..STILL
     };
     let model = NoiseModel::of(&records(&mut rng, 60, 2000, how), true);
-    // 60 draws know a deviation to 9 %.
+    // 60 draws estimate a standard deviation to 9 %.
     for (found, true_) in [
         (model.offset, how.offset),
         (model.drift, how.drift),
@@ -145,7 +145,7 @@ fn noise_above_its_standard_errors_counts_and_noise_below_them_does_not() {
     assert!((scale(&mut rng, 0.5, false) / 0.25 - 1.0).abs() < 0.05);
 }
 
-/// The density of a short record against that of its covariance, written out.
+/// The likelihood of a short record equals the Gaussian density with its full covariance matrix.
 #[test]
 fn the_likelihood_is_that_of_the_covariance() {
     let n = 6;

@@ -2,8 +2,7 @@
 
 use super::format::{fixed, power_of_ten};
 
-/// Magnitudes beyond this are left out of a range: no measurement reaches them, and
-/// their differences overflow.
+/// Larger magnitudes are left out of a range: no measurement reaches them, and their differences overflow.
 const LARGEST: f64 = 1e150;
 
 /// A range of values and how it maps to [0, 1]. Always `lo < hi`, both finite.
@@ -11,18 +10,18 @@ const LARGEST: f64 = 1e150;
 pub(super) struct Axis {
     lo: f64,
     hi: f64,
-    /// Values are logarithms to base 10; ticks are labelled with what they are the logarithms of.
+    /// Values are logarithms to base 10; tick labels show the original values.
     decades: bool,
 }
 
-/// One tick: where it is and what it says.
+/// A tick: its position and label.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Tick {
     pub(super) value: f64,
     pub(super) label: String,
 }
 
-/// Smallest and largest usable value, if there is one.
+/// Smallest and largest finite value, if any.
 pub(super) fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     values
         .into_iter()
@@ -80,8 +79,7 @@ impl Axis {
         (self.lo, self.hi)
     }
 
-    /// Place of `value` on the axis, 0 at the lower end and 1 at the upper, clamped;
-    /// `None` for NaN.
+    /// Position of `value` on the axis, 0 at the lower end and 1 at the upper, clamped; `None` for NaN.
     pub(super) fn place(&self, value: f64) -> Option<f64> {
         if value.is_nan() {
             return None;
@@ -131,7 +129,7 @@ impl Axis {
             .collect()
     }
 
-    /// Ticks at 1, 2 and 5 times powers of ten, or at the powers alone where those are enough.
+    /// Ticks at 1, 2 and 5 times powers of ten, or at powers only if those are enough.
     fn decade_ticks(&self, count: usize) -> Vec<Tick> {
         let (first, last) = (self.lo.floor() as i32, self.hi.ceil() as i32);
         let at = |multiples: &[f64]| -> Vec<Tick> {

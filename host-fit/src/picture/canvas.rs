@@ -12,7 +12,7 @@ pub(super) const MARGIN: f64 = 14.0;
 /// Width of an average character over the font's size, for a wide sans-serif.
 const CHARACTER: f64 = 0.59;
 
-/// Which part of a text lies at the point it is written at, horizontally.
+/// Horizontal alignment of a text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Anchor {
     Start,
@@ -20,7 +20,7 @@ pub(super) enum Anchor {
     End,
 }
 
-/// Size, weight and colour of words; they are centred on their line.
+/// Size, weight and colour of a text, vertically centred.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Words {
     pub(super) size: f64,
@@ -91,13 +91,13 @@ impl Ink {
     }
 }
 
-/// The drawing surface; what it writes to is a string, so nothing can fail.
+/// The drawing surface: a string, so that nothing can fail.
 pub(super) struct Canvas {
     elements: String,
 }
 
-/// Draws a picture of [`WIDTH`]; `paint` returns the height it came to.
-/// `description` is what a screen reader says.
+/// Draws a picture of width [`WIDTH`]; `paint` returns its height. `description` is the text for screen
+/// readers.
 pub(super) fn draw(description: &str, paint: impl FnOnce(&mut Canvas) -> f64) -> String {
     let mut canvas = Canvas {
         elements: String::new(),
@@ -120,7 +120,7 @@ impl Canvas {
         self.elements.push('\n');
     }
 
-    /// A line through `points`; a dot where there is one only.
+    /// A line through `points`; a dot for a single point.
     pub(super) fn line(&mut self, points: &[(f64, f64)], ink: Ink) {
         match points {
             [] => {}
@@ -133,7 +133,7 @@ impl Canvas {
         }
     }
 
-    /// A dashed line through `points`; solid where it would take thousands of dashes.
+    /// A dashed line through `points`; solid if it would need thousands of dashes.
     pub(super) fn dashes(&mut self, points: &[(f64, f64)], ink: Ink, dash: f64) {
         let length: f64 = points.windows(2).map(distance).sum();
         if !(dash > 0.5 && length / dash < 600.0) {
@@ -198,7 +198,7 @@ impl Canvas {
         ));
     }
 
-    /// A rectangle that a page may make something of: `name` is what the page knows it by, `label` what it says of itself.
+    /// A rectangle that a page can make interactive: `name` identifies it, `label` is its accessible text.
     pub(super) fn bar(
         &mut self,
         corner: (f64, f64),
@@ -285,7 +285,7 @@ fn distance(pair: &[(f64, f64)]) -> f64 {
     }
 }
 
-/// Any number as a coordinate: tenths of a pixel, nonsense at the edge of a huge sheet.
+/// A coordinate in tenths of a pixel; invalid numbers go to the edge of a large sheet.
 fn pixel(v: f64) -> f64 {
     let v = if v.is_nan() { 0.0 } else { v };
     (v.clamp(-1e5, 1e5) * 10.0).round() / 10.0
@@ -300,7 +300,7 @@ fn list(points: &[(f64, f64)]) -> String {
     list
 }
 
-/// Estimated width of `text`, pixels; on the wide side.
+/// Estimated width of `text`, pixels; rather too large.
 pub(super) fn text_width(text: &str, size: f64) -> f64 {
     text.chars()
         .map(|c| match c {
@@ -315,7 +315,7 @@ pub(super) fn text_width(text: &str, size: f64) -> f64 {
         * size
 }
 
-/// `text`, cut with an ellipsis where it is wider than `width` pixels.
+/// `text`, shortened with an ellipsis if it is wider than `width` pixels.
 pub(super) fn fit(text: &str, size: f64, width: f64) -> String {
     // Half a pixel of slack: callers compute `width` from this very text and round.
     if text_width(text, size) <= width + 0.5 {

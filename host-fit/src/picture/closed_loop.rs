@@ -11,7 +11,7 @@ use super::strip::{HEIGHT as STRIP, columns, strip};
 /// One controller's run.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LoopRun<'a> {
-    /// What the legend says.
+    /// Label in the legend.
     pub label: &'a str,
     /// Controlled output, one value per sample.
     pub y: &'a [f64],
@@ -21,7 +21,7 @@ pub struct LoopRun<'a> {
     pub air: &'a [f64],
 }
 
-/// What [`closed_loop()`] draws.
+/// Contents of [`closed_loop()`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ClosedLoop<'a> {
     /// Title; empty for none.

@@ -1,4 +1,4 @@
-//! A curve with its band: how a term depends on its coordinate.
+//! A curve with its confidence band: a term as a function of its coordinate.
 
 use super::axis::{Axis, extent};
 use super::canvas::{Ink, MARGIN, WIDTH, draw};
@@ -19,24 +19,24 @@ pub struct BandPoint {
     pub high: f64,
 }
 
-/// What [`curve`] draws.
+/// Contents of [`curve`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CurvePlot<'a> {
     /// Title; empty for none.
     pub title: &'a str,
-    /// What the coordinate is, with its unit.
+    /// Label of the coordinate with its unit.
     pub x_label: &'a str,
-    /// What the value is, with its unit.
+    /// Label of the value with its unit.
     pub y_label: &'a str,
     /// The curve on ascending coordinates.
     pub points: &'a [BandPoint],
     /// A formula for it on ascending coordinates: x and value; empty for none.
     pub formula: &'a [(f64, f64)],
-    /// What the legend says of the formula.
+    /// Label of the formula in the legend.
     pub formula_label: &'a str,
 }
 
-/// Points of a curve that are drawn.
+/// Largest number of points drawn.
 const MOST_POINTS: usize = 400;
 
 /// Draws a curve with its confidence band, and its formula. Returns SVG.
@@ -44,7 +44,7 @@ const MOST_POINTS: usize = 400;
 pub fn curve(plot: &CurvePlot<'_>) -> String {
     let description = format!("{}: {} against {}", plot.title, plot.y_label, plot.x_label);
     draw(&description, |canvas| {
-        // Hundreds of points look like thousands.
+        // More points make no visible difference.
         let thin = plot.points.len().div_ceil(MOST_POINTS).max(1);
         let points: Vec<&BandPoint> = plot.points.iter().step_by(thin).collect();
         let values = points.iter().map(|p| p.value);
@@ -60,7 +60,7 @@ pub fn curve(plot: &CurvePlot<'_>) -> String {
             entries.push((Swatch::Line(INK), plot.formula_label.to_owned()));
         }
         let top = heading(canvas, plot.title, &entries);
-        // A wide band where little is known must not flatten the curve.
+        // A wide band at poorly determined points must not flatten the curve.
         let y = Axis::padded(Some(shown), 0.35);
         let left = left_edge([&y]);
         let x = extent(

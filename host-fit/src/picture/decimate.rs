@@ -1,11 +1,10 @@
-//! Thinning of long records: the smallest and the largest sample of every pixel
-//! column stay, so a picture of any record is small and no spike is lost.
+//! Decimation of long records: the smallest and largest sample of every pixel column are kept, so that a
+//! picture of any record is small and no spike is lost.
 
 use std::ops::Range;
 
-/// Indices to draw of `values[range]`, in order, as unbroken pieces: non-finite
-/// samples end a piece unless thinning hides them. At most `2·columns` indices, or
-/// all of them where the range is that short.
+/// Indices of `values[range]` to draw, as unbroken pieces: non-finite samples end a piece unless decimation
+/// hides them. At most `2·columns` indices, or all if the range is that short.
 pub(super) fn min_max(values: &[f64], range: Range<usize>, columns: usize) -> Vec<Vec<usize>> {
     let range = range.start.min(values.len())..range.end.min(values.len());
     let columns = columns.max(1);
@@ -44,14 +43,13 @@ pub(super) fn min_max(values: &[f64], range: Range<usize>, columns: usize) -> Ve
 /// `range` cut into `columns` parts of equal length, to one sample.
 pub(super) fn split(range: Range<usize>, columns: usize) -> impl Iterator<Item = Range<usize>> {
     let (start, length) = (range.start, range.len());
-    // Wide arithmetic: length × column overflows for records nobody can store, but
-    // the cut must not depend on that.
+    // Wide arithmetic, because length × column may overflow.
     let edge =
         move |column: usize| start + (length as u128 * column as u128 / columns as u128) as usize;
     (0..columns).map(move |column| edge(column)..edge(column + 1))
 }
 
-/// Where the smallest and the largest finite value of `values[range]` are.
+/// Indices of the smallest and the largest finite value of `values[range]`.
 pub(super) fn extremes(values: &[f64], range: Range<usize>) -> Option<(usize, usize)> {
     indexed(values, range)
         .filter(|(_, value)| value.is_finite())

@@ -40,7 +40,7 @@ pub struct LawPoint {
     pub high: f64,
 }
 
-/// What [`delay_law`] draws.
+/// Contents of [`delay_law`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DelayLawPlot<'a> {
     /// Title; empty for none.
@@ -51,9 +51,9 @@ pub struct DelayLawPlot<'a> {
     pub points: &'a [MeasuredDelay],
     /// The fitted law on an ascending grid of ỹ; empty for none.
     pub law: &'a [LawPoint],
-    /// What the legend says of the law, for example `"47.35 + 12.69·exp(−20.18·ỹ)"`.
+    /// Label of the law in the legend, for example `"47.35 + 12.69·exp(−20.18·ỹ)"`.
     pub law_label: &'a str,
-    /// Edges left out because no response could be measured; named in the legend.
+    /// Number of edges without a measurable response; stated in the legend.
     pub unmeasured: usize,
 }
 
@@ -119,7 +119,7 @@ pub fn delay_law(plot: &DelayLawPlot<'_>) -> String {
         let upper = band().rev().filter_map(|p| panel.point(p.y_avg, p.high));
         let outline: Vec<(f64, f64)> = lower.chain(upper).collect();
         canvas.area(&outline, Ink::new(MUTED, 1.0).faint(0.22));
-        // Thousands of dots say no more than hundreds.
+        // More dots make no visible difference.
         let stride = plot.points.len().div_ceil(800).max(1);
         for point in plot.points.iter().step_by(stride) {
             if !(point.y_avg.is_finite() && point.delay.is_finite()) {

@@ -1,4 +1,4 @@
-//! Numbers as a reader wants them.
+//! Formatting of numbers for readers.
 
 /// `value` with `digits` significant digits, no trailing zeros, a true minus sign and
 /// powers of ten outside 10⁻⁴…10⁶; an en dash when it is not finite.
@@ -16,7 +16,8 @@ pub fn significant(value: f64, digits: usize) -> String {
         return "–".to_owned();
     }
     let digits = digits.clamp(1, 17);
-    // Rounding first: 0.99996 to three digits is 1, one decade up. The largest numbers would round to infinity.
+    // Rounded first: 0.99996 to three digits is 1, in the next decade. The largest numbers would round to
+    // infinity.
     let rounded: f64 = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
     let rounded = if rounded.is_finite() { rounded } else { value };
     if rounded == 0.0 {
@@ -45,7 +46,7 @@ pub(super) fn fixed(value: f64, decimals: usize, trim: bool) -> String {
 /// A number that was written with a hyphen, as `−12.3`.
 pub(super) fn with_minus(text: String) -> String {
     match text.strip_prefix('-') {
-        // "−0" is what rounding leaves of a tiny negative number.
+        // "−0" is a rounded tiny negative number.
         Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
         Some(rest) => format!("−{rest}"),
         None => text,

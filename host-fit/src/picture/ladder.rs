@@ -6,16 +6,16 @@ use super::legend::{Swatch, heading, nothing};
 use super::palette::{BLUE, Colour, FLOOR, INK, MUTED, PAPER, VERMILLION, series};
 use super::panel::{LABEL_SIZE, Panel, TICK_SIZE, left_edge};
 
-/// One rung: the model after an effect was added.
+/// A step of the ladder: the model after an effect was added.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LadderStep<'a> {
-    /// Name of the rung, for example `"model as given"` or `"+ plenum-droop"`.
+    /// Name of the step, for example `"model as given"` or `"+ plenum-droop"`.
     pub label: &'a str,
     /// Validation RMSE, free run of all records together, in the unit of y.
     pub rmse: f64,
 }
 
-/// The same errors for one held-out record.
+/// The same errors for one validation record.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LadderRecord<'a> {
     /// Name of the record.
@@ -24,14 +24,14 @@ pub struct LadderRecord<'a> {
     pub rmse: &'a [f64],
 }
 
-/// What [`ladder`] draws.
+/// Contents of [`ladder`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ladder<'a> {
     /// Title; empty for none.
     pub title: &'a str,
     /// Unit of y; empty for a normalised output.
     pub y_unit: &'a str,
-    /// The steps in the order taken, the model as given first.
+    /// The steps in order, the given model first.
     pub steps: &'a [LadderStep<'a>],
     /// The validation records; empty to show them together only.
     pub records: &'a [LadderRecord<'a>],
@@ -66,7 +66,7 @@ pub fn ladder(plot: &Ladder<'_>) -> String {
             .into_iter()
             .flatten()
             .fold(0.0, f64::max);
-        // One record that diverges must not flatten the others.
+        // A diverging record must not flatten the others.
         let upper = upper.min(highest.max(noise.unwrap_or(0.0)) * 3.0);
         let y = Axis::linear(Some((0.0, if upper > 0.0 { upper * 1.2 } else { 1.0 })));
         let left = left_edge([&y]);
@@ -106,7 +106,7 @@ fn record_colour(index: usize) -> Colour {
     series(index % 5 + 1)
 }
 
-/// One column per rung; what lies above the floor is what the model leaves unexplained.
+/// One column per step; the part above the noise level is the model error.
 fn columns(
     canvas: &mut Canvas,
     panel: &Panel,
@@ -142,7 +142,7 @@ fn floor(canvas: &mut Canvas, panel: &Panel, noise: f64) {
     panel.level(canvas, noise, Ink::new(INK, 1.5));
 }
 
-/// The error of every record, side by side within the column of its rung.
+/// The errors of the single records, side by side within the column of their step.
 fn dots(
     canvas: &mut Canvas,
     panel: &Panel,
@@ -167,7 +167,7 @@ fn dots(
     }
 }
 
-/// The error of every rung above all that is drawn there, and its fall from the rung before.
+/// The error of every step above its column, and the reduction from the step before.
 fn numbers(
     canvas: &mut Canvas,
     panel: &Panel,
@@ -187,7 +187,7 @@ fn numbers(
         let Some((_, at)) = above.and_then(|(_, highest)| panel.point(0.0, highest)) else {
             continue;
         };
-        // Room for both lines below the upper edge, whatever is there.
+        // Keeps room for both lines below the upper edge.
         let at = (at - 17.0).max(panel.top + 22.0);
         let middle = Words::new(size, INK).at(Anchor::Middle);
         canvas.text(middle.bold(), (*x, at), &super::significant(step.rmse, 3));

@@ -1,4 +1,4 @@
-//! Titles and legends. They stand above the data, never over it.
+//! Titles and legends, placed above the data.
 
 use super::canvas::{Canvas, Ink, MARGIN, WIDTH, Words, fit, text_width};
 use super::palette::{Colour, INK, MUTED};
@@ -9,7 +9,7 @@ const ROW: f64 = 22.0;
 const SWATCH: f64 = 24.0;
 const GAP: f64 = 20.0;
 
-/// The sample of a series that stands before its name.
+/// The sample of a series before its name.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Swatch {
     Line(Colour),
@@ -20,7 +20,7 @@ pub(super) enum Swatch {
     Ring(Colour),
 }
 
-/// Writes the title, then the legend in as many rows as it takes; returns the height used.
+/// Draws the title and the rows of the legend; returns the height used.
 pub(super) fn heading(canvas: &mut Canvas, title: &str, entries: &[(Swatch, String)]) -> f64 {
     let mut top = MARGIN;
     if !title.is_empty() {
@@ -66,7 +66,7 @@ fn sample(canvas: &mut Canvas, swatch: Swatch, left: f64, middle: f64) {
     }
 }
 
-/// Says that there is nothing to draw, in the middle of an empty picture; returns its height.
+/// Draws an empty picture with a message; returns its height.
 pub(super) fn nothing(canvas: &mut Canvas, title: &str, reason: &str) -> f64 {
     let top = heading(canvas, title, &[]);
     canvas.text(Words::new(SIZE, MUTED), (MARGIN, top + 16.0), reason);

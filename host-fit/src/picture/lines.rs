@@ -9,34 +9,34 @@ use super::panel::{FOOT, Panel, left_edge};
 /// One curve.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Line<'a> {
-    /// What the legend says.
+    /// Label in the legend.
     pub label: &'a str,
     /// Points on ascending coordinates.
     pub points: &'a [(f64, f64)],
-    /// Which colour: the number of the model that it belongs to; none for ink (what was measured).
+    /// Colour index of the model it belongs to; none for the ink colour of measurements.
     pub colour: Option<usize>,
-    /// Dashed, to tell two curves of one model apart.
+    /// Dashed, to distinguish two curves of one model.
     pub dashed: bool,
 }
 
-/// What [`lines`] draws.
+/// Contents of [`lines`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LinePlot<'a> {
     /// Title; empty for none.
     pub title: &'a str,
-    /// What the coordinate is, with its unit.
+    /// Label of the coordinate with its unit.
     pub x_label: &'a str,
-    /// What the value is, with its unit.
+    /// Label of the value with its unit.
     pub y_label: &'a str,
     /// The curves, the most important last.
     pub lines: &'a [Line<'a>],
-    /// Half width of a band about zero and what the legend says of it.
+    /// Half width of a band about zero, with its label in the legend.
     pub band: Option<(f64, &'a str)>,
     /// Logarithmic coordinate: points at or below 0 are left out.
     pub log_x: bool,
 }
 
-/// Points of a curve that are drawn.
+/// Largest number of points drawn.
 const MOST_POINTS: usize = 600;
 
 /// Draws curves over one coordinate, with a band about zero. Returns SVG.

@@ -1,6 +1,7 @@
-//! Records with models on them, to be looked along on a page: the numbers that a page's script draws.
+//! Data for interactive records with models on a page.
 //!
-//! The script and its styles are bundled from `host-fit/web` and checked in, so that nothing but cargo is needed to build.
+//! The script and its styles are bundled from `host-fit/web` and checked in, so that only cargo is needed to
+//! build.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -8,7 +9,7 @@ use serde::Serialize;
 
 use crate::data::Record;
 
-/// A page's script, its styles, and what the page's policy has to say to let the script run.
+/// A page's script, its styles, and the script's hash for the page's security policy.
 pub(super) struct Bundle {
     pub(super) script: &'static str,
     pub(super) style: &'static str,
@@ -28,24 +29,24 @@ macro_rules! bundle {
 pub(super) const REPORT: Bundle = bundle!("report");
 pub(super) const WORKBENCH: Bundle = bundle!("workbench");
 
-/// Samples of one record by bin of a coordinate, in order: the bin and how many samples it holds; no bin where the coordinate has
-/// no value or lies outside the table.
+/// Samples of one record by bin of a coordinate, in order: the bin and the number of samples; no bin where
+/// the coordinate is undefined or outside the table.
 pub type Stretches = Vec<(Option<u16>, usize)>;
 
-/// What a page draws of a data set. Serialises to the numbers for the page's script; samples are single-precision, as many
-/// digits as any converter gives.
+/// Data of an interactive page. Serialises to the input of the page's script; samples are in single
+/// precision, which exceeds the resolution of any converter.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Living {
-    /// Label of the axis of y.
+    /// Label of the y axis.
     label: String,
     records: Vec<LivingRecord>,
     /// Names of the models.
     runs: Vec<String>,
-    /// Runs that are not shown until they are asked for.
+    /// Runs that are hidden at first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     off: Vec<usize>,
     coordinates: Vec<Coordinate>,
-    /// What is in view at first, from and to, s since a record's start; everything if left out.
+    /// Initial view, from and to, s since a record's start; everything if omitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     view: Option<[f64; 2]>,
 }
@@ -69,7 +70,7 @@ struct LivingRecord {
     runs: Vec<Option<String>>,
 }
 
-/// A command: where it switches, or its values.
+/// A command: its switching samples, or its values.
 #[derive(Clone, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 enum Command {
@@ -86,7 +87,7 @@ struct Coordinate {
 }
 
 impl Living {
-    /// Records with free runs on them, labelled; `role` says in words what a record is used for.
+    /// Records with labelled free runs; `role` gives the use of a record in words.
     #[must_use]
     pub fn new(
         label: &str,
@@ -123,19 +124,19 @@ impl Living {
         }
     }
 
-    /// Shows this stretch at first, s since a record's start.
+    /// Sets the initial view, s since a record's start.
     pub fn view(&mut self, from: f64, to: f64) -> &mut Self {
         self.view = (from < to).then_some([from, to]);
         self
     }
 
-    /// These runs are not shown until they are asked for.
+    /// Hides these runs at first.
     pub fn off(&mut self, runs: impl IntoIterator<Item = usize>) -> &mut Self {
         self.off.extend(runs);
         self
     }
 
-    /// Adds a coordinate of "where it fails": which bin each sample is in, per record. In the order of the picture's panels.
+    /// Adds a coordinate of "where it fails": the bin of each sample, per record. In the order of the panels.
     pub fn coordinate(&mut self, name: &str, unit: &str, places: &[Stretches]) -> &mut Self {
         let flat = |stretches: &Stretches| {
             let pairs = stretches.iter();
@@ -151,7 +152,7 @@ impl Living {
         self
     }
 
-    /// As a JSON document that ends no element of a page.
+    /// As JSON that cannot end an HTML element.
     #[must_use]
     pub fn json(&self) -> String {
         let json = serde_json::to_string(self).unwrap_or_else(|_| "{}".to_owned());
@@ -161,7 +162,7 @@ impl Living {
     }
 }
 
-/// Samples as a page's script takes them: single precision, base64.
+/// Samples for the page's script: single precision, base64.
 #[must_use]
 pub fn packed(values: &[f64]) -> String {
     let bytes: Vec<u8> = values
@@ -219,7 +220,8 @@ mod tests {
         assert_eq!(y[8..12], (-2.5f32).to_le_bytes());
     }
 
-    /// Eight records of 10 000 samples with three models and their scatter: what a page may weigh.
+    /// Eight records of 10 000 samples with three models and their scatter stay below the size limit of a
+    /// page.
     #[test]
     fn eighty_thousand_samples_of_three_models_stay_under_five_megabytes() {
         let n = 10_000;

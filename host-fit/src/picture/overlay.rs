@@ -12,13 +12,13 @@ use super::strip::{HEIGHT as STRIP, columns, strip};
 /// One free-run simulation of a model.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LabelledRun<'a> {
-    /// What the legend says, for example `"fixed delay, FIT 87.6 %"`.
+    /// Label in the legend, for example `"fixed delay, FIT 87.6 %"`.
     pub label: &'a str,
     /// Simulated output, one value per sample of the record, in the unit of y.
     pub y: &'a [f64],
 }
 
-/// What [`overlay`] draws. Slices may be shorter than the record; what is missing is not drawn.
+/// Contents of [`overlay`]. Slices may be shorter than the record; the rest is not drawn.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Overlay<'a> {
     /// Title; empty for none.
@@ -33,9 +33,9 @@ pub struct Overlay<'a> {
     pub u: &'a [f64],
     /// Measured output.
     pub y: &'a [f64],
-    /// Standard error of the measured output: the noise level, drawn as ±2 of it.
+    /// Standard error of the measured output, drawn as ±2 of it.
     pub y_sd: Option<&'a [f64]>,
-    /// Smallest value over the repeats, with `y_max` the band around y (instead of ±2 `y_sd`).
+    /// Smallest value over the repeats; with `y_max` the band around y (instead of ±2 `y_sd`).
     pub y_min: Option<&'a [f64]>,
     /// Largest value over the repeats.
     pub y_max: Option<&'a [f64]>,
@@ -206,7 +206,7 @@ fn around(centre: &[f64], sd: &[f64]) -> (Vec<f64>, Vec<f64>) {
         .unzip()
 }
 
-/// The samples of `range` that exist.
+/// The existing samples of `range`.
 pub(super) fn part(values: &[f64], range: &Range<usize>) -> impl Iterator<Item = f64> {
     let end = range.end.min(values.len());
     values
@@ -216,7 +216,7 @@ pub(super) fn part(values: &[f64], range: &Range<usize>) -> impl Iterator<Item =
         .copied()
 }
 
-/// Smallest range that holds both.
+/// Smallest range that contains both.
 pub(super) fn union(a: Option<(f64, f64)>, b: Option<(f64, f64)>) -> Option<(f64, f64)> {
     match (a, b) {
         (Some(a), Some(b)) => Some((a.0.min(b.0), a.1.max(b.1))),
@@ -262,8 +262,8 @@ mod tests {
         };
         let svg = overlay(&plot);
         check(&svg);
-        // The measured line spans the panel from the spike down to 0; without the spike
-        // it would stay within its lowest eighth.
+        // With the spike the measured line spans the panel; without it, it would stay within its lowest
+        // eighth.
         let document = roxmltree::Document::parse(&svg).unwrap();
         let heights = |points: &str| {
             let ys = points

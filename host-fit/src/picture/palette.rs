@@ -1,5 +1,5 @@
-//! Colours: the Okabe–Ito set, told apart with every common colour blindness, on
-//! quiet greys. Each has a counterpart for dark pages (see [`dark_rules`]).
+//! Colours: the Okabe–Ito set, distinguishable with all common colour blindness, on neutral greys. Each has a
+//! counterpart for dark pages (see [`dark_rules`]).
 
 use std::fmt::{self, Write as _};
 
@@ -18,17 +18,17 @@ impl fmt::Display for Colour {
 pub(super) const PAPER: Colour = Colour(255, 255, 255);
 /// Text and measured data.
 pub(super) const INK: Colour = Colour(31, 35, 40);
-/// Secondary text, scatter bands, noise level, chance.
+/// Secondary text, scatter bands, noise level.
 pub(super) const MUTED: Colour = Colour(101, 109, 118);
 /// Grid lines.
 pub(super) const GRID: Colour = Colour(230, 234, 238);
 /// Axis lines and ticks.
 pub(super) const RULE: Colour = Colour(175, 184, 193);
-/// Noise floor and measurement scatter.
+/// Noise level and measurement scatter.
 pub(super) const FLOOR: Colour = Colour(140, 149, 159);
 /// First series.
 pub(super) const BLUE: Colour = Colour(0, 114, 178);
-/// What needs attention: the worst bin, the second series.
+/// Emphasis: the worst bin, the second series.
 pub(super) const VERMILLION: Colour = Colour(213, 94, 0);
 const GREEN: Colour = Colour(0, 158, 115);
 const PURPLE: Colour = Colour(170, 68, 153);
@@ -42,7 +42,7 @@ pub(super) fn series(index: usize) -> Colour {
     SERIES.get(index % SERIES.len()).copied().unwrap_or(BLUE)
 }
 
-/// Light colour and the one that replaces it on a dark page.
+/// Light colours with their dark replacements.
 const DARK: [(Colour, Colour); 12] = [
     (PAPER, Colour(22, 27, 34)),
     (INK, Colour(230, 237, 243)),
@@ -70,8 +70,8 @@ pub(super) fn dark_rules(scope: &str) -> String {
     css
 }
 
-/// The colours as variables of a style sheet, for what scripts draw: `--s0` … the series, `--floor`, `--grid`, `--axis`, `--band`
-/// (scatter) and `--lit` (samples that are pointed at).
+/// The colours as CSS variables for scripts: `--s0` … the series, `--floor`, `--grid`, `--axis`, `--band`
+/// (scatter) and `--lit` (marked samples).
 pub(super) fn variables(dark: bool) -> String {
     let shade = |colour: Colour| {
         let counterpart = DARK.iter().find(|(light, _)| dark && *light == colour);
@@ -81,7 +81,7 @@ pub(super) fn variables(dark: bool) -> String {
     for (name, colour) in [("floor", FLOOR), ("grid", GRID), ("axis", RULE)] {
         let _ = write!(css, "--{name}:{};", shade(colour));
     }
-    // See-through: `#RRGGBBAA`.
+    // With transparency: `#RRGGBBAA`.
     let _ = write!(css, "--band:{}59;--lit:{}40;", shade(FLOOR), shade(ORANGE));
     for index in 0..SERIES.len() {
         let _ = write!(css, "--s{index}:{};", shade(series(index)));

@@ -11,10 +11,10 @@ use super::palette::{GRID, INK, MUTED, RULE};
 pub(super) const TICK_SIZE: f64 = 14.0;
 /// Size of axis labels, pixels.
 pub(super) const LABEL_SIZE: f64 = 14.5;
-/// Room below a panel for tick labels and the axis label, pixels.
+/// Height below a panel for tick labels and the axis label, pixels.
 pub(super) const FOOT: f64 = 50.0;
 
-/// Where a panel is and what it spans.
+/// Position and axes of a panel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Panel {
     pub(super) left: f64,
@@ -25,7 +25,7 @@ pub(super) struct Panel {
     pub(super) y: Axis,
 }
 
-/// When the samples of a record were taken, in seconds.
+/// Times of the samples of a record, s.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clock {
     start: f64,
@@ -33,7 +33,7 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// A start that is not finite counts as 0, a period that is not positive as 1.
+    /// A non-finite start counts as 0, a non-positive period as 1.
     pub(super) fn new(start: f64, period: f64) -> Self {
         Self {
             start: if start.is_finite() { start } else { 0.0 },
@@ -50,8 +50,8 @@ impl Clock {
         self.start + self.period * index as f64
     }
 
-    /// Samples of `0..length` inside `window` (s) and one more on either side; all of
-    /// them without a window or when none lies inside.
+    /// Samples of `0..length` inside `window` (s) with one more on either side; all samples without a window
+    /// or if none is inside.
     pub(super) fn samples(&self, window: Option<(f64, f64)>, length: usize) -> Range<usize> {
         let Some((from, to)) = window else {
             return 0..length;
@@ -70,7 +70,7 @@ impl Clock {
 }
 
 impl Panel {
-    /// Pixel of a point; `None` where a coordinate is NaN. Points outside come to the edge.
+    /// Pixel of a point; `None` if a coordinate is NaN. Points outside are moved to the edge.
     pub(super) fn point(&self, x: f64, y: f64) -> Option<(f64, f64)> {
         Some((
             self.left + self.width * self.x.place(x)?,
@@ -147,7 +147,7 @@ impl Panel {
         );
     }
 
-    /// Pixel and label of the ticks of x, as many as fit side by side.
+    /// Pixel and label of the ticks of x, as many as fit.
     fn x_ticks(&self) -> Vec<(f64, String)> {
         let mut ticks = Vec::new();
         for count in (2..=10).rev() {
@@ -166,7 +166,7 @@ impl Panel {
             .collect()
     }
 
-    /// A record, thinned to `columns` columns.
+    /// A record, decimated to `columns` columns.
     pub(super) fn trace(
         &self,
         canvas: &mut Canvas,
@@ -185,7 +185,7 @@ impl Panel {
         }
     }
 
-    /// The area between two records; a column keeps the lowest of `low` and the highest of `high`.
+    /// The area between two records; each column spans from the lowest `low` to the highest `high`.
     pub(super) fn band(
         &self,
         canvas: &mut Canvas,
@@ -261,7 +261,7 @@ impl Panel {
     }
 }
 
-/// Left edge that leaves room for the upright label and the widest tick label of `axes`.
+/// Left edge with room for the vertical label and the widest tick label of `axes`.
 pub(super) fn left_edge<'a>(axes: impl IntoIterator<Item = &'a Axis>) -> f64 {
     axes.into_iter()
         .flat_map(|axis| axis.ticks(6))

@@ -1,4 +1,4 @@
-//! Candidate effects ranked by the validation error they leave.
+//! Candidate effects ranked by validation error.
 
 use super::axis::{Axis, extent};
 use super::canvas::{Anchor, Ink, MARGIN, WIDTH, Words, draw, fit, text_width};
@@ -10,7 +10,7 @@ use super::panel::{FOOT, Panel};
 /// One candidate.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Candidate<'a> {
-    /// Name of the effect, or of the group that cannot be told apart.
+    /// Name of the effect, or of the equivalence set.
     pub name: &'a str,
     /// Validation RMSE, free run with the candidate added and everything refitted, unit of y.
     pub rmse: f64,
@@ -18,13 +18,13 @@ pub struct Candidate<'a> {
     pub low: f64,
     /// Upper end of the interval.
     pub high: f64,
-    /// Accepted as missing effect.
+    /// Whether it is named as missing.
     pub accepted: bool,
-    /// A few words at the right, for example `"p < 0.001"`; empty for none.
+    /// A short note at the right, for example `"p < 0.001"`; empty for none.
     pub note: &'a str,
 }
 
-/// What [`ranking`] draws.
+/// Contents of [`ranking`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ranking<'a> {
     /// Title; empty for none.
@@ -41,9 +41,9 @@ pub struct Ranking<'a> {
 
 const ROW: f64 = 25.0;
 const SIZE: f64 = 14.5;
-/// Width of bold letters over plain ones.
+/// Width of bold letters relative to plain ones.
 const BOLD: f64 = 1.12;
-/// Rows drawn; a longer list is cut at the bad end.
+/// Largest number of rows; the worst candidates are left out.
 const MOST: usize = 60;
 
 /// Draws candidates as dots with intervals, the best on top, between the noise level and
@@ -81,7 +81,7 @@ pub fn ranking(plot: &Ranking<'_>) -> String {
             union(ends(|c| c.rmse), lines),
             union(ends(|c| c.low), ends(|c| c.high)),
         );
-        // A candidate that made everything worse may lie far to the right.
+        // A candidate with a much larger error may lie far to the right.
         let shown = match (all, base) {
             (Some((low, high)), Some(base)) => {
                 let low = low.max(0.0);

@@ -1,4 +1,4 @@
-//! Regions around a point, side by side: how wrong two things may be at once.
+//! Regions around a point, side by side, for pairs of model errors.
 
 use super::axis::{Axis, extent};
 use super::canvas::{Ink, MARGIN, WIDTH, draw};
@@ -9,22 +9,22 @@ use super::panel::{FOOT, Panel, left_edge};
 /// A region around (0, 0) and the labels of its axes.
 #[derive(Clone, Copy, Debug)]
 pub struct Region<'a> {
-    /// Label across.
+    /// Label of the horizontal axis.
     pub across: &'a str,
-    /// Label up.
+    /// Label of the vertical axis.
     pub up: &'a str,
-    /// Its contour, in the order of the angle.
+    /// Its contour, ordered by angle.
     pub contour: &'a [[f64; 2]],
 }
 
-/// What [`regions`] draws.
+/// Contents of [`regions`].
 #[derive(Clone, Copy, Debug)]
 pub struct Regions<'a> {
     /// Title; empty for none.
     pub title: &'a str,
-    /// What the legend says of the inside of a contour.
+    /// Legend of the inside of a contour.
     pub inside: &'a str,
-    /// What it says of the point at (0, 0).
+    /// Legend of the point at (0, 0).
     pub centre: &'a str,
     /// The regions, from left to right.
     pub regions: &'a [Region<'a>],

@@ -1,4 +1,4 @@
-//! A report: one HTML page that carries its pictures and styles and fetches nothing.
+//! A report: one self-contained HTML page.
 
 use std::fmt::Write as _;
 
@@ -6,10 +6,10 @@ use super::format::with_minus;
 use super::living::{self, Bundle, Living};
 use super::palette;
 
-/// What a verdict box announces.
+/// Tone of a verdict box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
-    /// All is as it should be.
+    /// No problem.
     Good,
     /// Something was found.
     Finding,
@@ -17,14 +17,14 @@ pub enum Tone {
     Warning,
 }
 
-/// One number worth a tile.
+/// A number in a tile.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct KeyNumber {
-    /// What it is, for example `"Held-out FIT"`.
+    /// Its label, for example `"Validation FIT"`.
     pub label: String,
-    /// The number with its unit, as it is to be read.
+    /// The number with its unit, as text.
     pub value: String,
-    /// A few words of comparison; empty for none.
+    /// A short comparison; empty for none.
     pub note: String,
 }
 
@@ -71,7 +71,7 @@ pub struct Report {
     subtitle: String,
     body: String,
     sections: Vec<String>,
-    /// Those of the sections that the contents list: what is folded away is not.
+    /// Sections in the table of contents: folded ones are not listed.
     listed: Vec<usize>,
     folds: usize,
     open: bool,
@@ -80,7 +80,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// An empty report; `subtitle` says of what, in a line.
+    /// An empty report; `subtitle` names its subject in a line.
     #[must_use]
     pub fn new(title: &str, subtitle: &str) -> Self {
         Self {
@@ -128,12 +128,12 @@ impl Report {
         self.push(format_args!("</div>\n"))
     }
 
-    /// What follows until [`Report::end_columns`] stands side by side where the page is wide enough.
+    /// Starts a group that is laid out in columns if the page is wide enough, until [`Report::end_columns`].
     pub fn columns(&mut self) -> &mut Self {
         self.push(format_args!("<div class=\"columns\">"))
     }
 
-    /// Ends what [`Report::columns`] began.
+    /// Ends the group of [`Report::columns`].
     pub fn end_columns(&mut self) -> &mut Self {
         self.push(format_args!("</div>\n"))
     }
@@ -143,7 +143,7 @@ impl Report {
         self.push(format_args!("<div class=\"cell\">"))
     }
 
-    /// What follows until [`Report::end_fold`] opens on a click; printing opens it.
+    /// Starts a folded part until [`Report::end_fold`]; it opens on a click and in print.
     pub fn fold(&mut self, summary: &str) -> &mut Self {
         self.close_section();
         self.folds += 1;

@@ -1,16 +1,15 @@
-//! Records cut into the bins of each coordinate.
+//! Assignment of samples to the bins of each coordinate.
 
 use super::coordinate::FailureCoordinate;
 use super::rules::RULES;
 use crate::data::Record;
 
-/// How a coordinate is learned on some samples and tested on others.
+/// Folds of the cross-validation of a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Folds {
-    /// Half-second blocks in turn: the coordinate comes back within a record.
+    /// Half-second blocks in turn, for coordinates that repeat within a record.
     Blocks,
-    /// Whole records: what happens at one time in one record only is no
-    /// function of time.
+    /// Whole records, for time: an event in one record only is not a function of time.
     Records,
 }
 
@@ -19,7 +18,7 @@ pub(super) enum Folds {
 pub(super) struct Binned {
     pub(super) coordinate: FailureCoordinate,
     pub(super) folds: Folds,
-    /// Bin of every sample, per record; none where the coordinate has no value.
+    /// Bin of every sample, per record; none where the coordinate is undefined.
     pub(super) bin: Vec<Vec<Option<u16>>>,
     /// Ends of the bins.
     pub(super) ranges: Vec<(f64, f64)>,
@@ -27,16 +26,16 @@ pub(super) struct Binned {
     pub(super) dwell: Option<Vec<Vec<f64>>>,
 }
 
-/// What the coordinates are made from; samples of a record's lead are not scored.
+/// The data from which coordinates are computed; samples of a record's lead are not scored.
 pub(super) struct Source<'a> {
     pub(super) records: &'a [&'a Record],
     /// y_sim per record.
     pub(super) simulated: &'a [Vec<f64>],
-    /// Samples from the command to the flow.
+    /// Dead time from command to flow, samples.
     pub(super) delay: usize,
 }
 
-/// Every coordinate that the records have.
+/// All coordinates that the records define.
 pub(super) fn coordinates(source: &Source<'_>) -> Vec<Binned> {
     let period = source.records.first().map_or(1.0, |r| r.sample_period_s);
     let each = |coordinate: &FailureCoordinate| -> Vec<Vec<f64>> {
@@ -108,8 +107,8 @@ pub(super) fn coordinates(source: &Source<'_>) -> Vec<Binned> {
     all
 }
 
-/// The coordinate at every sample of a record; NaN where it has no value. `simulated` is the free run, `delay` the samples from
-/// the command to the flow. Empty for the error's own frequency.
+/// The coordinate at every sample of a record; NaN where it is undefined. `simulated` is the free run,
+/// `delay` the dead time from command to flow in samples. Empty for the error's own frequency.
 pub(super) fn values(
     coordinate: &FailureCoordinate,
     record: &Record,
@@ -186,7 +185,7 @@ fn dwell_before_edge(u: &[f64], rising: bool) -> Vec<f64> {
         .collect()
 }
 
-/// Mean of the last `samples` inputs; before the record the input was 0.
+/// Moving average of the input over `samples`; the input before the record is 0.
 fn moving_mean(u: &[f64], samples: usize) -> Vec<f64> {
     let mut sum = 0.0;
     u.iter()
@@ -201,7 +200,7 @@ fn moving_mean(u: &[f64], samples: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Number of the pulse that the flow feels, from 1; NaN before the first.
+/// Number of the pulse that acts on the flow, from 1; NaN before the first.
 fn pulse_number(u: &[f64], delay: usize) -> Vec<f64> {
     let mut before = 0.0;
     let mut count = 0.0;
@@ -243,8 +242,7 @@ fn blank(bin: &mut [Vec<Option<u16>>], records: &[&Record]) {
     }
 }
 
-/// Leaves out bins that one record alone reaches: they would name the record,
-/// not the coordinate.
+/// Removes bins that only one record reaches: they would identify the record, not the coordinate.
 fn keep_shared(bin: &mut [Vec<Option<u16>>], bins: usize) {
     let mut reached = vec![0; bins];
     for record in bin.iter() {
@@ -261,7 +259,7 @@ fn keep_shared(bin: &mut [Vec<Option<u16>>], bins: usize) {
     }
 }
 
-/// Bins with about equally many samples; `None` for a coordinate without spread.
+/// Bins with about equal numbers of samples; `None` for a constant coordinate.
 fn binned(
     source: &Source<'_>,
     coordinate: FailureCoordinate,
@@ -280,7 +278,7 @@ fn binned(
     if high - low <= 1e-12 * high.abs().max(low.abs()) {
         return None;
     }
-    // Limits with few digits, so that sentences and axes read well.
+    // Bin limits are rounded for readable sentences and axes.
     let step = 10f64.powf(((high - low) / 500.0).log10().floor());
     let tidy = |value: f64| (value / step).round() * step;
     let mut limits: Vec<f64> = (1..RULES.bins)

@@ -1,4 +1,4 @@
-//! What an error can be split along.
+//! Coordinates along which an error is split.
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use std::fmt;
@@ -21,14 +21,14 @@ pub enum FailureCoordinate {
     LevelOfU,
     /// Rate of change of the model's output, y/s; for graded commands.
     RateOfY,
-    /// Share of the last so many seconds in which the valve was open.
+    /// Fraction of the last `window_s` seconds in which the valve was open.
     Blowing {
-        /// How far back, s.
+        /// Window length, s.
         window_s: f64,
     },
-    /// Mean of the command over the last so many seconds; for graded commands.
+    /// Mean of the command over the last `window_s` seconds; for graded commands.
     MeanInput {
-        /// How far back, s.
+        /// Window length, s.
         window_s: f64,
     },
     /// Time since the record began, s.
@@ -38,14 +38,14 @@ pub enum FailureCoordinate {
         /// Its column.
         String,
     ),
-    /// Number of the pulse that the flow feels, from 1.
+    /// Number of the pulse that acts on the flow, from 1.
     PulseNumber,
-    /// That number modulo a cycle.
+    /// The pulse number modulo a cycle.
     PulseInCycle {
-        /// Pulses of a cycle, at least 2.
+        /// Cycle length in pulses, at least 2.
         cycle: usize,
     },
-    /// The error's own frequency, Hz: says what the error is like, not what it depends on.
+    /// Frequency of the error itself, Hz: describes the error, not a cause.
     FrequencyBand,
 }
 
@@ -67,8 +67,8 @@ impl FailureCoordinate {
         }
     }
 
-    /// Whether it changes slower than y, so that a gain may follow it: the error may then be a proportion of y that
-    /// depends on it.
+    /// Whether the coordinate changes more slowly than y, so that the error may be a coordinate-dependent
+    /// gain times y.
     #[must_use]
     pub fn is_slow(&self) -> bool {
         match self {
@@ -88,13 +88,13 @@ impl FailureCoordinate {
         }
     }
 
-    /// Whether it is the place of a pulse in a cycle.
+    /// Whether it is the position of a pulse in a cycle.
     #[must_use]
     pub fn is_cycle(&self) -> bool {
         matches!(self, Self::PulseInCycle { .. })
     }
 
-    /// Whether the edges it counts from are the rising ones; none for coordinates that count from no edge.
+    /// Whether it counts from rising edges (true) or falling edges (false); none for other coordinates.
     #[must_use]
     pub fn counts_from_rising(&self) -> Option<bool> {
         match self {
@@ -104,7 +104,7 @@ impl FailureCoordinate {
         }
     }
 
-    /// A stretch of it in words, for example `within 80 ms after rising edges`.
+    /// An interval of the coordinate in words, for example `within 80 ms after rising edges`.
     #[must_use]
     pub fn stretch(&self, from: f64, to: f64) -> String {
         let (low, high) = (significant(from, 3), significant(to, 3));
@@ -116,7 +116,7 @@ impl FailureCoordinate {
             Self::FrequencyBand => format!("between {low} and {high} Hz"),
             Self::PulseNumber => format!("between pulses {low} and {high} of the records"),
             Self::PulseInCycle { cycle } => {
-                // Remainder 0 stands for the last pulse of a cycle.
+                // Remainder 0 is the last pulse of a cycle.
                 let n = *cycle as f64;
                 let first = if from == 0.0 { n } else { from };
                 format!(

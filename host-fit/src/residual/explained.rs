@@ -1,5 +1,4 @@
-//! How much of an error is a function of a coordinate: learned on some samples,
-//! tested on others.
+//! Share of the error that is a function of a coordinate, by cross-validation.
 
 use super::binned::{Binned, Folds};
 use super::rules::RULES;
@@ -14,38 +13,38 @@ pub(super) struct Errors {
     pub(super) simulated: Vec<Vec<f64>>,
     /// σ² of the noise.
     pub(super) noise: Vec<Vec<f64>>,
-    /// First samples that are not scored, per record.
+    /// Number of unscored samples at the start of each record.
     pub(super) lead: Vec<usize>,
     pub(super) period_s: f64,
 }
 
-/// In which way an error depends on a coordinate.
+/// How the error depends on a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dependence {
-    /// Its mean does: the model reads too high here and too low there.
+    /// The mean error depends on it.
     Mean,
-    /// Its proportion to y does.
+    /// The ratio of error to y depends on it.
     Proportion,
-    /// Its mean does, and how that changes with the dwell before the edge.
+    /// The mean error depends on it and on the dwell before the edge.
     Dwell,
-    /// Its size does; the sign is not a function of the coordinate.
+    /// The size of the error depends on it, but not the sign.
     Size,
 }
 
-/// A cross-validated share of the excess error.
+/// A cross-validated share of the unexplained variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Share {
     pub(super) fraction: f64,
     pub(super) dependence: Dependence,
 }
 
-/// A sample that is judged.
+/// A validation sample.
 struct JudgedSample {
     fold: usize,
     block: usize,
     bin: Option<usize>,
     residual: f64,
-    /// What the error may be proportional to: y_sim, and ln(dwell before the edge).
+    /// Covariates of the error: y_sim, and ln(dwell before the edge).
     covariates: [f64; 2],
     excess: f64,
 }
@@ -100,7 +99,7 @@ impl Errors {
     }
 }
 
-/// Moments of the samples that something is learned from.
+/// Moments of the training samples.
 #[derive(Clone, Copy, Debug, Default)]
 struct Moments {
     count: f64,
@@ -154,8 +153,7 @@ impl Moments {
     }
 }
 
-/// The share of the excess error that is a function of the coordinate; none
-/// when it is not beyond chance.
+/// The share of the unexplained variance that is a function of the coordinate; none if not significant.
 pub(super) fn explained(errors: &Errors, binned: &Binned, excess: f64) -> Option<Share> {
     let samples = errors.samples(binned);
     let by_y = gains(&samples, binned, excess, 0)?;
@@ -179,8 +177,8 @@ pub(super) fn explained(errors: &Errors, binned: &Binned, excess: f64) -> Option
     best
 }
 
-/// Energy that knowing the coordinate takes off the error: by mean, by line in
-/// the covariate, by size.
+/// Reduction of the error energy by the coordinate: by bin means, by a line in the covariate per bin, by
+/// size.
 fn gains(
     samples: &[JudgedSample],
     binned: &Binned,
@@ -216,8 +214,8 @@ fn gains(
     }
     Some(match binned.folds {
         Folds::Blocks => gains.map(|gains| beyond_chance(&gains, RULES.share_standard_errors)),
-        // A single event per record has no steady mean; that it comes at the
-        // same place in most records is the evidence.
+        // A single event per record has no reproducible mean; the evidence is that it occurs at the same
+        // place in most records.
         Folds::Records => {
             let mut of_record = vec![[0.0; 3]; folds];
             let fold_of_block: BTreeMap<usize, usize> =
@@ -239,7 +237,7 @@ fn gains(
     })
 }
 
-/// The sum of blocks that are as good as independent; 0 within chance.
+/// The sum over independent blocks; 0 if not significant.
 pub(super) fn beyond_chance(gains: &[f64], standard_errors: f64) -> f64 {
     let n = gains.len() as f64;
     let sum: f64 = gains.iter().sum();
@@ -253,13 +251,13 @@ pub(super) fn beyond_chance(gains: &[f64], standard_errors: f64) -> f64 {
     }
 }
 
-/// What the other folds say.
+/// Bin statistics of the training folds.
 struct Learned {
     mean: f64,
     line: (f64, f64),
     means: Vec<f64>,
     lines: Vec<(f64, f64)>,
-    /// Bins with more than their share.
+    /// Bins with more than their share of the error energy.
     rich: Vec<bool>,
 }
 
@@ -284,8 +282,8 @@ impl Learned {
         }
     }
 
-    /// What knowing the bin of a sample takes off its error, against knowing
-    /// nothing of the coordinate: by mean, by line in the covariate, by size.
+    /// Reduction of a sample's squared error by knowing its bin: by bin mean, by a line in the covariate, by
+    /// size.
     fn gains(&self, sample: &JudgedSample, covariate: usize, density: f64) -> [f64; 3] {
         let Some(bin) = sample.bin else {
             return [0.0; 3];

@@ -1,5 +1,5 @@
-//! Where a model fails: its free-run error on validation records, split along one
-//! coordinate after another and judged against the noise.
+//! Where a model fails: its free-run error on validation records, split along each coordinate and compared
+//! with the noise.
 
 mod binned;
 mod coordinate;
@@ -34,25 +34,25 @@ pub struct Where {
     /// The coordinate; its unit is that of `worst_from` and `worst_to`.
     #[serde(flatten)]
     pub coordinate: FailureCoordinate,
-    /// Share of the excess error energy Σ(e² − σ²) that is a function of the
-    /// coordinate, cross-validated, 0–1; 0 unless beyond chance.
+    /// Share of the unexplained variance Σ(e² − σ²) that is a function of the coordinate, cross-validated,
+    /// 0–1; 0 unless significant.
     pub explained_fraction: f64,
-    /// Where the error is worst: lower end, in the coordinate's unit.
+    /// Lower end of the interval with the largest error, in the coordinate's unit.
     pub worst_from: f64,
-    /// Upper end; equal to the lower one for a single pulse of a cycle.
+    /// Upper end of that interval; equal to the lower end for a single pulse of a cycle.
     pub worst_to: f64,
     /// Root mean square of the error there, in y.
     pub worst_rmse: f64,
     /// Mean error y − y_sim there, in y.
     #[serde(skip)]
     pub bias: f64,
-    /// In which way the error depends on the coordinate; none if it does not.
+    /// How the error depends on the coordinate; none if it does not.
     #[serde(skip)]
     pub dependence: Option<Dependence>,
-    /// The smallest interval with three quarters of the excess error.
+    /// The smallest interval with three quarters of the unexplained variance.
     #[serde(skip)]
     pub concentration: Option<Interval>,
-    /// How the worst error changes from edge to edge.
+    /// Trend of the worst error from edge to edge.
     #[serde(skip)]
     pub trend: Option<Trend>,
     /// The table that the picture draws.
@@ -60,16 +60,16 @@ pub struct Where {
     pub bins: Vec<FailureBin>,
 }
 
-/// A stretch of a coordinate and what it holds.
+/// An interval of a coordinate with its share of the error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// Lower end.
     pub from: f64,
     /// Upper end.
     pub to: f64,
-    /// Share of the excess error in it, 0–1.
+    /// Share of the unexplained variance in it, 0–1.
     pub share: f64,
-    /// Share of the samples in it, 0–1; for a frequency band, of y's energy.
+    /// Share of the samples in it, 0–1; for a frequency band, share of the energy of y.
     pub of_samples: f64,
 }
 
@@ -84,9 +84,9 @@ pub struct Failures {
     pub noise_source: NoiseSource,
     /// Mean error y − y_sim, in y.
     pub bias: f64,
-    /// Whether the error is above the noise at all.
+    /// Whether the error is significantly above the noise.
     pub above_noise: bool,
-    /// The coordinates, the one that explains most first.
+    /// The coordinates, the largest explained share first.
     pub by: Vec<Where>,
 }
 
@@ -108,8 +108,7 @@ impl Failures {
     }
 }
 
-/// Splits the free-run error of `model` on the validation records (on all records
-/// if none is held out).
+/// Splits the free-run error of `model` on the validation records (on all records if there are none).
 ///
 /// # Errors
 /// A missing channel, or a free run that diverges.
@@ -134,8 +133,8 @@ pub(crate) fn noise_floor(
     noise::floor(records, series)
 }
 
-/// As [`where_it_fails`], for free runs that were made already: y_sim per
-/// record, and the samples from the command to the flow.
+/// As [`where_it_fails`], with given free runs y_sim per record and the dead time from command to flow in
+/// samples.
 #[must_use]
 pub fn examine(records: &[&Record], simulated: Vec<Vec<f64>>, delay: usize) -> Failures {
     let residual: Vec<Vec<f64>> = records
@@ -200,7 +199,7 @@ pub fn examine(records: &[&Record], simulated: Vec<Vec<f64>>, delay: usize) -> F
     }
 }
 
-/// Whether Σ e² is above Σ σ² by more than chance and more than σ is known.
+/// Whether Σ e² exceeds Σ σ² significantly and by more than the uncertainty of σ.
 fn is_above(errors: &Errors) -> bool {
     let mut blocks = Vec::new();
     let mut noise = 0.0;
@@ -218,15 +217,14 @@ fn is_above(errors: &Errors) -> bool {
             .sum::<f64>();
     }
     let excess: f64 = blocks.iter().sum();
-    // A single large event has no steady mean, but noise alone does not reach
-    // it: Σ e² of as many independent samples as blocks varies by √(2/n).
+    // A single large event has no reproducible mean, but noise alone does not reach it: Σ e² of as many
+    // independent samples as blocks has the relative standard deviation √(2/n).
     let varies = (2.0 / blocks.len().max(1) as f64).sqrt();
     let steady = beyond_chance(&blocks, RULES.excess_standard_errors) > RULES.least_excess * noise;
     steady || excess > (RULES.least_excess + RULES.event_deviations * varies) * noise
 }
 
-/// The cycle that explains most; a multiple of it explains as much and is not
-/// preferred.
+/// The cycle that explains most; its multiples explain as much and are not preferred.
 fn shortest_cycle(cycles: Vec<Where>) -> Option<Where> {
     cycles.into_iter().reduce(|best, next| {
         if next.explained_fraction > RULES.longer_cycle * best.explained_fraction {
@@ -319,7 +317,7 @@ fn along(errors: &Errors, binned: &Binned, excess: f64, above_noise: bool) -> Wh
     }
 }
 
-/// The bin with the most excess per sample and its neighbours of at least half that.
+/// The bin with the largest unexplained variance per sample, and its neighbours with at least half of that.
 fn worst(tallies: &[Tally], samples: f64, single: bool) -> (usize, usize, Tally) {
     let large = |i: &usize| tallies[*i].count >= RULES.worst_holds * samples;
     let peak = (0..tallies.len())
@@ -342,7 +340,7 @@ fn worst(tallies: &[Tally], samples: f64, single: bool) -> (usize, usize, Tally)
     (first, last, sum)
 }
 
-/// The run of bins with the fewest samples that holds three quarters of the excess.
+/// The interval of fewest samples with three quarters of the unexplained variance.
 fn concentration(
     tallies: &[Tally],
     ranges: &[(f64, f64)],

@@ -1,4 +1,4 @@
-//! the noise level that a residual is judged against.
+//! The noise level with which a residual is compared.
 
 use super::explained::Errors;
 use super::rules::RULES;
@@ -10,14 +10,13 @@ use crate::data::Record;
 pub enum NoiseSource {
     /// The standard error `y_sd` of the recordings.
     Measured,
-    /// Estimated: how y differs between periods of the same command.
+    /// Estimated from repeats: the scatter of y between periods of the same command.
     Repeats,
-    /// Estimated from sample to sample: slow noise is not in it.
+    /// Estimated from sample-to-sample scatter; slow noise is not included.
     Scatter,
 }
 
-/// σ² of the noise, per record and sample, and where it comes from. Records
-/// without `y_sd` decide for all.
+/// σ² of the noise per record and sample, and its source. If one record lacks `y_sd`, all are estimated.
 pub(super) fn floor(records: &[&Record], residual: &[Vec<f64>]) -> (Vec<Vec<f64>>, NoiseSource) {
     let measured: Option<Vec<Vec<f64>>> = records
         .iter()
@@ -44,8 +43,8 @@ pub(super) fn floor(records: &[&Record], residual: &[Vec<f64>]) -> (Vec<Vec<f64>
     (constant, source)
 }
 
-/// Half the mean square difference between samples a few periods of the command
-/// apart; the least over the number of periods.
+/// Half the mean square difference between samples whole command periods apart; the least over the number of
+/// periods.
 fn by_repeats(record: &Record) -> Option<f64> {
     let period = command_period(&record.u)?;
     let history = (RULES.history_s / record.sample_period_s).round().max(1.0) as usize;
@@ -54,13 +53,13 @@ fn by_repeats(record: &Record) -> Option<f64> {
         let shift = periods * period;
         let (mut same, mut pairs, mut sum) = (0, 0.0, 0.0);
         for k in shift..record.len() {
-            // How long the command has been what it was `shift` earlier.
+            // Number of samples for which the command has equalled itself `shift` samples earlier.
             same = if record.u[k] == record.u[k - shift] {
                 same + 1
             } else {
                 0
             };
-            // A second of rest is a repeat as well, but it says nothing of the flow.
+            // Long rests repeat as well, but contain no information about the flow.
             if same > history + period {
                 let difference = record.y[k] - record.y[k - shift];
                 sum += difference * difference;
@@ -92,8 +91,8 @@ fn command_period(u: &[f64]) -> Option<usize> {
     periodic.then_some(middle)
 }
 
-/// σ² of white noise from third differences, which smooth motion leaves small;
-/// their median, which edges do not move.
+/// σ² of white noise from third differences, in which smooth motion is small; by the median, which edges do
+/// not affect.
 fn by_scatter(e: &[f64]) -> f64 {
     let mut squares: Vec<f64> = e
         .windows(4)
@@ -106,7 +105,7 @@ fn by_scatter(e: &[f64]) -> f64 {
 }
 
 impl Errors {
-    /// σ of the noise, root mean square over what is judged.
+    /// Noise level on the scored samples, rms.
     pub(super) fn noise_rmse(&self) -> f64 {
         let each = self.noise.iter().zip(&self.lead);
         let judged = each.flat_map(|(n, lead)| n.iter().skip(*lead));

@@ -1,4 +1,4 @@
-//! Plants with something hidden in them: does the split point at it?
+//! Synthetic plants with a hidden effect, on which the split is tested.
 
 use super::{FailureCoordinate, Failures, where_it_fails};
 use crate::data::{Record, Use};
@@ -7,14 +7,14 @@ use crate::model::{Delay, Model};
 use firmware_sim::hidden_set::HiddenSetPlan;
 use model_core::effects::StateDependentDelay;
 
-/// The records of a plant, as a user would have them.
+/// The records of a plant in the user's format.
 pub(crate) fn records(effects: &[&str], faults: &[&str], seed: u64) -> Vec<Record> {
     let plan = HiddenSetPlan::draw(effects, faults, seed).expect("a known effect");
     let set = plan.build().expect("a possible plant");
     set.data.records
 }
 
-/// The leanest bilinear model with a state-dependent delay, identified on the records.
+/// The lowest-order bilinear model with a state-dependent delay, identified on the records.
 pub(crate) fn base(records: &[Record]) -> Model {
     let learning: Vec<&Record> = records.iter().filter(|r| r.role == Use::Identify).collect();
     let given = Model {
@@ -31,7 +31,7 @@ pub(crate) fn split(effects: &[&str], faults: &[&str], seed: u64) -> Failures {
     where_it_fails(&base(&records), &records).expect("a stable model")
 }
 
-/// The three faults outside the catalogue, where the right coordinate leads.
+/// Three faults outside the catalogue for which the correct coordinate has the largest share.
 #[test]
 fn faults_are_pointed_at() {
     for seed in 100..103 {
@@ -67,7 +67,7 @@ fn a_perfect_model_has_nothing_to_explain() {
     }
 }
 
-/// An error that is far above the stated noise but a function of nothing.
+/// A white error far above the stated noise is a function of no coordinate.
 #[test]
 fn pure_noise_explains_nothing() {
     use firmware_sim::instrument::{Noise, NoiseSignal};
@@ -98,7 +98,7 @@ fn pure_noise_explains_nothing() {
         let noisy: Vec<&Record> = noisy.iter().collect();
         let found = super::examine(&noisy, runs.clone(), 40);
         assert!(found.above_noise, "four times the stated noise");
-        // Coloured noise is in a band of its own: that much is true.
+        // Coloured noise does occupy a frequency band.
         let itself = FailureCoordinate::FrequencyBand;
         let other = found.by.iter().filter(|w| w.coordinate != itself);
         coordinates += other.clone().count();
@@ -108,7 +108,7 @@ fn pure_noise_explains_nothing() {
     assert!(50 * alarms <= coordinates, "{alarms} of {coordinates}");
 }
 
-/// Which coordinates lead for what is hidden: the rules of this room were calibrated on it.
+/// The leading coordinates of each hidden effect, on which the rules of this module were calibrated.
 #[test]
 #[ignore = "a table for people: cargo test --release -p host-fit table_of_plants -- --ignored --nocapture"]
 fn table_of_plants() {

@@ -1,4 +1,4 @@
-//! Which samples a bar of "where it fails" stands for.
+//! The samples behind each bar of "where it fails".
 
 use super::binned::values;
 use super::{Failures, Where};
@@ -6,8 +6,9 @@ use crate::data::Record;
 use crate::picture::Stretches;
 
 impl Failures {
-    /// Per coordinate and record, which bin each sample is in: what a page lights up. Also for records that were not judged.
-    /// `runs` are the free runs of `records`, `delay` the samples from the command to the flow.
+    /// Bin of each sample, per coordinate and record, for highlighting on a page; validation and other
+    /// records alike. `runs` are the free runs of `records`, `delay` the dead time from command to flow in
+    /// samples.
     #[must_use]
     pub fn samples(
         &self,
@@ -58,7 +59,7 @@ mod tests {
     use crate::data::{Record, Use};
     use crate::residual::{FailureCoordinate, examine};
 
-    /// The samples that a bar stands for have its error.
+    /// The samples of a bar have the bar's error.
     #[test]
     fn the_samples_of_a_bar_have_its_error() {
         let n = 6000;

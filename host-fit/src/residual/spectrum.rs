@@ -1,4 +1,4 @@
-//! The excess error by frequency band.
+//! Unexplained variance by frequency band.
 
 use super::coordinate::FailureCoordinate;
 use super::explained::Errors;
@@ -7,16 +7,16 @@ use super::{Interval, Where};
 use crate::picture::FailureBin;
 use realfft::{RealFftPlanner, RealToComplex};
 
-/// Energies of one piece in each band.
+/// Energies of one segment in each band.
 struct Piece {
     error: Vec<f64>,
-    /// Of y_sim about its mean.
+    /// Energy of y_sim about its mean.
     model: Vec<f64>,
     noise: f64,
 }
 
-/// How far the excess error's spectrum departs from that of y itself: a misfit
-/// that has y's own spectrum is at no particular frequency.
+/// Difference between the spectrum of the error above the noise and that of y: an error with the spectrum of
+/// y is at no particular frequency.
 pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
     let length = ((RULES.piece_s / errors.period_s) as usize).clamp(64, 4096);
     let length = 1 << length.ilog2();
@@ -44,8 +44,8 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
         return None;
     }
     let sum = |of: &dyn Fn(&Piece) -> f64| pieces.iter().map(of).sum::<f64>();
-    // The noise is taken for as white as the highest octave says, the rest of it
-    // for coloured like a first-order lag: lowest bands.
+    // The noise is modelled as white at the level of the highest octave plus first-order coloured noise in
+    // the lowest bands.
     let noise = sum(&|p| p.noise);
     let lines = |band: usize| limits[band + 1].floor() - limits[band].ceil() + 1.0;
     let all_lines: f64 = (0..bands).map(lines).sum();
@@ -67,7 +67,7 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
     };
     let mut gains = vec![0.0; pieces.len()];
     for half in 0..2 {
-        // Learned on every other piece, tested on the ones between.
+        // Trained on every other segment, tested on those between.
         let rich: Vec<usize> = (0..bands)
             .filter(|b| {
                 let mut learning = pieces.iter().skip(half).step_by(2);
@@ -84,8 +84,8 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
                 .sum();
         }
     }
-    // y_sd says nothing of the noise's colour: what is claimed for a band counts
-    // only as far as the error is not noise.
+    // y_sd does not give the colour of the noise: a band's share counts only in proportion to the unexplained
+    // variance.
     let known = excess / (excess + noise);
     let fraction =
         known * super::explained::beyond_chance(&gains, RULES.band_standard_errors) / excess;
@@ -121,8 +121,7 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
     })
 }
 
-/// Energy in each band of lines, summed so that all bands give Σ x²
-/// (without the mean's, which no frequency has).
+/// Energy of the spectral lines in each band, scaled so that all bands sum to Σ x² without the mean.
 fn energies(transform: &dyn RealToComplex<f64>, x: &[f64], limits: &[f64]) -> Vec<f64> {
     let n = x.len();
     let mean = x.iter().sum::<f64>() / n as f64;

@@ -1,4 +1,4 @@
-//! Whether the error after an edge grows with what came before the edge.
+//! Trend of the error after an edge with the dwell before the edge.
 
 use super::Where;
 use super::explained::Errors;
@@ -6,7 +6,7 @@ use super::rules::RULES;
 use crate::data::Record;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// How the error after edges changes with the dwell before them.
+/// Correlation of the error after edges with the dwell before them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trend {
     /// Whether the dwell is a rest (before rising edges) or a blow.
@@ -15,8 +15,7 @@ pub struct Trend {
     pub correlation: f64,
 }
 
-/// The trend in the worst stretch after edges; none for other coordinates or
-/// within chance.
+/// The trend in the worst interval after edges; none for other coordinates or if not significant.
 pub(super) fn from_edge_to_edge(
     errors: &Errors,
     records: &[&Record],
@@ -32,7 +31,7 @@ pub(super) fn from_edge_to_edge(
     for ((record, e), lead) in records.iter().zip(&errors.residual).zip(&errors.lead) {
         let edges = edges(&record.u);
         for (i, (at, up)) in edges.iter().enumerate() {
-            // The dwell before the first edge is not known to have begun with the record.
+            // The dwell before the first edge is unknown: it may have begun before the record.
             let Some((before, _)) = i.checked_sub(1).and_then(|i| edges.get(i)) else {
                 continue;
             };

@@ -1,4 +1,4 @@
-//! The split of an error, read out in plain language.
+//! The split of an error in sentences.
 
 use super::coordinate::FailureCoordinate;
 use super::rules::RULES;
@@ -11,10 +11,10 @@ impl Failures {
         let floor = match self.noise_source {
             NoiseSource::Measured => "the noise level (`y_sd`)",
             NoiseSource::Repeats => {
-                "a noise level estimated from repeats of the command (no `y_sd`)"
+                "a noise level (estimated from repeats of the command, because there is no `y_sd`)"
             }
             NoiseSource::Scatter => {
-                "a noise level estimated from sample-to-sample scatter (no `y_sd`), without slow noise"
+                "a noise level (estimated from sample-to-sample scatter, because there is no `y_sd`; slow noise is not included)"
             }
         };
         let (rmse, noise) = (number(self.rmse), number(self.noise_rmse));
@@ -51,7 +51,7 @@ impl Failures {
     }
 }
 
-/// What one coordinate says.
+/// The sentence about one coordinate.
 fn sentence(found: &Where) -> String {
     let explained = percent(found.explained_fraction);
     let coordinate = &found.coordinate;
@@ -110,7 +110,7 @@ fn percent(fraction: f64) -> String {
     format!("{:.0} %", 100.0 * fraction.clamp(0.0, 1.0))
 }
 
-/// A share in words where it has a name.
+/// A share, as a common fraction in words where possible.
 fn quarters(share: f64) -> String {
     if (0.72..0.80).contains(&share) {
         "Three quarters".to_owned()

@@ -1,9 +1,8 @@
 //! Evaluation of trial points: cache, order, threads, budget, interrupt.
 //!
-//! A list of points is tried in its order until one is better than the
-//! incumbent. With several threads points are evaluated ahead, but everything
-//! after the first success in order is forgotten, so cache, count and decision
-//! are those of one thread.
+//! Points are tried in order until one is better than the incumbent. With several threads points are
+//! evaluated ahead; results after the first success in order are discarded, so that cache, count and decision
+//! equal those of one thread.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -33,7 +32,7 @@ pub struct Snapshot {
 pub trait Progress: Sync {
     /// Called after each block of evaluations and each improvement, on the searching thread.
     fn report(&self, snapshot: &Snapshot);
-    /// The point that is best so far, called after each report of one.
+    /// The best point so far, after each report of one.
     fn best(&self, _point: &Point) {}
 }
 
@@ -42,7 +41,7 @@ impl Progress for () {
     fn report(&self, _: &Snapshot) {}
 }
 
-/// A point better than the one compared with.
+/// A point with a lower value than the one compared with.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Success {
     /// The better point.
@@ -73,7 +72,7 @@ impl<'a, P: Problem> Evaluator<'a, P> {
         progress: &'a dyn Progress,
         interrupt: &'a AtomicBool,
     ) -> Self {
-        // Without a pool of its own the search still runs, on the caller's thread.
+        // If no thread pool can be created, the search runs on the caller's thread.
         let pool = (threads > 1)
             .then(|| {
                 rayon::ThreadPoolBuilder::new()
@@ -135,7 +134,7 @@ impl<'a, P: Problem> Evaluator<'a, P> {
         self.interrupt.load(Ordering::Relaxed)
     }
 
-    /// What is remembered of a point, if anything.
+    /// The cached evaluation of a point, if any.
     pub fn remembered(&self, point: &[i64]) -> Option<Evaluation> {
         self.cache.get(&self.problem.canonical(point)).copied()
     }
@@ -151,7 +150,7 @@ impl<'a, P: Problem> Evaluator<'a, P> {
     ) -> Result<Option<Success>, StopReason> {
         let mut rest = points;
         while !rest.is_empty() {
-            // A block is the next few points that the cache does not settle.
+            // A block is the next few points that are not in the cache.
             let mut block: Vec<(&Point, Point)> = Vec::with_capacity(BLOCK);
             let mut taken = 0;
             let mut known = None;

@@ -113,7 +113,7 @@ pub fn minimise<P: Problem>(
     }
 }
 
-/// Runs MADS from `start` until it is locally optimal and every step has given up.
+/// Runs MADS from `start` until the point is locally optimal and no search step improves it.
 pub(crate) fn descend<P: Problem>(
     evaluator: &mut Evaluator<'_, P>,
     steps: &mut [Box<dyn SearchStep<P>>],
@@ -313,7 +313,7 @@ mod tests {
 
     #[test]
     fn a_staircase_with_ripples_needs_the_kicks() {
-        // Flat steps three wide, a ripple of local minima, global minimum at (60, 60).
+        // A staircase with steps three wide, a ripple of local minima, and the global minimum at (60, 60).
         fn staircase(x: &[f64]) -> f64 {
             x.iter()
                 .map(|v| ((v - 60.0) / 3.0).trunc().abs() + 3.0 * (1.0 - ((v - 60.0) * 0.7).cos()))

@@ -1,4 +1,4 @@
-//! What a search minimises.
+//! The minimisation problem of a search.
 
 use super::variable::{Point, Variable};
 
@@ -7,7 +7,7 @@ use super::variable::{Point, Variable};
 pub enum Evaluation {
     /// The exact value; `f64::INFINITY` for a point that has none.
     Value(f64),
-    /// The evaluation was given up early: the value is not below this one.
+    /// The evaluation stopped early: the value is at least this.
     AtLeast(f64),
 }
 
@@ -20,8 +20,8 @@ pub trait Problem: Sync {
     /// The variables, in the order of a point's coordinates.
     fn variables(&self) -> &[Variable];
 
-    /// Name under which the cache knows a point. Points that the problem cannot
-    /// tell apart (permuted or repeated delays) should share one.
+    /// The cache key of a point. Points that are equivalent for the problem (permuted or repeated delays)
+    /// should share one.
     fn canonical(&self, point: &[i64]) -> Point {
         point.to_vec()
     }

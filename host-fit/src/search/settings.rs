@@ -5,7 +5,7 @@ use super::rules::RULES;
 /// Settings of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Most evaluations of the objective; points remembered from before cost nothing.
+    /// Most evaluations of the objective; cached points are free.
     pub evaluations: usize,
     /// Seed of every random choice: the same seed gives the same result bit for bit.
     pub seed: u64,
@@ -17,12 +17,12 @@ pub struct Settings {
     pub initial_frame: f64,
 }
 
-/// How many directions a poll tries.
+/// Number of directions of a poll.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PollKind {
     /// Both signs of an orthogonal basis: 2n points.
     Ortho2N,
-    /// The better-looking half of them and minus their sum: n + 1 points.
+    /// The more promising half of them and minus their sum: n + 1 points.
     OrthoNPlus1,
 }
 

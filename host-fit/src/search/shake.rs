@@ -14,8 +14,8 @@ use super::stop::StopReason;
 
 /// Variable neighbourhood search: from a local optimum, a kick and a descent.
 ///
-/// Each fruitless kick is larger than the one before; a success starts again
-/// with small ones. Audet, Béchard, Le Digabel, J. Glob. Optim. 41, 2008.
+/// Kicks grow while they are unsuccessful and restart small after a success. Audet, Béchard, Le Digabel, J.
+/// Glob. Optim. 41, 2008.
 #[derive(Debug)]
 pub struct Shake {
     patience: usize,
@@ -23,7 +23,7 @@ pub struct Shake {
 }
 
 impl Shake {
-    /// Gives up after `patience` kicks in a row without a success.
+    /// Gives up after `patience` consecutive kicks without a success.
     pub fn new(patience: usize) -> Self {
         Self {
             patience,
@@ -43,7 +43,7 @@ impl<P: Problem> SearchStep<P> for Shake {
         }
         self.fruitless += 1;
         let variables = evaluator.problem().variables().to_vec();
-        // The kick grows over the allowed tries and moves a random share of the variables.
+        // The kick grows over the allowed attempts and moves a random subset of the variables.
         let growth = RULES.largest_kick - RULES.least_kick;
         let share = RULES.least_kick + growth * self.fruitless as f64 / self.patience as f64;
         let moving: f64 = around.rng.random_range(0.2..1.0);

@@ -1,4 +1,4 @@
-//! Search steps: anything that may find a better point before the poll does.
+//! Search steps: heuristics that may find a better point before the poll.
 
 use rand_chacha::ChaCha8Rng;
 
@@ -9,7 +9,7 @@ use super::rules::RULES;
 use super::stop::StopReason;
 use super::variable::Point;
 
-/// Where the search stands when a step is asked for a better point.
+/// State of the search when a step is called.
 pub struct Around<'a> {
     /// The incumbent.
     pub point: &'a [i64],
@@ -21,14 +21,13 @@ pub struct Around<'a> {
     pub last_step: Option<&'a [i64]>,
     /// Whether the mesh is at one tick and every neighbour is known to be no better.
     pub locally_optimal: bool,
-    /// The search's source of randomness.
+    /// Random generator of the search.
     pub rng: &'a mut ChaCha8Rng,
 }
 
 /// A search step of MADS.
 ///
-/// Generic steps are [`Speculative`] and [`Shake`](super::Shake); a problem brings its own for
-/// what only it knows.
+/// Generic steps are [`Speculative`] and [`Shake`](super::Shake); a problem can add its own.
 pub trait SearchStep<P: Problem> {
     /// Looks for a point better than the incumbent.
     ///
@@ -40,13 +39,13 @@ pub trait SearchStep<P: Problem> {
         around: &mut Around<'_>,
     ) -> Result<Option<Success>, StopReason>;
 
-    /// Whether nothing more is to be expected of this step at a locally optimal
-    /// incumbent. The search ends when all steps have given up.
+    /// Whether the step cannot improve a locally optimal incumbent any more. The search ends when all steps
+    /// have given up.
     fn has_given_up(&self) -> bool {
         true
     }
 
-    /// Points that the step judged by a closed form of its own, without evaluating them.
+    /// Points that the step evaluated in closed form, without the objective.
     fn screened(&self) -> usize {
         0
     }
@@ -85,16 +84,15 @@ impl<P: Problem> SearchStep<P> for Speculative {
     }
 }
 
-/// From the incumbent, the point that a [`Settle`] ends at and, where that is better, the success; adds
-/// to the number of points screened.
+/// From the incumbent, the end point of a [`Settle`] and, if it is better, the success; adds to the number of
+/// points screened.
 pub type Improve<P> = fn(
     &mut Evaluator<'_, P>,
     &Around<'_>,
     &mut usize,
 ) -> Result<(Point, Option<Success>), StopReason>;
 
-/// An improvement that depends on nothing but the incumbent: made once from each, and not
-/// from where it ended itself.
+/// An improvement that depends only on the incumbent: applied once to each, and not to its own results.
 pub struct Settle<P: Problem> {
     improve: Improve<P>,
     settled_at: Option<Point>,
@@ -102,7 +100,7 @@ pub struct Settle<P: Problem> {
 }
 
 impl<P: Problem> Settle<P> {
-    /// A step that makes `improve`.
+    /// A step that applies `improve`.
     pub fn new(improve: Improve<P>) -> Self {
         Self {
             improve,

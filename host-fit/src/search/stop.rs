@@ -20,12 +20,12 @@ pub enum StopReason {
 }
 
 impl StopReason {
-    /// Whether the search ended by itself because nothing better was left nearby.
+    /// Whether the search ended because no neighbour is better.
     pub fn was_successful(self) -> bool {
         matches!(self, Self::LocallyOptimal | Self::NothingToSearch)
     }
 
-    /// Whether the way the search was called, not the data, is the cause.
+    /// Whether the call, not the data, is the cause.
     pub fn was_usage_issue(self) -> bool {
         matches!(self, Self::NothingToSearch)
     }

@@ -2,16 +2,16 @@
 
 use serde::Serialize;
 
-/// Stands for the model file in [`Answer::next`] until [`Answer::with_files`] names it.
+/// Placeholder of the model file in [`Answer::next`], replaced by [`Answer::with_files`].
 pub const MODEL: &str = "model.toml";
-/// Stands for the data set in [`Answer::next`] until [`Answer::with_files`] names it.
+/// Placeholder of the data set in [`Answer::next`], replaced by [`Answer::with_files`].
 pub const DATASET: &str = "DATASET";
 
-/// What a verdict announces.
+/// Tone of a verdict.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Tone {
-    /// Nothing is left to do here.
+    /// Complete: no further step is needed.
     Good,
     /// Something was found.
     #[default]
@@ -41,11 +41,11 @@ pub struct Answer {
     pub verdict: String,
     /// One number and what it is compared with.
     pub evidence: String,
-    /// How sure it is, and by which test; empty where nothing was tested.
+    /// The confidence with its test; empty if nothing was tested.
     pub confidence: String,
-    /// The command to run next; empty where none follows.
+    /// The next command; empty if there is none.
     pub next: String,
-    /// What limits or qualifies the result, one point each.
+    /// Limitations of the result, one each.
     pub notes: Vec<String>,
 }
 
@@ -81,7 +81,7 @@ impl Answer {
         self
     }
 
-    /// Adds a point; an empty one is passed over.
+    /// Adds a note; an empty one is ignored.
     pub fn note(&mut self, text: impl Into<String>) {
         let text = text.into();
         if !text.trim().is_empty() {
@@ -89,7 +89,7 @@ impl Answer {
         }
     }
 
-    /// With the user's own files in the next command, quoted as a shell takes them.
+    /// Replaces the placeholders in the next command by the user's files, quoted for a shell.
     #[must_use]
     pub fn with_files(mut self, model: &str, dataset: &str) -> Self {
         let words = self.next.split(' ').map(|word| match word {
@@ -136,7 +136,7 @@ impl Answer {
         text
     }
 
-    /// As sentences in a row, for a JSON document.
+    /// As consecutive sentences, for a JSON document.
     #[must_use]
     pub fn sentence(&self) -> String {
         let mut text = format!("{}.", self.verdict);
@@ -163,7 +163,7 @@ const INDENT: usize = 14;
 /// Words in lines of at most `columns` characters; a longer word has a line of its own.
 fn wrapped(text: &str, columns: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    // A number keeps its unit, an abbreviation its number.
+    // A number stays with its unit, and an abbreviation with its number.
     let kept = text.replace(" %", "\u{a0}%").replace("RMSE ", "RMSE\u{a0}");
     for word in kept.split(' ').filter(|word| !word.is_empty()) {
         match lines.last_mut() {

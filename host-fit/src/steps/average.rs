@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::StepError;
 use crate::data::{AverageSummary, Averaging, DataSet, average_files};
 
-/// What averaging gave. Serialises to the keys of `average --json`.
+/// Result of averaging. Serialises to the keys of `average --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Average {
     /// The phase-averaged records.
@@ -15,7 +15,7 @@ pub struct Average {
     pub set: DataSet,
     /// Hash of the data set.
     pub hash: String,
-    /// What became of each recording.
+    /// Summary of each recording.
     pub recordings: Vec<AverageSummary>,
 }
 
@@ -50,7 +50,7 @@ pub fn average(
     })
 }
 
-/// Refuses names of records to hold out that none of the files gives.
+/// Rejects names of validation records that none of the files has.
 pub(super) fn check_names(files: &[&Path], validate: &[String]) -> Result<(), StepError> {
     let stems: Vec<_> = files.iter().filter_map(|p| p.file_stem()).collect();
     let unknown = |name: &&String| !stems.iter().any(|stem| *stem == name.as_str());

@@ -1,11 +1,11 @@
-//! What usual linear models reach on the samples that a model is scored on.
+//! Reference models: FIT of standard linear models on the scored samples.
 
 use crate::baseline::{BaselineFits, Baselines};
 use crate::data::{Record, Use};
 use crate::preparation::scored_samples;
 use serde::Serialize;
 
-/// Baselines beside a model, on the same scored samples.
+/// Baselines with the scored samples.
 #[derive(Clone, Debug, Serialize)]
 pub struct Beside {
     /// FIT of each, %: on the validation records, or on the estimation records where there are none.
@@ -49,7 +49,7 @@ impl Beside {
         }
     }
 
-    /// What the user should know of a model with this FIT beside the best baseline, if that is better.
+    /// A note if the best baseline has a higher FIT than this.
     pub(super) fn better_than(&self, fit_percent: f64) -> Option<String> {
         let (name, best) = self.fits.best()?;
         let behind = best - fit_percent;
@@ -62,5 +62,5 @@ impl Beside {
     }
 }
 
-/// A model this far behind a baseline is not the answer, points of FIT.
+/// A model is replaced by a baseline with a FIT higher by this many points.
 const BEHIND_POINTS: f64 = 1.0;

@@ -1,4 +1,4 @@
-//! The delay law (2), taken from the records themselves.
+//! Candidate for the delay law (2), from the records.
 
 use super::StepError;
 use crate::averages::averaged_past;
@@ -10,8 +10,8 @@ use crate::model::{Delay, Model};
 use model_core::average::WINDOW;
 use model_core::effects::StateDependentDelay;
 
-/// Law (2) from the edges; where they do not support one, as the leanest model fits it in free run. `None` where it is
-/// negative on the records. Whether it does better than a constant delay is for the caller to test.
+/// Law (2) from the edges; if they do not support one, from a free-run fit with the lowest-order model.
+/// `None` if it is negative on the records. The caller tests it against a constant delay.
 pub(super) fn candidate_law(
     set: &DataSet,
     learning: &[&Record],
@@ -40,7 +40,7 @@ pub(super) fn candidate_law(
     Ok(is_positive(law, learning).then_some((law, origin)))
 }
 
-/// The law of the edges in the form of a model.
+/// The law of the edges in the model's form.
 fn law_of_edges(study: &DelayStudy) -> Option<ExponentialDelay> {
     let law = study.law.as_ref()?;
     let law = ExponentialDelay {
@@ -51,7 +51,7 @@ fn law_of_edges(study: &DelayStudy) -> Option<ExponentialDelay> {
     (law.floor >= 0.0 && law.rate > 0.0).then_some(law)
 }
 
-/// Whether a law is at least 0 at the smallest and at the largest ỹ of some records, and so at all between. ỹ below 0
+/// Whether a law is at least 0 at the smallest and largest ỹ of the records, and therefore between. ỹ below 0
 /// counts as 0.
 fn is_positive(law: ExponentialDelay, learning: &[&Record]) -> bool {
     let outputs = learning.iter().flat_map(|r| averaged_past(&r.y, WINDOW));

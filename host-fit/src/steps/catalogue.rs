@@ -16,17 +16,17 @@ pub struct EffectEntry {
     pub summary: &'static str,
     /// Its equation.
     pub equation: &'static str,
-    /// The measured channel that it needs.
+    /// The measured channel that it needs, if any.
     pub channel: Option<&'static str>,
     /// Where it is described.
     pub source: &'static str,
-    /// What records show where it is named.
+    /// The behaviour of the records that it describes.
     pub shows: Option<String>,
-    /// The check at the bench that would confirm it.
+    /// The bench check that would confirm it.
     pub check: Option<&'static str>,
-    /// Candidates with a similar residual, and what distinguishes them.
+    /// Candidates with a similar residual, and how to distinguish them.
     pub confused_with: Option<&'static str>,
-    /// Whether it belongs to base models, so that it is never reported as missing.
+    /// Whether it is a base term, which is never reported as missing.
     pub base: bool,
     /// Its parameters.
     pub parameters: Vec<ParameterEntry>,
@@ -39,9 +39,9 @@ pub struct ParameterEntry {
     pub name: &'static str,
     /// Its unit.
     pub unit: &'static str,
-    /// Lowest value that is tried.
+    /// Lower end of the searched range.
     pub low: f64,
-    /// Highest.
+    /// Upper end of the searched range.
     pub high: f64,
 }
 
@@ -81,7 +81,7 @@ pub fn catalogue() -> Vec<EffectEntry> {
     SPECS.iter().map(EffectEntry::from).collect()
 }
 
-/// The terms of base models: what `identify` may give a model without naming an effect, and the delay laws of base models.
+/// The base terms that `identify` may add, and the delay laws of base models.
 #[must_use]
 pub fn base_terms() -> Vec<EffectEntry> {
     let laws = LAWS.iter().filter(|law| law.base);

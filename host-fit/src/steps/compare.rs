@@ -1,4 +1,4 @@
-//! How well a model matches, and where it fails.
+//! Comparison of a model with records: indicators and where it fails.
 
 use serde::{Serialize, Serializer};
 
@@ -9,7 +9,7 @@ use crate::indicators::{Scores, score};
 use crate::model::Model;
 use crate::residual::{Failures, where_it_fails};
 
-/// A model beside recordings. Serialises to the keys of `compare --json`.
+/// A model compared with records. Serialises to the keys of `compare --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Indicators per record, and of the identify and of the validate records together.
@@ -30,7 +30,8 @@ pub struct Comparison {
     pub runs: Vec<Vec<f64>>,
 }
 
-/// Several models beside the same recordings. Serialises to the keys of `compare --json` of several models.
+/// Several models compared with the same records. Serialises to the keys of `compare --json` of several
+/// models.
 #[derive(Clone, Debug, Serialize)]
 pub struct SideBySide {
     /// The answer: which model has the lowest error.
@@ -42,13 +43,13 @@ pub struct SideBySide {
 /// One of several models.
 #[derive(Clone, Debug, Serialize)]
 pub struct NamedComparison {
-    /// What it is called.
+    /// Its name.
     pub model: String,
-    /// Parameters: coefficients that are not 0, those of the delay and of the effects.
+    /// Number of parameters: non-zero coefficients, delay and effects.
     pub parameters: usize,
     /// Its effects.
     pub effects: Vec<String>,
-    /// What a comparison of it alone says.
+    /// Its own comparison.
     #[serde(flatten)]
     pub comparison: Comparison,
 }

@@ -1,4 +1,4 @@
-//! The delay of every edge, and the law through them.
+//! The delays of all edges, and the law fitted to them.
 
 use std::io;
 
@@ -18,13 +18,13 @@ pub struct DelayReport {
     pub window: u32,
     /// Names of the records.
     pub records: Vec<String>,
-    /// What was measured.
+    /// The measurement.
     pub study: DelayStudy,
-    /// What the commands cannot tell, one sentence each.
+    /// Remarks on the excitation, one sentence each.
     pub remarks: Vec<String>,
 }
 
-/// One edge as JSON and CSV have it.
+/// An edge in JSON and CSV.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EdgeReport<'a> {
     record: &'a str,
@@ -63,7 +63,7 @@ impl<'a> EdgeReport<'a> {
 }
 
 impl DelayReport {
-    /// Every edge as JSON and CSV have it.
+    /// All edges for JSON and CSV.
     #[must_use]
     pub fn edges(&self) -> Vec<EdgeReport<'_>> {
         let each = self.study.edges.iter();
@@ -71,10 +71,10 @@ impl DelayReport {
             .collect()
     }
 
-    /// Writes every edge as CSV.
+    /// Writes all edges as CSV.
     ///
     /// # Errors
-    /// What the writer says.
+    /// Errors of the writer.
     pub fn write_csv(&self, out: impl io::Write) -> io::Result<()> {
         let mut csv = csv::Writer::from_writer(out);
         for edge in self.edges() {

@@ -1,4 +1,4 @@
-//! A control law from a model, and the law tried in the loop.
+//! Design of a control law and its trials in closed loop.
 
 use serde::Serialize;
 
@@ -14,8 +14,8 @@ use crate::model::{Law, Model};
 use crate::terms::Units;
 use closed_loop::Controlled;
 
-/// What a law is for. Levels are what the sensor shows, in the unit of the records, its zero included; costs and rates are in
-/// that unit.
+/// Goal of a law. Levels are sensor readings, offset included, in the unit of the records; costs and rates
+/// are in the same unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DesignRequest {
     /// Hold the friction at a value.
@@ -24,41 +24,42 @@ pub enum DesignRequest {
     Maximise(MaximiseRequest),
 }
 
-/// A designed law. Serialises to the keys of `design --json`, those of the trials left out: they are a [`Proof`]'s.
+/// A designed law. Serialises to the keys of `design --json` except the trials, which belong to [`Proof`].
 #[derive(Clone, Debug, Serialize)]
 pub struct Design {
     /// The model with its law.
     #[serde(skip)]
     pub model: Model,
-    /// The loop's period, which the law's times are samples of, s.
+    /// Sample period of the loop, the unit of the law's times, s.
     pub sample_period_s: f64,
     /// The law.
     pub law: Law,
-    /// What the sensor shows of a flow without friction, y: levels here and in trials are with it, those of the law without.
+    /// Sensor offset: the reading without friction, y. Levels here and in trials include it, those of the law
+    /// do not.
     pub sensor_zero: f64,
-    /// What the design rests on.
+    /// Figures of the design.
     #[serde(flatten)]
     pub outcome: DesignOutcome,
-    /// Size of y, for which the rules of the design are written at 1.
+    /// Size of y; the rules of the design assume 1.
     #[serde(skip)]
     pub(crate) size: f64,
-    /// Noise of the sensor in units of a usual hot film's.
+    /// Sensor noise in units of a typical hot film's.
     #[serde(skip)]
     pub(crate) noise: f64,
 }
 
-/// What a design rests on.
+/// Figures of a design.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DesignOutcome {
-    /// Of a tracking law.
+    /// For a tracking law.
     Track(TrackDesign),
-    /// Of a maximising law.
+    /// For a maximising law.
     Maximise(Optimum),
 }
 
 impl Design {
-    /// The same design, whose law says in which trials attachment was lost.
+    /// The same design with the trials in which attachment was lost noted in its law.
     #[must_use]
     pub fn which_lost(self, trials: Vec<String>) -> Self {
         let law = self.law.clone().which_lost(trials);
@@ -70,7 +71,7 @@ impl Design {
     }
 }
 
-/// Units in which y of `model` is of order one and the sensor's zero is at 0.
+/// Units in which y of `model` is of order one without sensor offset.
 #[must_use]
 pub fn units_of_order_one(model: &Model) -> Units {
     let zero = model.zero_among(&model.values());
@@ -96,11 +97,11 @@ impl TrackRequest {
     }
 }
 
-/// Longest time in a request, samples: a valve's shortest times, a period, a horizon. Beyond it no law is found within
-/// minutes, and the board's memory of the command ends before.
+/// Longest time in a request, samples: beyond it the search takes more than minutes, and the board's command
+/// memory is shorter.
 const LONGEST: f64 = 100_000.0;
 
-/// Refuses times that no law can be searched over.
+/// Rejects times outside the range of a search.
 fn check_times(model: &Model, request: &DesignRequest) -> Result<(), StepError> {
     let (min_on_s, min_off_s, period_s, horizon_s) = match request {
         DesignRequest::Track(r) => (r.min_on_s, r.min_off_s, None, None),
@@ -237,17 +238,17 @@ pub fn design(model: &Model, request: &DesignRequest) -> Result<Design, StepErro
     })
 }
 
-/// The flows that `set` leaves possible beside `model`: what a law has to keep attached.
+/// The plants beside `model` that `set` does not exclude, on which a law must keep attachment.
 ///
 /// # Errors
-/// [`StepError`]: other sampling, a missing channel, a model whose free run diverges.
+/// [`StepError`]: other sampling period, a missing channel, a model whose free run diverges.
 pub fn possible(model: &Model, set: &DataSet) -> Result<Vec<PossibleFlow>, StepError> {
     check_period(model, set)?;
     Ok(possible_flows(model, &prepared(set)?)?)
 }
 
-/// Tries the law of `design` on its model, on `possible` flows and on those under `stress`; figures are in the sensor's units,
-/// its zero included. Noise is repeatable by `seed`.
+/// Runs the law of `design` on its model, on `possible` plants and on those under `stress`; figures are
+/// sensor readings, offset included. Noise is repeatable by `seed`.
 pub fn try_out<F>(
     design: &Design,
     possible: &[PossibleFlow],
@@ -265,7 +266,8 @@ where
     };
     let proof = match (&design.law, &design.outcome) {
         (Law::Maximise(law), DesignOutcome::Maximise(optimum)) => {
-            // Pulses have no reference: steady blowing is the measure, or what they reach where that grows.
+            // Pulses have no reference: they are compared with steady blowing, or with their own level if
+            // that diverges.
             let blown = optimum.steady_mean.unwrap_or(optimum.mean) - design.sensor_zero;
             prove_pulses(&design.model, law, blown, &trials)
         }
@@ -277,7 +279,8 @@ where
     proof.shown_by(design.sensor_zero)
 }
 
-/// The margin of a tracking law: how wrong the model may be, with errors two at a time where `planes` are wanted. `None` for pulses, which do not depend on what is measured.
+/// The robustness margin of a tracking law, with pairs of errors if `planes` is set. `None` for pulses, which
+/// use no measurement.
 #[must_use]
 pub fn law_margin(design: &Design, seed: u64, planes: bool) -> Option<Margin> {
     let Law::Track(law) = &design.law else {
@@ -287,19 +290,19 @@ pub fn law_margin(design: &Design, seed: u64, planes: bool) -> Option<Margin> {
     Some(margin(&design.model, law, noise, seed, planes))
 }
 
-/// Whether a law for a target passes all trials that decide.
+/// Whether a law for a target passes all deciding trials.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TargetVerdict {
     /// The target, in the sensor's units.
     pub target: f64,
     /// Whether it passes.
     pub passes: bool,
-    /// Why it does not: the trials that lose attachment, or why there is no law.
+    /// Why it fails: the trials that lose attachment, or the error of the design.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
 }
 
-/// Which targets over the reachable interval pass when everything else of `request` is kept.
+/// The targets over the reachable interval that pass, with `request` otherwise unchanged.
 #[must_use]
 pub fn passing_targets(
     model: &Model,
@@ -312,7 +315,7 @@ pub fn passing_targets(
     let [low, high] = reachable;
     let verdict = |step: u32| {
         let share = f64::from(step) / f64::from(steps);
-        // Two digits of the interval are enough to choose by.
+        // Two digits of the interval are enough for a choice.
         let decimals = (1.0 - (high - low).log10().floor()).clamp(0.0, 9.0) as usize;
         let exact = low + share * (high - low);
         let target = format!("{exact:.decimals$}").parse().unwrap_or(exact);
@@ -333,7 +336,7 @@ pub fn passing_targets(
     (1..steps).map(verdict).collect()
 }
 
-/// What stands for a flow where nothing is tried under stress.
+/// Placeholder type for runs without stress trials.
 #[derive(Clone, Copy, Debug)]
 pub enum NoStress {}
 

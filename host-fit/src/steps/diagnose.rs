@@ -1,4 +1,4 @@
-//! Which physical effect is missing.
+//! Diagnosis of a missing physical effect.
 
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -20,32 +20,33 @@ use crate::power::{Detectable, detectable};
 use crate::residual::{FailureCoordinate, Failures, NoiseSource, Where, where_it_fails};
 use crate::simulate::SimulateError;
 
-/// A diagnosis with all that is said of it. Serialises to the keys of `diagnose --json`.
+/// A diagnosis with its reports. Serialises to the keys of `diagnose --json`.
 #[derive(Clone, Debug)]
 pub struct Finding {
-    /// The model that it ends in, with its training record: what was missing is in it.
+    /// The final model with the missing effects and its training record.
     pub model: Model,
     /// The diagnosis.
     pub diagnosis: Diagnosis,
     /// The answer: verdict, evidence, confidence, next command.
     pub answer: Answer,
-    /// Where that model still fails; none if its free run diverges.
+    /// Where the final model still fails; none if its free run diverges.
     pub failures: Option<Failures>,
-    /// Why there is none.
+    /// The error message if it diverges.
     pub unstable: Option<String>,
-    /// Indicators of that model.
+    /// Indicators of the final model.
     pub scores: Scores,
     /// The free run of the given model over each record, y; none if it diverges.
     pub runs_before: Option<Vec<Vec<f64>>>,
     /// The free run of the final model over each record, y; none if it diverges.
     pub runs: Option<Vec<Vec<f64>>>,
-    /// What a term that no catalogue has would do; looked for where the catalogue explains too little.
+    /// First-order prediction for a term outside the catalogue; computed if the catalogue explains too
+    /// little.
     pub beyond: Option<Glance>,
-    /// What of each effect would have been seen, had it been there; said where nothing is missing.
+    /// Detectable size of each effect; reported if nothing is missing.
     pub detectable: Vec<Detectable>,
-    /// The last error, y, of the runs that decided, where those were not whole runs over records marked `validate`.
+    /// The final validation error, y rms, if it is not that of whole free runs over `validate` records.
     pub judged_rmse: Option<f64>,
-    /// A measured channel that the error follows, and the share of its energy above the noise.
+    /// A measured channel that the error depends on, and the explained share of the unexplained variance.
     pub channel: Option<(String, f64)>,
 }
 
@@ -116,8 +117,8 @@ impl Serialize for Finding {
     }
 }
 
-/// Finds what `model` lacks on `set`, judged in free run on validation records. Effects of the user's own are tried with
-/// those of the catalogue if the model knows them ([`Model::define`]).
+/// Finds the effect that `model` lacks on `set`, by the free-run error on validation records. User effects
+/// known to the model ([`Model::define`]) are tried as well.
 ///
 /// ```no_run
 /// use host_fit::data::DataSet;
@@ -129,12 +130,13 @@ impl Serialize for Finding {
 /// let set = DataSet::load("data/hidden-ramp".as_ref())?;
 /// let found = diagnose(&model, &set, &Options::default(), &())?;
 /// println!("{}", found.answer.words());
-/// found.model.save("with-what-was-missing.toml".as_ref())?;
+/// found.model.save("with-the-missing-effect.toml".as_ref())?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
-/// [`StepError`]: different sampling periods, nothing to learn from, a missing channel, a user who ended it at once.
+/// [`StepError`]: different sampling periods, no estimation record, a missing channel, an interrupt before
+/// the first result.
 pub fn diagnose(
     model: &Model,
     set: &DataSet,
@@ -177,7 +179,7 @@ pub fn diagnose(
         Err(error) => return Err(error.into()),
     };
     let detectable = match detectable {
-        // A model on the verge of instability has no amplitudes to tell.
+        // A model at the stability limit has no detectable sizes.
         Err(SimulateError::Diverged { .. }) => Vec::new(),
         other => other?,
     };
@@ -218,9 +220,9 @@ pub fn diagnose(
     })
 }
 
-/// The errors of the ladder as `compare` has them of each model that stands there, and the given model in the place of
-/// one that errs more. Gives the last error as it was judged, where that was of other runs than whole ones over records
-/// marked `validate`: of runs that start anew, or of records left out in turn.
+/// Recomputes the errors of the ladder's models as `compare` does, and replaces models worse than the given
+/// one by it. Returns the final error if it is not that of whole runs over `validate` records, but of
+/// restarted runs or cross-validation.
 fn as_written(diagnosis: &mut Diagnosis, given: &Model, records: &[Record]) -> Option<f64> {
     let judged = diagnosis.ladder.last().map(|rung| rung.validate_rmse);
     for rung in &mut diagnosis.ladder {
@@ -249,8 +251,8 @@ fn as_written(diagnosis: &mut Diagnosis, given: &Model, records: &[Record]) -> O
     judged.filter(|_| !whole)
 }
 
-/// The measured channel that the error of the final model follows, and the share of its energy above the noise; none
-/// where it follows none, or an effect of the model has that channel.
+/// The measured channel that the error of the final model depends on, and the explained share; none if there
+/// is none, or if an effect of the model uses it already.
 fn followed_channel(diagnosis: &Diagnosis, failures: Option<&Failures>) -> Option<(String, f64)> {
     let failures = failures.filter(|failures| failures.above_noise)?;
     let known = diagnosis.model.channels();

@@ -1,4 +1,4 @@
-//! The term that is missing where no catalogue has it.
+//! Discovery of a term outside the catalogue.
 
 use super::onlooker::watched;
 use super::prepared::prepared;
@@ -19,7 +19,7 @@ use crate::terms::HeldOutBy;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
-/// A discovery with all that is said of it. Serialises to the keys of `discover --json`.
+/// A discovery with its reports. Serialises to the keys of `discover --json`.
 #[derive(Clone, Debug)]
 pub struct Terms {
     /// The model with the terms, with its training record.
@@ -130,8 +130,8 @@ pub fn discover(
     })
 }
 
-/// How the model that is handed over scores over whole `records`: the one that was found, or the given one where that
-/// errs less. The last rung of the ladder says the same.
+/// The final model by its free-run error over whole `records`: the found one, or the given one if its error
+/// is smaller. The last step of the ladder shows the same.
 fn as_written(
     discovery: &mut Discovery,
     given: &Model,
@@ -266,7 +266,7 @@ fn answer(discovery: &Discovery) -> Answer {
     answer
 }
 
-/// A term's formula, and what it is like.
+/// Adds a term's formula and its equivalent alternatives to the answer.
 fn describe_term(answer: &mut Answer, term: &FoundTerm) {
     if term.is_formula {
         let values = term.parameters.iter().map(|(name, estimate)| {
@@ -306,7 +306,7 @@ fn capitalised(text: &str) -> String {
     first.unwrap_or_default() + letters.as_str()
 }
 
-/// At which place the error enters, by its trace.
+/// The place at which the error enters, according to the trace.
 fn where_it_enters(trace: &Trace) -> String {
     let odds = trace
         .odds

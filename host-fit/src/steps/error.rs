@@ -1,4 +1,4 @@
-//! Why a step was not done.
+//! Errors of the steps.
 
 use crate::codegen::CodegenError;
 use crate::data::{AverageError, DataError, FilePlace};
@@ -12,26 +12,26 @@ use crate::simulate::SimulateError;
 use crate::user_effect::DefinitionError;
 use thiserror::Error;
 
-/// Why a step was not done: one paragraph with the remedy.
+/// Why a step failed: one paragraph with the remedy.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StepError {
-    /// The recordings are at fault.
+    /// An error in the recordings.
     #[error(transparent)]
     Data(#[from] DataError),
     /// Raw recordings cannot be averaged.
     #[error(transparent)]
     Average(#[from] AverageError),
-    /// The recordings are in order, but say too little.
+    /// The recordings are valid, but their excitation is not sufficient.
     #[error(transparent)]
     Excitation(#[from] ExcitationError),
-    /// The model file is at fault.
+    /// An error in the model file.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A user's own effect is at fault.
+    /// An error in a user effect.
     #[error(transparent)]
     Definition(#[from] DefinitionError),
-    /// A user's own effect has the name of another.
+    /// A user effect has the name of another one.
     #[error(transparent)]
     Define(#[from] DefineError),
     /// No model could be identified.
@@ -48,7 +48,7 @@ pub enum StepError {
     /// A free run could not be made.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
-    /// There is no diagnosis.
+    /// The diagnosis failed.
     #[error(transparent)]
     Diagnose(#[from] DiagnoseError),
     /// The model was not extended.
@@ -57,12 +57,12 @@ pub enum StepError {
     /// No law was designed.
     #[error(transparent)]
     Design(#[from] DesignError),
-    /// A time of a law that nothing can be searched over.
+    /// A time of a law outside the range of the search.
     #[error(
-        "a {what} of {time_s:?} s is none for a law of this model: give 0 to {longest_s} s (100000 samples)"
+        "a {what} of {time_s:?} s is outside the range for a law of this model: give 0 to {longest_s} s (100000 samples)"
     )]
     DesignTime {
-        /// What the time is of.
+        /// Name of the time.
         what: &'static str,
         /// The time, s.
         time_s: f64,
@@ -74,8 +74,8 @@ pub enum StepError {
     Codegen(#[from] CodegenError),
     /// A model and recordings of different sampling periods.
     #[error(
-        "{place}: `sample_period_s` is {data}, but the model was made for {model} s; its lags would mean other times. \
-         Identify a model on this data, or resample it"
+        "{place}: `sample_period_s` is {data}, but the model was made for {model} s, and its lags are \
+        counted in samples. Identify a model on this data, or resample it"
     )]
     SamplePeriod {
         /// The recordings.
@@ -85,7 +85,7 @@ pub enum StepError {
         /// The model's, s.
         model: f64,
     },
-    /// Factors that are none.
+    /// Invalid factors.
     #[error("--factors takes finite numbers that are not below 0, as in --factors 1")]
     BadFactors,
     /// Factors without a law.
@@ -93,10 +93,10 @@ pub enum StepError {
     FactorsWithoutLaw,
     /// No delay law could be measured.
     #[error(
-        "no delay law could be found on these records; prescribe one with --delay-law P0,P1,P2, or use --delay fixed"
+        "no delay law is identifiable on these records; prescribe one with --delay-law P0,P1,P2, or use --delay fixed"
     )]
     NoDelayLaw,
-    /// A command sampled otherwise than the model.
+    /// The command's sampling period differs from the model's.
     #[error(
         "{place}: the samples are {input} s apart, but the model has a sample period of {model} s; resample the command"
     )]
@@ -108,16 +108,16 @@ pub enum StepError {
         /// The model's, s.
         model: f64,
     },
-    /// The model that was found does not stay finite on its own records.
+    /// The free run of the identified model diverges on its own records.
     #[error(
-        "no model was written: the best that was found does not stay finite on these records ({0}). Use fewer lags \
+        "no model was written: the free run of the best model diverges on these records ({0}). Use fewer lags \
          (`--n1 1 --n2 1`), or a longer record with more switchings"
     )]
     Unstable(crate::simulate::SimulateError),
-    /// An effect does not help.
+    /// An effect does not lower the error.
     #[error(
-        "nothing was written: with {effects} the error of the free run does not fall ({before} → {after} on the {on} \
-         records). Use the model as it was, or another effect (`host-fit diagnose` ranks them)"
+        "nothing was written: with {effects} the error of the free run does not decrease ({before} → {after} \
+        on the {on} records). Use the model as it was, or another effect (`host-fit diagnose` ranks them)"
     )]
     NoGain {
         /// The effects.
@@ -129,14 +129,14 @@ pub enum StepError {
         /// `validation` or `estimation`.
         on: &'static str,
     },
-    /// Too few samples are left to judge a model on.
+    /// Too few samples can be scored.
     #[error(
-        "{scored} of {samples} samples would be scored, which is less than half: the other records or samples only lead up to \
-         them (`lead_samples` in dataset.toml) or begin in mid-run. Record longer, or state what the command was before \
+        "{scored} of {samples} samples can be scored, less than half: the others are lead-in (`lead_samples` \
+        in dataset.toml) or belong to records that start in mid-run. Record longer, or state what the command was before \
          the first sample (`u_before` in dataset.toml)"
     )]
     TooFewScored {
-        /// Samples that would be scored.
+        /// Samples that can be scored.
         scored: usize,
         /// Samples in all.
         samples: usize,
@@ -149,7 +149,7 @@ pub enum StepError {
         /// The channel.
         channel: String,
     },
-    /// The model is unstable for this command.
+    /// The model diverges under this command.
     #[error(
         "the model's free run diverges at t = {time_s} s of {place}: it is unstable for this command; \
          identify it again, with fewer lags or `--objective free-run`"
@@ -157,10 +157,10 @@ pub enum StepError {
     Diverges {
         /// The command file.
         place: Box<FilePlace>,
-        /// When, s.
+        /// Time of the divergence, s.
         time_s: f64,
     },
-    /// A record that is to be held out and is not there.
+    /// A validation record that does not exist.
     #[error("--validate {0}: no recording has this name; give a file name without its ending")]
     NoSuchRecording(String),
 }

@@ -27,16 +27,16 @@ pub struct Extension {
     pub effects: Vec<String>,
     /// Their parameters by name; with the effect's name before it where several were added.
     pub parameters: BTreeMap<String, ParameterEstimate>,
-    /// Held-out indicators before; none if the model diverges on these records.
+    /// Validation indicators before; none if the model diverges on these records.
     pub before: Option<Indicators>,
-    /// Held-out indicators after.
+    /// Validation indicators after.
     pub after: Option<Indicators>,
-    /// Where the lags come from.
+    /// Origin of the structure.
     pub structure: StructureKept,
-    /// Whether lags of the given model were dropped: the leanest structure with the effects is as good.
+    /// Whether the lowest-order structure was used because it fits equally well as the given one.
     #[serde(skip)]
     pub dropped_lags: bool,
-    /// Record by record.
+    /// Error of each record before and after.
     pub records: Vec<RecordChange>,
     /// All indicators before.
     #[serde(skip)]
@@ -46,7 +46,7 @@ pub struct Extension {
     pub scores_after: Scores,
 }
 
-/// What a record's error was and is.
+/// The error of a record before and after.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RecordChange {
     /// The record.
@@ -66,7 +66,7 @@ fn one_or_several<S: Serializer>(effects: &[String], serializer: S) -> Result<S:
     }
 }
 
-/// A model that errs more than the one it came from is not handed over.
+/// A model with a larger error than the given one is rejected.
 fn refuse_worse(
     effects: &[String],
     before: Option<&Scores>,

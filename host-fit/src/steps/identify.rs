@@ -1,4 +1,4 @@
-//! Recordings to a model.
+//! Identification of a model from records.
 
 use serde::{Serialize, Serializer};
 
@@ -26,12 +26,12 @@ use model_core::recursion::LagConvention;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// What to identify and how.
+/// Options of an identification.
 #[derive(Debug, Clone)]
 pub struct IdentifyRequest {
-    /// Where the input delays come from; none for what does better on validation records.
+    /// Kind of the input delays; none for the kind with the lower validation error.
     pub delay: Option<DelayKind>,
-    /// Keep delays between samples even where they do not pay.
+    /// Keep unrounded delays even if the validation error hardly differs.
     pub interpolated: bool,
     /// Factors f of the delay law, one per input, in place of searching them; empty to search.
     pub factors: Vec<f64>,
@@ -46,7 +46,7 @@ pub struct IdentifyRequest {
     pub n3: Option<u16>,
     /// Longest lag and input delay, samples; by default 500, at most a quarter of the shortest record.
     pub max_lag: Option<u16>,
-    /// What a lag means.
+    /// Meaning of a lag.
     pub lags: LagConvention,
     /// What the search minimises.
     pub objective: Objective,
@@ -62,7 +62,7 @@ pub struct IdentifyRequest {
     pub definitions: Vec<&'static Definition>,
 }
 
-/// Where the input delays of a model come from.
+/// Kind of the input delays of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DelayKind {
     /// Constant, eq. (3).
@@ -123,7 +123,7 @@ pub struct Identification {
     pub beside: Beside,
     /// Lags and delays of the model.
     pub delays: IdentifiedDelays,
-    /// Candidates that the search judged in closed form.
+    /// Number of candidates that the search evaluated in closed form.
     pub screened: usize,
     /// Why the search ended.
     #[serde(serialize_with = "stop_name")]
@@ -132,9 +132,9 @@ pub struct Identification {
     pub refinement: Option<Refinement>,
     /// Largest pole magnitudes of the recursion, closed and open.
     pub poles: [f64; 2],
-    /// What the user should know, one sentence each.
+    /// Remarks for the user, one sentence each.
     pub remarks: Vec<String>,
-    /// What the commands cannot tell about the model, one sentence each.
+    /// Remarks on the excitation, one sentence each.
     pub excitation: Vec<String>,
 }
 
@@ -246,7 +246,7 @@ impl IdentifyRequest {
         }
     }
 
-    /// The input delays that are searched, the one that is asked for first; the validation error decides.
+    /// The kinds of input delay to search, the requested one first; the validation error decides.
     fn input_delays(
         &self,
         set: &DataSet,
@@ -282,7 +282,7 @@ impl IdentifyRequest {
     }
 }
 
-/// The error with the file of the record that it is about.
+/// The error, with the file of the record concerned.
 fn located(set: &DataSet, error: IdentifyError) -> StepError {
     let at_fault = |r: &Record| Some(r.name.as_str()) == error.record();
     match set.records.iter().position(at_fault) {
@@ -294,13 +294,13 @@ fn located(set: &DataSet, error: IdentifyError) -> StepError {
     }
 }
 
-/// What to do about a model that holds on its own records only.
+/// The remark on an over-fitted model.
 fn overfitted(scores: &Scores, model: &Model) -> Option<String> {
     let (own, held_out) = (
         finite_fit(scores.identify.as_ref())?,
         finite_fit(scores.validate.as_ref())?,
     );
-    // No advice that is followed already.
+    // Only advice that the model does not follow already.
     let fewer = match (model.state_lags.len(), model.product_lags.len()) {
         (0..=1, 0..=1) => "",
         (0..=2, 0..=2) => "fewer lags (`--n1 1 --n2 1`), ",
@@ -359,7 +359,7 @@ pub fn identify(
     if request.is_automatic() {
         return automatic(set, &prepared, request, onlooker, (remarks, excitation));
     }
-    // The recursion has its zero where the records rest, and jets between 0 and 1.
+    // The recursion has its zero at the rest level of the records, and jets between 0 and 1.
     let units = Units {
         zero: prepared.zero,
         command: prepared.command,
@@ -373,7 +373,7 @@ pub fn identify(
     let delays = request.input_delays(set, &mut remarks)?;
     let mut searched: Vec<(Identified, Vec<Record>)> = Vec::new();
     for delay in delays {
-        // Interrupted, the law that was searched is the result.
+        // After an interrupt the law that was searched is the result.
         if !searched.is_empty() && onlooker.interrupt().load(Ordering::Relaxed) {
             break;
         }
@@ -441,7 +441,7 @@ fn answer(scores: &Scores, beside: &Beside, model: &Model) -> Answer {
     level::identified(scores, &beside.fits, parameters)
 }
 
-/// The base model with the effects that were asked for, and how it scores.
+/// The base model with the requested effects, and its scores.
 fn with_effects(
     mut model: Model,
     records: &[Record],
@@ -470,7 +470,8 @@ fn with_effects(
     Ok((model, scores, beside))
 }
 
-/// The baseline that does best on validation, as a model, where it beats `model` there; effects that were asked for stay.
+/// The best linear baseline as a model, if its validation error is lower than that of `model`; requested
+/// effects are kept.
 fn better_baseline(
     model: &Model,
     scores: &Scores,

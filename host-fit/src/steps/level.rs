@@ -1,4 +1,4 @@
-//! An error beside the noise level, worded once for every step.
+//! Wording of an error relative to the noise level, shared by all steps.
 
 use super::{Answer, Tone, verdict::times};
 use crate::analysis::{Correlation, Residuals, correlations};
@@ -71,7 +71,10 @@ pub(super) fn compared(
 /// The answer of an identification; `parameters` are those of the model.
 pub(super) fn identified(scores: &Scores, fits: &BaselineFits, parameters: usize) -> Answer {
     let Some(all) = scores.held_out() else {
-        return Answer::new(Tone::Warning, "the model has no record to be judged on");
+        return Answer::new(
+            Tone::Warning,
+            "the model cannot be validated: no record can be scored",
+        );
     };
     let error = error_name(all.role);
     let baseline = fits.best().map_or_else(String::new, |(name, fit)| {
@@ -87,9 +90,10 @@ pub(super) fn identified(scores: &Scores, fits: &BaselineFits, parameters: usize
     ))
     .next("host-fit diagnose model.toml DATASET --report diagnosis.html");
     answer.confidence(match all.role {
-        Use::Validate => "Choices were made on the validation records, so this error is optimistic.",
+        Use::Validate => "The structure was chosen on these validation records, so this error is optimistic.",
         Use::Identify => {
-            "Not independent: no record is marked `validate`, so the error is of the records that were fitted."
+            "Not independent: no record is marked `validate`, so this is the error on the estimation \
+            records."
         }
     })
 }
@@ -101,7 +105,10 @@ pub(super) fn extended(
     after: Option<&Indicators>,
 ) -> Answer {
     let Some(after) = after else {
-        return Answer::new(Tone::Warning, "the model has no record to be judged on");
+        return Answer::new(
+            Tone::Warning,
+            "the model cannot be validated: no record can be scored",
+        );
     };
     let error = error_name(after.role);
     let was = before.map_or_else(

@@ -1,4 +1,4 @@
-//! The way from recordings to constants on a board, one function per step.
+//! The steps from recordings to constants on a board, one function each.
 //!
 //! | step | from | to |
 //! |---|---|---|
@@ -17,11 +17,11 @@
 //! | [`law_margin`] | a design | [`Margin`](crate::design::Margin) |
 //! | [`constants`] | a model | [`BoardConstants`] |
 //!
-//! [`catalogue`] lists the effects that can be missing, [`rulebooks`] every threshold that decides.
+//! [`catalogue`] lists the effects, [`rulebooks`] every threshold.
 //!
-//! Every result serialises to the JSON document that the program prints for the step, without the paths of the files
-//! that the program wrote; what only a picture needs is left out of the document. The program itself is these
-//! functions, a parser before them and three renderers (words, JSON, pages) behind them.
+//! Every result serialises to the JSON document of the step, without paths of written files and without data
+//! that only pictures need. The program consists of these functions, a parser in front and three renderers
+//! (text, JSON, pages) behind them.
 
 mod answer;
 mod average;
@@ -71,7 +71,7 @@ use crate::data::DataSet;
 use crate::indicators::{Indicators, Scores};
 use crate::model::{Model, Training};
 
-/// Refuses data that were sampled otherwise than the model.
+/// Rejects data whose sampling period differs from the model's.
 fn check_period(model: &Model, set: &DataSet) -> Result<(), StepError> {
     if model.is_sampled_at(set.sample_period_s) {
         return Ok(());
@@ -83,14 +83,14 @@ fn check_period(model: &Model, set: &DataSet) -> Result<(), StepError> {
     })
 }
 
-/// FIT in percent; none where there is no run or it diverged.
+/// FIT in percent; none without a run or if it diverged.
 fn finite_fit(indicators: Option<&Indicators>) -> Option<f64> {
     indicators
         .map(|i| i.fit_percent)
         .filter(|fit| fit.is_finite())
 }
 
-/// What a model file says of the data its model was made from.
+/// The training record of a model file.
 fn training(set: &DataSet, scores: &Scores, seed: u64, objective: &str, value: f64) -> Training {
     let learning: Vec<_> = set.identify().collect();
     Training {

@@ -1,4 +1,4 @@
-//! Who watches a step at work.
+//! Observer of a running step.
 
 use std::sync::atomic::AtomicBool;
 
@@ -6,21 +6,23 @@ use crate::identify::Watcher;
 use crate::model::Model;
 use crate::search::{Progress, Snapshot};
 
-/// Someone who watches a step at work, and may ask it to end. The unit type `()` watches nothing and never asks.
+/// Observer of a running step, which may also interrupt it. The unit type `()` ignores everything and never
+/// interrupts.
 pub trait Onlooker: Sync {
-    /// A piece of work begins: what it is, in words.
+    /// A task starts; its name.
     fn begins(&self, _what: &str) {}
-    /// What the piece of work is at now, in words.
+    /// Progress of the task, in words.
     fn now(&self, _what: &str) {}
-    /// How far a search has come.
+    /// Progress of a search.
     fn sees(&self, _snapshot: &Snapshot) {}
-    /// The model that the search has found so far. It is made when it is asked for, and the search waits meanwhile.
+    /// The best model of a search so far. It is built when the closure is called, and the search waits
+    /// meanwhile.
     fn finds(&self, _best: &dyn Fn() -> Option<Model>) {}
-    /// The piece of work is over.
+    /// The task is finished.
     fn ends(&self) {}
-    /// Something to know before a long computation, not after it.
+    /// A warning before a long computation.
     fn hears(&self, _warning: &str) {}
-    /// Raised from outside when the best so far is wanted at once.
+    /// When set, the step returns its best result so far.
     fn interrupt(&self) -> &AtomicBool;
 }
 
@@ -32,7 +34,7 @@ impl Onlooker for () {
     }
 }
 
-/// An onlooker as a search knows one.
+/// Adapter from a step's observer to a search's.
 pub(super) struct Searching<'a>(pub(super) &'a dyn Onlooker);
 
 impl Progress for Searching<'_> {
@@ -47,7 +49,7 @@ impl Watcher for Searching<'_> {
     }
 }
 
-/// Runs a piece of work that an onlooker sees begin and end.
+/// Runs a task between `begins` and `ends` of its observer.
 pub(super) fn watched<T>(onlooker: &dyn Onlooker, what: &str, work: impl FnOnce() -> T) -> T {
     onlooker.begins(what);
     let result = work();

@@ -1,4 +1,4 @@
-//! The thresholds of every room.
+//! The rules of all modules.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,7 @@ use crate::{
     preparation, residual, search, simulate, terms,
 };
 
-/// The rules of every room, in the order in which the way of the data meets them.
+/// The rules of all modules, in the order of the workflow.
 #[must_use]
 pub fn rulebooks() -> Vec<Rulebook> {
     vec![
@@ -76,7 +76,7 @@ mod tests {
                     "{rule:?}"
                 );
                 assert!(!rule.calibrated.is_empty(), "{rule:?}");
-                // The name ends in the unit of a time, so that code reads right.
+                // Names of times end in their unit, which code needs and the table does not.
                 let time = rule.unit == "s" || rule.unit.starts_with("s ");
                 assert_eq!(rule.name.ends_with("-s"), time, "{rule:?}");
             }

@@ -1,4 +1,4 @@
-//! A model's free run over a command.
+//! Free run of a model over a command.
 
 use std::io;
 
@@ -13,7 +13,7 @@ use crate::simulate::Signals;
 /// A free run. Serialises to the keys of `simulate --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Simulation {
-    /// Its length.
+    /// Number of samples.
     pub samples: usize,
     /// Mean of y.
     pub mean: f64,
@@ -21,7 +21,7 @@ pub struct Simulation {
     pub lowest: f64,
     /// Highest y.
     pub highest: f64,
-    /// Where the run leaves what the model was made from, one sentence each.
+    /// Where the run leaves the training range of the model, one sentence each.
     pub outside_training: Vec<String>,
     /// Sampling period, s.
     #[serde(skip)]
@@ -41,13 +41,13 @@ impl Simulation {
     /// Writes the run as CSV with the columns t, u, y.
     ///
     /// # Errors
-    /// What the writer says.
+    /// Errors of the writer.
     pub fn write_csv(&self, out: impl io::Write) -> io::Result<()> {
         let mut csv = csv::Writer::from_writer(out);
         csv.write_record(["t", "u", "y"])?;
         for (k, (u, y)) in self.u.iter().zip(&self.y).enumerate() {
             let t = self.t0_s + k as f64 * self.sample_period_s;
-            // Times as they were given: sums of a period would print 0.30000000000000004.
+            // Rounded to 1 ns: multiples of the period would print 0.30000000000000004.
             let t = (t * 1e9).round() / 1e9;
             csv.write_record([t.to_string(), u.to_string(), y.to_string()])?;
         }
@@ -91,7 +91,7 @@ pub fn simulate(model: &Model, input: &InputFile) -> Result<Simulation, StepErro
             channel,
         })
     });
-    // A model that starts from measurements begins as it does in `compare`, where they are given.
+    // A model that starts from measurements starts as in `compare`, if the input contains y.
     let measured = input.y.as_ref().filter(|_| model.start == Start::Measured);
     let prepared = measured.map(|y| {
         let record = Record::new("", Use::Validate, period, input.u.clone(), y.clone());

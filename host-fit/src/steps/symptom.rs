@@ -1,4 +1,5 @@
-//! The two parts of an effect's name: what the records show, and what it is in this kind of plant.
+//! The two parts of an effect's report: the behaviour that the records show, and its name in this kind of
+//! plant.
 
 use crate::data::Plant;
 use crate::diagnose::{FLOW_LAG, FLOW_MEMORY, ParameterEstimate};
@@ -9,8 +10,8 @@ use std::collections::BTreeMap;
 /// Parameters of an effect by name.
 pub(super) type Estimates = BTreeMap<String, ParameterEstimate>;
 
-/// What the records show where `effect` is named: behaviour that any plant can have. The test certifies this part.
-/// `{name}` stands for a fitted parameter.
+/// The behaviour that records show when `effect` is named, in words that fit any plant. The test certifies
+/// this part. `{name}` is replaced by a fitted parameter.
 const SHOWN: [(&str, &str); 23] = [
     (
         "valve-lag",
@@ -97,7 +98,7 @@ const SHOWN: [(&str, &str); 23] = [
     ),
 ];
 
-/// The check at the bench that would confirm the interpretation in a flow, one sentence each.
+/// The bench check that would confirm the interpretation in a flow.
 const CHECKS: [(&str, &str); 21] = [
     (
         "valve-lag",
@@ -109,7 +110,7 @@ const CHECKS: [(&str, &str); 21] = [
     ),
     (
         "free-stream-variation",
-        "hold the free stream constant and repeat one record: the misfit disappears",
+        "hold the free stream constant and repeat one record: the model error disappears",
     ),
     (
         "input-nonlinearity",
@@ -185,7 +186,7 @@ const CHECKS: [(&str, &str); 21] = [
     ),
 ];
 
-/// Candidates with a similar residual, and what distinguishes them.
+/// Candidates with a similar residual, and how to distinguish them.
 const CONFUSED: [(&str, &str); 12] = [
     (
         "valve-lag",
@@ -237,7 +238,7 @@ const CONFUSED: [(&str, &str); 12] = [
     ),
 ];
 
-/// What is observed, the bench check and what it is confused with, for the catalogue of effects.
+/// Behaviour, bench check and similar candidates of an effect, for the catalogue.
 pub(super) fn described(effect: &str) -> [Option<&'static str>; 3] {
     let of = |table: &'static [(&str, &str)]| {
         let found = table.iter().find(|(name, _)| *name == effect);
@@ -246,7 +247,7 @@ pub(super) fn described(effect: &str) -> [Option<&'static str>; 3] {
     [of(&SHOWN), of(&CHECKS), of(&CONFUSED)]
 }
 
-/// What the records show where `effect` is named.
+/// The behaviour that records show when `effect` is named.
 pub(super) fn shown(effect: &str, parameters: Option<&Estimates>) -> Option<String> {
     let (_, text) = SHOWN.iter().find(|(name, _)| *name == effect)?;
     let frequency = parameters.and_then(|own| own.get("frequency"));
@@ -256,8 +257,8 @@ pub(super) fn shown(effect: &str, parameters: Option<&Estimates>) -> Option<Stri
     Some(text.replace("{frequency}", &at))
 }
 
-/// What `effect` is in a plant of this kind, with the check that would confirm it; none where the name says nothing
-/// about the plant.
+/// The meaning of `effect` in a plant of this kind, with its bench check; none if the name is not specific to
+/// the plant.
 pub(super) fn meant(effect: &str, plant: Plant) -> Option<String> {
     if plant != Plant::Flow {
         return None;
@@ -273,7 +274,7 @@ mod tests {
     use super::*;
     use model_core::effects::SPECS;
 
-    /// A name without its observed part would be interpretation alone.
+    /// An effect must not be reported by its interpretation alone.
     #[test]
     fn every_effect_has_both_parts() {
         for card in SPECS {

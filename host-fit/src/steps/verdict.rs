@@ -15,9 +15,9 @@ use model_core::effects::spec;
 const CALIBRATED: &str = "What p and intervals are worth, measured on simulated plants: of 300 without a missing effect, 2 got a name; \
      95 % intervals held the truth in about 90 % of the cases.";
 
-/// The answer of a diagnosis. `judged_rmse` is the error, y, that the decision was made by where that was not the error
-/// of whole validation records; `channel` is a measured channel that the residual follows, with the share of the
-/// unexplained variance that it explains.
+/// The answer of a diagnosis. `judged_rmse` is the error used for the decision, y, if it is not that of whole
+/// validation records; `channel` is a measured channel that the residual depends on, with its share of the
+/// unexplained variance.
 pub(super) fn answer(
     diagnosis: &Diagnosis,
     judged_rmse: Option<f64>,
@@ -57,7 +57,7 @@ pub(super) fn answer(
     answer
 }
 
-/// What a term beyond the catalogue promises.
+/// First-order prediction of a term outside the catalogue, in words.
 pub(super) fn beyond(glance: &Glance) -> String {
     format!(
         "A first look beyond the catalogue: a term at the {} that depends on {} would explain about {:.0} % of the \
@@ -68,7 +68,7 @@ pub(super) fn beyond(glance: &Glance) -> String {
     )
 }
 
-/// Which error the ladder holds.
+/// Name of the error in the ladder.
 fn error_name(diagnosis: &Diagnosis) -> &'static str {
     match diagnosis.held_out_by {
         HeldOutBy::Records => "validation error",
@@ -76,7 +76,7 @@ fn error_name(diagnosis: &Diagnosis) -> &'static str {
     }
 }
 
-/// An error beside the noise level, as far as that is known: "1.01 × the noise level (RMSE 0.0104)".
+/// An error relative to the noise level, if that is known: "1.01 × the noise level (RMSE 0.0104)".
 fn beside_noise(rmse: f64, diagnosis: &Diagnosis) -> String {
     let noise = diagnosis.noise_estimate;
     match diagnosis.noise_source {
@@ -89,7 +89,7 @@ fn beside_noise(rmse: f64, diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// Two errors beside the noise level: "from 2.64 to 1.01 × the noise level (RMSE 0.0273 → 0.0104)".
+/// Two errors relative to the noise level: "from 2.64 to 1.01 × the noise level (RMSE 0.0273 → 0.0104)".
 fn from_to(before: f64, after: f64, diagnosis: &Diagnosis) -> String {
     let noise = diagnosis.noise_estimate;
     let (from, to) = (significant(before, 3), significant(after, 3));
@@ -150,7 +150,7 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
                 .next(add(&diagnosis.missing))
         }
         Verdict::PartlyExplained => {
-            Answer::new(Tone::Warning, "something is missing; its cause stays open")
+            Answer::new(Tone::Warning, "something is missing; its cause is not identified")
                 .evidence(format!(
                     "With {} as surrogates the {error} falls {}.",
                     joined(&diagnosis.stand_ins),
@@ -181,7 +181,7 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
     }
 }
 
-/// How sure the named effects are, and by which test.
+/// The confidence in the named effects, with its test.
 fn confidence(diagnosis: &Diagnosis) -> String {
     match diagnosis.p_value {
         Some(p) => format!(
@@ -199,8 +199,8 @@ fn confidence(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// How the error falls with what is named. An effect that is named by parsimony does not lower the error of the model as
-/// given; its gain shows beside the model with the fewest lags.
+/// The reduction of the error by the named effects. An effect named for parsimony does not lower the error of
+/// the given model; it is compared with the lowest-order model.
 fn fall(diagnosis: &Diagnosis, with: &str) -> String {
     let rmse = |rung: Option<&Rung>| rung.map_or(f64::NAN, |rung| rung.validate_rmse);
     let last = rmse(diagnosis.ladder.last());
@@ -218,7 +218,7 @@ fn fall(diagnosis: &Diagnosis, with: &str) -> String {
     }
 }
 
-/// The behaviour that each missing effect stands for, in words.
+/// The behaviour behind each missing effect, in words.
 fn behaviour(diagnosis: &Diagnosis) -> String {
     let each = diagnosis.missing.iter().map(|name| {
         let text = shown(name, diagnosis.parameters.get(name));
@@ -227,8 +227,7 @@ fn behaviour(diagnosis: &Diagnosis) -> String {
     each.collect::<Vec<_>>().join("; and ")
 }
 
-/// What is missing: in a flow by name, elsewhere by behaviour. Members of a set that the records do not distinguish stand
-/// beside each name.
+/// The claim: effects by name in a flow, by behaviour elsewhere, each with its equivalence set.
 fn claim(diagnosis: &Diagnosis, plant: Plant) -> String {
     match plant {
         Plant::Flow => missing(&diagnosis.missing, &diagnosis.sets),
@@ -258,14 +257,14 @@ fn surrogates(answer: &mut Answer, diagnosis: &Diagnosis) {
     }
     let several = diagnosis.stand_ins.len() > 1;
     answer.note(format!(
-        "{} {} in the model as {}: not significant beside what is named, or not identifiable on these records.",
+        "{} {} in the model as {}: not significant beside the named effects, or not identifiable on these records.",
         joined(&diagnosis.stand_ins),
         if several { "are" } else { "is" },
         if several { "surrogates" } else { "a surrogate" },
     ));
 }
 
-/// On which records the errors stand, and how far the noise level is known.
+/// The records that the errors refer to, and the source of the noise level.
 fn records(answer: &mut Answer, diagnosis: &Diagnosis, judged_rmse: Option<f64>) {
     match diagnosis.noise_source {
         NoiseSource::Measured => {}
@@ -294,11 +293,11 @@ fn records(answer: &mut Answer, diagnosis: &Diagnosis, judged_rmse: Option<f64>)
         ),
         (HeldOutBy::Records, None) => {}
         (HeldOutBy::Turns, _) => answer.note(
-            "No record is marked `validate`: errors are of the estimation records, and cross-validation over them decided. \
+            "No record is marked `validate`: errors come from cross-validation over the estimation records. \
              A validation record would give an independent estimate.",
         ),
         (HeldOutBy::End, _) => answer.note(
-            "There is one record only: its end decided, with models of its beginning. A validation record would give an \
+            "There is one record only: models are fitted to its beginning and validated on its end. A validation record would give an \
              independent estimate.",
         ),
     }
@@ -323,7 +322,7 @@ fn records(answer: &mut Answer, diagnosis: &Diagnosis, judged_rmse: Option<f64>)
     }
 }
 
-/// Lags of the model beyond the first that these records show.
+/// Further lags of the model that these records show.
 fn dynamics(answer: &mut Answer, diagnosis: &Diagnosis) {
     let named = diagnosis.sets.iter().flatten().any(|name| name == FLOW_LAG);
     if let Some(second) = second_lag_s(&diagnosis.model).filter(|_| !named) {
@@ -343,7 +342,7 @@ fn dynamics(answer: &mut Answer, diagnosis: &Diagnosis) {
     }
 }
 
-/// The bench check that distinguishes places which records alone do not: lags in series commute.
+/// The bench check for candidates that records cannot distinguish, because lags in series commute.
 fn bench_check(sets: &[Vec<String>]) -> &'static str {
     let places = |set: &[String]| {
         let of = |name: &String| match name.as_str() {

@@ -1,5 +1,5 @@
-//! A second one of the same effect. What a rig does in another law than the catalogue's often looks like two of it: two reservoirs, two
-//! time constants of a drift, two lags of a film.
+//! A second copy of an effect. A law that differs from the catalogue's often looks like two copies: two
+//! reservoirs, two time constants of a drift, two lags of a film.
 
 use super::RULES;
 use super::judge::Judged;
@@ -9,8 +9,8 @@ use model_core::effect::Spec;
 use rayon::prelude::*;
 
 impl Search<'_> {
-    /// `hypothesis` with one of its effects twice, the second from the best of the starting points of its card; `None` where it has
-    /// no such effect outside its delay law, or none is stable.
+    /// `hypothesis` with a second copy of one of its effects, fitted from the best starting point of its
+    /// card. `None` if it has no effect outside the delay law, or no copy is stable.
     pub(crate) fn again(&self, hypothesis: &Hypothesis, spec: &'static Spec) -> Option<Judged> {
         let model = hypothesis.judged.model();
         let own = model.effects.iter().find(|added| added.name == spec.name)?;
@@ -44,7 +44,7 @@ mod tests {
     use model_core::effects::spec;
     use std::sync::atomic::AtomicBool;
 
-    /// A drift that ends in two steps, one of 0.6 s and one of 5 s.
+    /// A drift with two exponential parts, of 0.6 s and 5 s.
     #[test]
     fn a_drift_of_two_time_constants_is_two_drifts() {
         let mut records = records(&[], &[], 3);

@@ -1,4 +1,4 @@
-//! What every search starts from: records in their own units, and a judge over them.
+//! Preparation of every search: records in inner units and a judge over them.
 
 use super::judge::Judge;
 use super::units::Units;
@@ -7,25 +7,25 @@ use crate::fit::{FitOptions, restart_after};
 use crate::model::Model;
 use crate::preparation::{MovingZero, Preparation};
 
-/// Records in inner units with the judge over them, and the model that is asked about.
+/// Records in inner units, the judge over them, and the given model.
 pub struct Bench {
-    /// What inner units are.
+    /// The inner units.
     pub units: Units,
     /// The judge.
     pub judge: Judge,
     /// The model as given, in inner units.
     pub given: Model,
-    /// Whether a record begins otherwise than at rest without command.
+    /// Whether a record does not start at rest without command.
     pub mid_run: bool,
-    /// The zero that differs between records, where it does.
+    /// The record-to-record offset of the sensor, if there is one.
     pub moving_zero: Option<MovingZero>,
-    /// After how many samples free runs start anew, for rigs that drift.
+    /// Free runs are restarted after so many samples, for rigs that drift.
     pub restarted: Option<usize>,
 }
 
 impl Bench {
-    /// The bench for `given` on `records`, each from its own zero where that moves; `None` if there is nothing to learn
-    /// from.
+    /// The bench for `given` on `records`, a record-to-record offset subtracted. `None` without estimation
+    /// records.
     #[must_use]
     pub fn of(given: &Model, records: &[Record]) -> Option<Self> {
         let prepared = Preparation::of(records);

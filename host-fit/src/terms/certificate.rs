@@ -1,4 +1,4 @@
-//! Certificates: how far the records are from any model without an effect.
+//! Certificates: comparison with the most likely models that lack an effect.
 
 use super::judge::Judge;
 use super::likelihood::{Weighed, errors, evidence, normal_equations, weighed};
@@ -9,13 +9,13 @@ use crate::model::Model;
 use crate::noise::NoiseModel;
 use crate::residual::NoiseSource;
 
-/// Steps in the metric of the noise after least squares, and halvings of each.
+/// Gauss–Newton steps in the metric of the noise after least squares, and halvings of each.
 const STEPS: usize = 8;
 const HALVINGS: i32 = 8;
 
-/// A model at its most likely parameters.
+/// A model at its maximum-likelihood parameters.
 pub(crate) struct MostLikely {
-    /// ln of the likelihood of all records, nats, but for a constant of the records.
+    /// ln of the likelihood of all records up to a constant of the records, nats.
     pub(crate) log_likelihood: f64,
     model: Model,
     records: Vec<Weighed>,
@@ -23,8 +23,8 @@ pub(crate) struct MostLikely {
 }
 
 impl MostLikely {
-    /// `model` with its parameters, and those of the noise, at the largest likelihood of all records: least squares, then steps of
-    /// Gauss and Newton in the metric of the noise. `None` where it diverges.
+    /// Maximum likelihood of `model` and noise parameters over all records: least squares, then Gauss–Newton
+    /// steps in the metric of the noise. `None` if the free run diverges.
     pub(crate) fn of(judge: &Judge, model: &Model) -> Option<Self> {
         let records = judge.scored_records();
         let mut best = Self::at(judge, model, &records)?;
@@ -57,13 +57,13 @@ impl MostLikely {
         })
     }
 
-    /// ln of the evidence, nats: parameters of the model at their priors, those of the noise at the price of BIC.
+    /// ln of the evidence, nats: model parameters by their priors, noise parameters by the BIC penalty.
     pub(crate) fn evidence(&self, judge: &Judge) -> Option<f64> {
         let noise = 0.5 * NoiseModel::PARAMETERS as f64 * self.samples.max(1.0).ln();
         Some(evidence(judge, &self.model, &self.records)? - noise)
     }
 
-    /// A step of Gauss and Newton, halved until the likelihood grows; `None` where it never does.
+    /// A Gauss–Newton step, halved until the likelihood increases; `None` if it never does.
     fn stepped(&self, judge: &Judge) -> Option<Model> {
         let free = judge.free(&self.model);
         let normal = normal_equations(&self.model, &free, &self.records)?;

@@ -1,11 +1,11 @@
-//! What noise alone would make of the best of all candidates.
+//! Distribution of the best candidate's gain under noise alone.
 //!
-//! The wild cluster bootstrap of the largest gain: the error of each record (of pieces longer than its
-//! correlation, where records are few) gets a sign by lot, which leaves its spectrum, its size and whatever is the
-//! same all through a record where they are, and takes away what a candidate could explain in all of them. The candidates are screened on each such error as they were on the
-//! measured one: coefficients from what is learned from, gains on what is held out. (White 2000, A reality
-//! check for data snooping; Cameron, Gelbach & Miller 2008, Bootstrap-based improvements for inference with
-//! clustered errors.)
+//! Wild cluster bootstrap of the maximum: the error of each record (or of pieces longer than its correlation
+//! time, if records are few) is multiplied by a random sign. This keeps its spectrum and size and destroys
+//! whatever a candidate could explain in all records. Candidates are screened on each such error as on the
+//! measured one: coefficients from the estimation samples, gains on the validation samples. (White 2000, A
+//! reality check for data snooping; Cameron, Gelbach & Miller 2008, Bootstrap-based improvements for
+//! inference with clustered errors.)
 
 use super::RULES;
 use super::screen::Screen;
@@ -15,32 +15,32 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::Range;
 
-/// Errors that are noise alone, as many as are drawn, in the numbers of a screen.
+/// Bootstrap draws of the error under the null hypothesis, in the screen's joined series.
 pub(crate) struct Noise {
     error: Vec<f64>,
-    /// Parts of the joined series that get one sign each; none lies in two records.
+    /// Blocks of the joined series that get one sign each; none spans two records.
     blocks: Vec<Range<usize>>,
     /// A sign for each block, per draw.
     signs: Vec<Vec<f64>>,
-    /// How far each draw lies along the directions that the model's own parameters follow.
+    /// Projection of each draw on the directions that the model's own parameters can follow.
     along: Vec<Vec<f64>>,
-    /// Its energy where it is held out, after the model was refitted to it.
+    /// Energy of each draw on the validation samples after the model was refitted to it.
     held_out: Vec<f64>,
 }
 
-/// What a candidate takes of the energy of one draw.
+/// Share of the energy of one draw that a candidate explains.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Taken {
-    /// Where it is learned from.
+    /// On the estimation samples.
     learned: f64,
-    /// On what is held out.
+    /// On the validation samples.
     held_out: f64,
 }
 
 impl Noise {
-    /// The error of `last` under drawn signs, `block` samples of it independent of the next as many:
-    /// that of the model without candidates for a test, of one with them for what chance would do
-    /// beside them. `None` if its free run diverges.
+    /// The error of `last` with random signs per `block` samples. `last` is the model without candidates for
+    /// a test, and the model with one for the gain that noise gives beside it. `None` if its free run
+    /// diverges.
     pub(crate) fn new(screen: &Screen, last: &Model, block: usize, seed: u64) -> Option<Self> {
         let error = screen.error_of(last)?;
         let blocks = screen.blocks(block);
@@ -93,7 +93,7 @@ impl Noise {
         self.blocks.iter().map(of).collect()
     }
 
-    /// The same summed under `signs`: where it is learned from, and where it is held out.
+    /// The block sums under `signs`, added over the estimation samples and over the validation samples.
     fn halves(&self, sums: &[f64], signs: &[f64], learned: usize) -> (f64, f64) {
         let first = self.blocks.partition_point(|block| block.start < learned);
         let (sums, others) = sums.split_at(first);
@@ -101,7 +101,7 @@ impl Noise {
         (dot(sums, signs), dot(others, other_signs))
     }
 
-    /// What a residualised column takes of each draw; nothing where its size makes no sense.
+    /// What a residualised column explains of each draw; 0 if its coefficient is not feasible.
     pub(super) fn taken(
         &self,
         screen: &Screen,
@@ -137,8 +137,8 @@ impl Noise {
         taken.collect()
     }
 
-    /// The share of the held-out energy of each draw that residualised columns take together; `None` if they are
-    /// not independent.
+    /// The share of each draw's validation energy that residualised columns explain together; `None` if they
+    /// are linearly dependent.
     pub(crate) fn taken_together(&self, screen: &Screen, columns: &[&[f64]]) -> Option<Vec<f64>> {
         let learned = screen.learned;
         let square = screen.square(columns, RULES.ridge);
@@ -168,18 +168,18 @@ impl Noise {
     }
 }
 
-/// What noise alone would make of the best of all candidates.
+/// Bootstrap distribution of the best candidate's gain under noise alone.
 #[derive(Clone, Debug, Default)]
 pub struct Chance {
-    /// Share of the held-out energy that the best takes, one a draw, rising.
+    /// Largest explained share of the validation energy in each draw, ascending.
     best: Vec<f64>,
-    /// Candidates that were looked at, points of grids and all.
+    /// Number of candidates, every grid point counted.
     pub alternatives: usize,
 }
 
 impl Chance {
-    /// Of candidates of one kind, those that take most where they are learned are kept, as in a
-    /// table, and of all kept ones the best counts.
+    /// Within each kind, only the candidates with the largest estimation gain are kept, as in the table; of
+    /// these the best on the validation samples counts.
     pub(super) fn of(candidates: Vec<(String, Vec<Taken>)>) -> Self {
         let mut kinds: Vec<(&str, Vec<&[Taken]>)> = Vec::new();
         for (kind, taken) in &candidates {
@@ -204,7 +204,7 @@ impl Chance {
         Self::sorted((0..draws).map(best_of).collect(), candidates.len())
     }
 
-    /// Of candidates that were all judged on what is held out: the share each takes, one a draw.
+    /// For candidates that are all evaluated on the validation samples: the largest share of each draw.
     pub(crate) fn of_all(shares: &[Vec<f64>]) -> Self {
         let draws = shares.first().map_or(0, Vec::len);
         let best_of = |draw: usize| shares.iter().map(|own| own[draw]).fold(0.0, f64::max);
@@ -216,14 +216,14 @@ impl Chance {
         Self { best, alternatives }
     }
 
-    /// How often noise alone lets some candidate take this share of the held-out energy, or more.
+    /// Family-wise p-value of an explained share of the validation energy.
     #[must_use]
     pub fn p_value(&self, share: f64) -> f64 {
         let below = self.best.partition_point(|best| *best < share);
         (self.best.len() - below + 1) as f64 / (self.best.len() + 1) as f64
     }
 
-    /// The share that the best takes of noise alone in all but one of twenty cases; 0 of nothing.
+    /// 95 % quantile of the best share under noise alone; 0 without candidates.
     #[must_use]
     pub fn usual(&self) -> f64 {
         let at = (0.95 * self.best.len() as f64) as usize;
@@ -245,7 +245,7 @@ mod tests {
         each.collect()
     }
 
-    /// What columns take together of a draw is what a regression on that draw finds.
+    /// Shares that columns explain together equal those of a regression on the draw.
     #[test]
     fn columns_that_are_fitted_as_one_take_what_a_regression_finds() {
         let records = records(&["plenum-droop"], &[], 4);
@@ -284,8 +284,7 @@ mod tests {
         }
     }
 
-    /// One draw: of three points of a kind the two that take most where they are learned
-    /// count, as in a table; what the third would take on what is held out does not.
+    /// One draw with three grid points of a kind: only the two with the largest estimation gain count.
     #[test]
     fn only_points_that_a_table_keeps_can_be_the_best() {
         let kind = |points: &[(f64, f64)]| -> Vec<(String, Vec<Taken>)> {

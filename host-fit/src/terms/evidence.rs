@@ -1,23 +1,23 @@
-//! What held-out records say about two models: effect size, significance under
-//! correlated errors, and what chance would have given.
+//! Comparison of two models on validation records: effect size, significance under correlated errors, and the
+//! gain expected under noise alone.
 
 use super::RULES;
 use crate::linalg::dot;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Standard deviation of normal numbers over their median absolute deviation.
+/// Standard deviation of a normal distribution over its median absolute deviation.
 const NORMAL: f64 = 1.4826;
 
-/// The held-out error of a model: y − y_sim per record, warm-up left out.
+/// Free-run error y − y_sim of a model on the validation records, warm-up left out.
 #[derive(Clone, Debug)]
 pub(crate) struct HeldOut {
     pub(crate) errors: Vec<Vec<f64>>,
     /// Σ e² and the number of samples.
     pub(crate) sum_of_squares: f64,
     pub(crate) samples: usize,
-    /// Σ e² before anything was taken for scatter of the level.
+    /// Σ e² before errors along the level's scatter were removed.
     pub(crate) measured: f64,
-    /// Samples of a block that counts as independent of the next.
+    /// Block length in samples; blocks count as independent.
     block: usize,
 }
 
@@ -34,27 +34,27 @@ impl HeldOut {
         }
     }
 
-    /// The same with what was taken from the errors for scatter of the level: `measured` is Σ e² before that.
+    /// The same after removal of the errors along the level's scatter; `measured` is Σ e² before that.
     pub(crate) fn beside_scatter(self, measured: f64) -> Self {
         Self { measured, ..self }
     }
 
-    /// Root mean square of y − y_sim as it is measured, scatter of the level and all.
+    /// Root mean square of y − y_sim as measured, scatter of the level included.
     pub(crate) fn measured_rmse(&self) -> f64 {
         (self.measured / self.samples.max(1) as f64).sqrt()
     }
 
-    /// Samples that say as much as one would.
+    /// Correlation length: number of samples that carry the information of one.
     pub(crate) fn correlated(&self) -> f64 {
         (self.block as f64 / RULES.correlation_times).max(1.0)
     }
 
-    /// Samples that count as independent of the next as many.
+    /// Block length in samples; blocks count as independent.
     pub(crate) fn block(&self) -> usize {
         self.block
     }
 
-    /// Infinite if nothing was judged.
+    /// Root mean square error; infinite without samples.
     pub(crate) fn rmse(&self) -> f64 {
         if self.samples == 0 {
             return f64::INFINITY;
@@ -63,7 +63,7 @@ impl HeldOut {
     }
 }
 
-/// Samples of a block whose errors count as independent of the next one's.
+/// Block length in samples such that the errors of neighbouring blocks count as independent.
 fn block(errors: &[Vec<f64>]) -> usize {
     let samples: usize = errors.iter().map(Vec::len).sum();
     let thinned = (samples / RULES.plenty).max(1);
@@ -79,24 +79,23 @@ fn block(errors: &[Vec<f64>]) -> usize {
     };
     let longest = samples / RULES.fewest_blocks;
     let variance = covariance(0).max(f64::MIN_POSITIVE);
-    // Summed up to where the correlation is lost for the first time.
+    // The autocorrelation is summed up to its first zero crossing.
     let correlations = (1..=longest / thinned).map(|lag| covariance(lag) / variance);
     let time = 1.0 + 2.0 * correlations.take_while(|rho| *rho > 0.0).sum::<f64>();
     let samples = (RULES.correlation_times * time * thinned as f64) as usize;
     samples.clamp(RULES.shortest_block, longest.max(RULES.shortest_block))
 }
 
-/// One-sided p-value of "`better` has the smaller held-out error than `worse`".
+/// One-sided p-value of "`better` has the smaller validation error than `worse`".
 ///
-/// With d what the models differ by and m the mean of their errors, the gain
-/// Σ e² − Σ e'² is 2 Σ m·d: it is above zero if m regressed on d has a positive
-/// slope. The test is Student's on that slope, its error from sums over blocks
-/// (cluster-robust), as many degrees of freedom as there are blocks in which the
-/// models differ. A paired test on the blocks' gains would take it for scatter
-/// that a gain lies in few places.
+/// With d the difference of the two runs and m the mean of their errors, the gain Σ e² − Σ e'² is 2 Σ m·d. It
+/// is positive if the regression of m on d has a positive slope. The test is Student's on that slope, with a
+/// cluster-robust standard error over blocks and as many degrees of freedom as there are blocks in which the
+/// runs differ. A paired test on the blocks' gains would lose power where the gain is concentrated in few
+/// blocks.
 pub(crate) fn p_value(worse: &HeldOut, better: &HeldOut) -> f64 {
     let block = better.block;
-    // m·d and d·d of the blocks.
+    // Per block: Σ m·d and Σ d·d.
     let mut blocks = Vec::new();
     for (worse, better) in worse.errors.iter().zip(&better.errors) {
         let (worse, better) = last_of_both(worse, better);
@@ -119,7 +118,7 @@ pub(crate) fn p_value(worse: &HeldOut, better: &HeldOut) -> f64 {
     student(product, error, (effective - 1.0).max(1.0))
 }
 
-/// What two series have in common at their ends: warm-ups differ.
+/// The common end of two series, whose warm-ups differ in length.
 fn last_of_both<'a>(a: &'a [f64], b: &'a [f64]) -> (&'a [f64], &'a [f64]) {
     let n = a.len().min(b.len());
     (&a[a.len() - n..], &b[b.len() - n..])
@@ -133,16 +132,15 @@ fn student(estimate: f64, error: f64, degrees: f64) -> f64 {
     StudentsT::new(0.0, 1.0, degrees).map_or(1.0, |t| t.sf(estimate / error))
 }
 
-/// The median, or 0 of nothing.
+/// The median; 0 of an empty list.
 fn median(mut numbers: Vec<f64>) -> f64 {
     numbers.sort_by(f64::total_cmp);
     numbers.get(numbers.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Whether the error is above the noise floor: p-value of "Σ e² exceeds `margin`
-/// times Σ σ²" by blocks; σ² per sample in the same shape as the errors. How much
-/// blocks scatter is taken from their median deviation: an excess that lies in few
-/// of them must not hide behind itself.
+/// p-value of "Σ e² exceeds `margin` times Σ σ²" over blocks; σ² per sample in the shape of the errors. The
+/// scatter of the blocks is estimated from their median absolute deviation, so that an error in few blocks
+/// does not inflate it.
 pub(crate) fn p_above_noise(held_out: &HeldOut, variance: &[Vec<f64>], margin: f64) -> f64 {
     let block = held_out.block;
     let mut excess = Vec::new();
@@ -178,8 +176,7 @@ mod tests {
             .collect()
     }
 
-    /// Two models that err equally, each with noise of its own: the stated
-    /// false-alarm rate is the true one.
+    /// Two equally wrong models with independent noise: the false-alarm rate is the stated one.
     #[test]
     fn the_p_value_is_calibrated_for_coloured_errors() {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
@@ -196,8 +193,7 @@ mod tests {
         assert!((7..=35).contains(&alarms), "{alarms} of {trials}");
     }
 
-    /// Two models that differ in the first second of each record, as at the first
-    /// blow: equally wrong there, or one of them right.
+    /// Two models that differ in the first second of each record: equally wrong there, or one of them right.
     #[test]
     fn a_gain_in_few_places_counts_and_a_chance_does_not() {
         let mut rng = ChaCha8Rng::seed_from_u64(8);

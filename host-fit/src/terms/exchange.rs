@@ -1,4 +1,5 @@
-//! What the end of a search does: drops what is needless, and tries other terms in the place of what is left.
+//! The end of a search: terms that are not needed are dropped, and each remaining one is exchanged for
+//! others.
 
 use super::RULES;
 use super::evidence::{HeldOut, p_value};
@@ -10,7 +11,7 @@ use crate::fit::{Fit, FitOptions, fit};
 use crate::model::Model;
 use rayon::prelude::*;
 
-/// An effect added to a model, followed for a few steps.
+/// An effect added to a model and fitted for a few iterations.
 pub(crate) struct InPlace {
     pub(crate) term: Term,
     pub(crate) held_out: HeldOut,
@@ -18,9 +19,9 @@ pub(crate) struct InPlace {
 }
 
 impl Search<'_> {
-    /// Single terms in the place of one that was taken out, on the model without it, the
-    /// best first: of those `wanted` one of each kind, and of effects the leading ones. Only
-    /// those within reach of `own`, the held-out error with the term.
+    /// Single terms that could replace a removed one, on the model without it, best first: one of each kind
+    /// among `wanted`, and the leading effects. Only those whose validation error is within reach of `own`,
+    /// the error with the removed term.
     pub(crate) fn in_place_of(
         &self,
         taken: &Term,
@@ -69,12 +70,11 @@ impl Search<'_> {
         tried
     }
 
-    /// A hypothesis with other terms in the place of its own, one by one, if it does
-    /// better so: terms of the base imitate effects and effects imitate those, and a
-    /// search that took the wrong one first does not come back.
+    /// Replaces the terms of a hypothesis one by one where that lowers the error. Base terms and effects
+    /// imitate each other, and a forward search does not correct a wrong early choice.
     pub(super) fn exchanged(&self, mut hypothesis: Hypothesis, root: &Hypothesis) -> Hypothesis {
         if let [Term::Effect { .. }] = hypothesis.terms[..] {
-            // The first round compared all that could stand in its place.
+            // The first round compared all possible replacements.
             return hypothesis;
         }
         let mut done: Vec<String> = Vec::new();
@@ -91,11 +91,11 @@ impl Search<'_> {
                 && term.effect().is_some()
                 && self.over(&hypothesis) <= RULES.at_the_floor
             {
-                // Nothing in its place would do better, and no name would be saved.
+                // No replacement lowers the error or removes a named effect.
                 done.push(term.name());
                 continue;
             }
-            // What is nearly at the floor can only be had for less.
+            // Near the noise level, only a replacement with fewer parameters is an improvement.
             let less_only =
                 term.effect().is_none() && self.over(&hypothesis) <= RULES.near_the_floor;
             (self.progress)(&format!("candidates in place of {}", term.name()));
@@ -114,7 +114,7 @@ impl Search<'_> {
                 self.finish(terms, other.fit, hypothesis.terms.len())
             });
             let Some(other) = other else { continue };
-            // A further name says something only if no base does as well.
+            // A second named effect is kept only if no base model fits equally well.
             let needless = effects > 1 && count_effects(&other.terms) < effects;
             let within = if needless { RULES.as_well } else { 0.0 };
             if other.score() < hypothesis.score() + within {
@@ -129,8 +129,8 @@ impl Search<'_> {
         hypothesis
     }
 
-    /// Drops what the other terms make needless. What is needed beside more terms is needed
-    /// beside fewer, and is not asked again.
+    /// Drops the terms that are not needed. A term that is needed in a larger model is needed in a smaller
+    /// one and is not tested again.
     pub(super) fn pruned(&self, mut hypothesis: Hypothesis, root: &Hypothesis) -> Hypothesis {
         let mut open: Vec<usize> = (0..hypothesis.terms.len()).collect();
         while !open.is_empty() && !self.interrupted() {
@@ -154,7 +154,7 @@ impl Search<'_> {
         hypothesis
     }
 
-    /// The hypothesis refitted without one of its terms, if that is needless.
+    /// The hypothesis refitted without one of its terms, if that term is not needed.
     fn as_well_without(
         &self,
         hypothesis: &Hypothesis,
@@ -164,7 +164,7 @@ impl Search<'_> {
         let own = hypothesis.judged.rmse();
         let price = |cost: usize| RULES.price * cost.max(RULES.head_start) as f64;
         let cost = hypothesis.terms[index].cost();
-        // A few steps tell what is far from needless.
+        // A few iterations identify the terms that are clearly needed.
         let model =
             hypothesis.terms[index].taken_from(hypothesis.judged.model(), root.judged.model());
         let options = FitOptions {

@@ -1,20 +1,20 @@
-//! What is learned from and what is judged on: records that were held out, each
-//! record in turn, or the end of the only one.
+//! Folds of estimation and validation: the `validate` records, each record in turn, or the end of the only
+//! record.
 
 use super::RULES;
 use crate::data::{Record, Use};
 use crate::fit::pieces;
 
-/// One split into learning and judging.
+/// One split into estimation and validation samples.
 #[derive(Clone, Debug)]
 pub(crate) struct Fold {
-    /// Records to fit.
+    /// Estimation records.
     pub(crate) learning: Vec<Record>,
-    /// Records to judge, each from a sample on.
+    /// Validation records, each scored from a sample on.
     pub(crate) judging: Vec<Judging>,
 }
 
-/// A record that is judged from a sample on, its lead left out; the run before leads up to it.
+/// A validation record that is scored from a sample on. The run starts earlier, but its lead is not scored.
 #[derive(Clone, Debug)]
 pub(crate) struct Judging {
     pub(crate) record: Record,
@@ -27,7 +27,7 @@ impl Judging {
         self.from.max(self.record.lead)
     }
 
-    /// y of the last so many samples: those that an error is left on.
+    /// y of the last `samples` samples: those that are scored.
     pub(crate) fn last(&self, samples: usize) -> &[f64] {
         let y = &self.record.y;
         &y[y.len().saturating_sub(samples)..]
@@ -35,7 +35,7 @@ impl Judging {
 }
 
 impl Fold {
-    /// The same split with free runs that start anew every `samples`.
+    /// The same split with free runs restarted every `samples` samples.
     pub(crate) fn restarted(&self, samples: usize) -> Self {
         let judging = self.judging.iter().flat_map(|judging| {
             let judged = judging.record.part(judging.from, judging.record.len());
@@ -52,20 +52,19 @@ impl Fold {
     }
 }
 
-/// How the error was held out.
+/// How the validation error is obtained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HeldOutBy {
     /// The data set has `validate` records.
     Records,
-    /// No `validate` record: each record in turn was judged by a model that had
-    /// not seen it.
+    /// No `validate` record: cross-validation with each record left out in turn.
     Turns,
-    /// One record only: its end was judged by a model that saw its beginning.
+    /// One record only: estimated on its beginning, validated on its end.
     End,
 }
 
-/// The folds of a data set; none if there is nothing to learn from.
+/// The folds of a data set; none without estimation records.
 pub(crate) fn folds(records: &[Record]) -> (Vec<Fold>, HeldOutBy) {
     let of = |role: Use| -> Vec<&Record> { records.iter().filter(|r| r.role == role).collect() };
     let (identify, validate) = (of(Use::Identify), of(Use::Validate));

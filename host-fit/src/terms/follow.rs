@@ -1,5 +1,5 @@
-//! How a proposal is followed to its end: fitted from where the screening puts it, its lags moved to where
-//! they leave least, what is bent as far as it can be left out.
+//! Full refit of a proposal: starts from the screening's prediction, moves the lags to the least error, and
+//! leaves out effects at a bound of their range.
 
 use super::RULES;
 use super::grid::{hides, longest_lag};
@@ -13,8 +13,8 @@ use crate::model::Model;
 use rayon::prelude::*;
 
 impl Search<'_> {
-    /// The fit of a proposal from where the screening puts it; from several points where the error
-    /// has more than one valley.
+    /// The first fit of a proposal, from the screening's prediction; from several starts if the error has
+    /// several minima.
     pub(crate) fn set_out(
         &self,
         model: &Model,
@@ -26,7 +26,7 @@ impl Search<'_> {
             [] => vec![&proposal.terms],
             others => others.iter().map(Vec::as_slice).collect(),
         };
-        // Of many starts the best are followed further.
+        // Only the best of many starts are fitted further.
         let many = all.len() > RULES.followed;
         let first = if many { iterations / 2 } else { iterations };
         let fits = all
@@ -50,7 +50,7 @@ impl Search<'_> {
         fits.into_iter().min_by(better)
     }
 
-    /// The terms from other starting points, none where one does.
+    /// The terms at further starting points; none where one start is enough.
     fn valleys(&self, model: &Model, terms: &[Term]) -> Vec<Vec<Term>> {
         if terms.iter().any(|term| matches!(term, Term::Inertia(_))) {
             let second = RULES.second_lags.into_iter().map(|samples| {
@@ -100,14 +100,13 @@ impl Search<'_> {
             };
             fit(&all, &learning, &options)
         };
-        // First-order coefficients may be too bold for a free run: then from 0.
+        // First-order coefficients may make the free run diverge: then the fit starts from 0.
         with(true).or_else(|_| with(false)).ok()
     }
 
-    /// A fit followed to the end: lags and fixed delays where they leave least, all
-    /// folds fitted and judged. Effects that are bent as far as they can be are left out,
-    /// as what they were added with may be right all the same; `None` if fewer than
-    /// `least` terms stay.
+    /// Completes a fit: moves lags and fixed delays to the least error, fits and scores all folds. Effects at
+    /// a bound of their range are left out, since the other terms may still be right. `None` if fewer than
+    /// `least` terms remain.
     pub(crate) fn finish(
         &self,
         mut terms: Vec<Term>,
@@ -139,8 +138,8 @@ impl Search<'_> {
         })
     }
 
-    /// Moves all lags to where they leave least, by steps of Gauss and Newton in lags and parameters together, the
-    /// parameters fitted briefly after each; a step that does not lower the error is halved.
+    /// Moves all lags to the least error by Gauss–Newton steps in lags and parameters together; the
+    /// parameters are refitted briefly after each. A step that does not lower the error is halved.
     fn settle_lags(&self, fitted: Fit, terms: &mut [Term]) -> Fit {
         let learning = self.judge.learning(0);
         let shortest = learning.iter().map(|r| r.len()).min().unwrap_or(0);
@@ -199,8 +198,8 @@ fn moved(model: &Model, terms: &[Term], steps: &[i32], longest: u16) -> (Model, 
     (model, moved)
 }
 
-/// Whether an effect was bent as far as its card lets it: it stands in for something
-/// else then. Delay laws are exempt: levels that y hardly visits leave them open.
+/// Whether an effect is at a bound of its card's range: it is then a surrogate. Delay laws are exempt,
+/// because levels that y hardly visits leave their parameters undetermined.
 fn at_a_bound(model: &Model, term: &Term) -> bool {
     let spec = match term {
         Term::Effect { spec, .. } | Term::Path { spec, .. } => spec,
@@ -228,7 +227,7 @@ mod tests {
     use crate::terms::judge::Judge;
     use std::sync::atomic::AtomicBool;
 
-    /// A flow that remembers what it was 120 samples ago, on its own and under the jet what it was 61 samples ago.
+    /// A flow with a memory of 120 samples on its own and of 61 samples under the jet.
     fn remembering(records: u32) -> Vec<Record> {
         let mut random = 7_u32;
         let mut next = move || {

@@ -12,8 +12,9 @@ pub(super) fn longest_lag(period_s: f64, shortest: usize) -> u16 {
     longest.min(share).clamp(2.0, 4096.0) as u16
 }
 
-/// Whether an effect promises nothing to first order where it is put in the wrong place: a threshold that is
-/// never crossed, limits beyond all that the bent base reaches. Its card writes the places out, or they are steps.
+/// Whether the first-order prediction of an effect is useless at a wrong grid point: a threshold that is
+/// never crossed, or limits outside the range of the biased base. Such cards list their grid points, or their
+/// thresholds are steps.
 pub(super) fn hides(spec: &Spec) -> bool {
     let mut parameters = spec.parameters.iter();
     let acts_in_steps = parameters.any(|p| p.influence == Influence::Stepwise);
@@ -57,7 +58,7 @@ pub(super) fn grid(spec: &Spec, model: &Model, known: &Known) -> Vec<Vec<f64>> {
         }
     };
     let mut all = combinations(spec.parameters.iter().map(along));
-    // Where levels come in pairs, the first is the upper one.
+    // Of a pair of levels, the first is the upper one.
     let levels: Vec<usize> = (0..spec.parameters.len())
         .filter(|i| {
             let p = &spec.parameters[*i];
@@ -70,7 +71,7 @@ pub(super) fn grid(spec: &Spec, model: &Model, known: &Known) -> Vec<Vec<f64>> {
     all
 }
 
-/// The middles of equal shares of the logarithmic range.
+/// Midpoints of equal parts of a logarithmic range.
 fn logarithmic(p: &Parameter, count: usize) -> Vec<f64> {
     let share = |i: usize| (i as f64 + 0.5) / count as f64;
     let values = (0..count).map(|i| p.low * (p.high / p.low).powf(share(i)));

@@ -1,5 +1,4 @@
-//! The bench on which models are judged: fitted in free run to some records, judged
-//! in free run on others.
+//! The judge of models: fitted by free-run error on some records, validated by free-run error on others.
 
 use super::RULES;
 use super::evidence::{HeldOut, p_above_noise};
@@ -13,15 +12,15 @@ use crate::simulate::SimulateError;
 use model_core::recursion::Grading;
 use rayon::prelude::*;
 
-/// A model with its fits, one per fold, and its held-out error.
+/// A model with its fits, one per fold, and its validation error.
 #[derive(Clone, Debug)]
 pub struct Judged {
     /// The fits.
     pub fits: Vec<Fit>,
-    /// y − y_sim on what was held out.
+    /// y − y_sim on the validation samples.
     pub(crate) held_out: HeldOut,
-    /// Root mean square error of free runs that are not started anew, y: the same
-    /// for rigs that do not drift.
+    /// Root mean square error of free runs without restarts, y; equal to [`rmse`](Self::rmse) for rigs that
+    /// do not drift.
     pub(crate) drifted: f64,
 }
 
@@ -32,41 +31,43 @@ impl Judged {
         &self.fits[0].model
     }
 
-    /// Root mean square error on what was held out, y.
+    /// Root mean square of the validation error, y.
     #[must_use]
     pub fn rmse(&self) -> f64 {
         self.held_out.rmse()
     }
 
-    /// ln of that, and the price of all parameters: models of different laws are compared so.
+    /// ln of the validation error plus the penalty of all parameters, by which models with different delay
+    /// laws are compared.
     pub(crate) fn size(&self) -> f64 {
         size(self.rmse(), self.model())
     }
 }
 
-/// ln of an error, and the price of all parameters of the model that leaves it.
+/// ln of an error plus the penalty of all parameters of its model.
 pub(crate) fn size(rmse: f64, model: &Model) -> f64 {
     rmse.ln() + RULES.price * model.coordinates().len() as f64
 }
 
-/// What is learned from, what is judged on, and the noise there.
+/// Estimation and validation records with the noise level of the latter.
 pub struct Judge {
     pub(crate) folds: Vec<Fold>,
-    /// The folds with free runs over whole records, where `folds` start them anew.
+    /// The folds with free runs over whole records; set where `folds` restarts them.
     whole: Option<Vec<Fold>>,
-    /// How the errors are held out.
+    /// How the validation error is obtained.
     pub held_out_by: HeldOutBy,
-    /// Everything that may be learned from, for the model that is handed over.
+    /// All estimation records, for the final fit.
     identify: Vec<Record>,
     /// Whether the command is on/off.
     pub on_off: bool,
-    /// Whether a full jet is a command of 1 in the user's units: the share of full strength means nothing in others.
+    /// Whether a full jet is a command of 1 in the user's units; the fraction of full strength has no meaning
+    /// in others.
     pub(crate) full_is_one: bool,
-    /// σ² of the noise per judged sample, what the level scatters by not counted …
+    /// Noise variance σ² per validation sample, without the scatter of the level.
     floor: Vec<Vec<f64>>,
-    /// … and the root mean square of all of it, y.
+    /// Root mean square of the noise including the scatter of the level, y.
     measured_noise: f64,
-    /// Where the noise floor comes from.
+    /// Where the noise level comes from.
     pub noise_source: NoiseSource,
     /// How models are fitted.
     pub options: FitOptions,
@@ -79,8 +80,8 @@ fn root_mean(variances: &[Vec<f64>]) -> f64 {
 }
 
 impl Judge {
-    /// A bench over `records`; with `restarted`, free runs start anew after so many
-    /// samples. `None` if there is nothing to learn from.
+    /// A judge over `records`. With `restarted`, free runs are restarted after so many samples. `None`
+    /// without estimation records.
     #[must_use]
     pub fn new(records: &[Record], restarted: Option<usize>, options: FitOptions) -> Option<Self> {
         let (mut folds, held_out_by) = folds(records);
@@ -136,26 +137,26 @@ impl Judge {
         })
     }
 
-    /// Root mean square of the noise on what is judged, y: measured or estimated, without what the level scatters by.
+    /// Noise level on the validation samples, y rms: measured or estimated, without the scatter of the level.
     #[must_use]
     pub fn noise_rmse(&self) -> f64 {
         root_mean(&self.floor)
     }
 
-    /// The same with it: what stands beside an error as it is measured.
+    /// Noise level including the scatter of the level, y rms: comparable with an error as measured.
     #[must_use]
     pub fn measured_noise_rmse(&self) -> f64 {
         self.measured_noise
     }
 
-    /// By how much of itself the level of a record scatters between repeats; none where nothing says so.
+    /// Relative scatter of a record's level between repeats; none if the records do not show it.
     #[must_use]
     pub fn level_scatter(&self) -> Option<f64> {
         Some(self.options.level_scatter?.deviation)
     }
 
-    /// The error over the noise floor; 1 is all that can be reached. Where slow noise
-    /// is not known, the floor is not either, and nothing is near it.
+    /// The error over the noise level; 1 is the least attainable. Where slow noise is unknown, so is the noise level,
+    /// and the ratio is never near 1.
     #[must_use]
     pub fn over_noise(&self, rmse: f64) -> f64 {
         match self.noise_source {
@@ -164,20 +165,20 @@ impl Judge {
         }
     }
 
-    /// Records to fit in a fold.
+    /// Estimation records of a fold.
     #[must_use]
     pub fn learning(&self, fold: usize) -> Vec<&Record> {
         self.folds[fold].learning.iter().collect()
     }
 
-    /// All records of the first fold, those that are learned from first.
+    /// All records of the first fold, estimation records first.
     pub(crate) fn first_fold(&self) -> Vec<&Record> {
         let fold = &self.folds[0];
         let judging = fold.judging.iter().map(|judging| &judging.record);
         fold.learning.iter().chain(judging).collect()
     }
 
-    /// The same with their leads: what precedes the samples that are judged is not scored.
+    /// The validation records with their leads; samples of the lead are not scored.
     pub(crate) fn scored_records(&self) -> Vec<Record> {
         let fold = &self.folds[0];
         let judging = fold.judging.iter().map(|judging| Record {
@@ -187,7 +188,7 @@ impl Judge {
         fold.learning.iter().cloned().chain(judging).collect()
     }
 
-    /// How `model` is fitted: with the constant where it has one.
+    /// Fit options for `model`: with the constant term if it has one.
     #[must_use]
     pub fn options_for(&self, model: &Model) -> FitOptions {
         FitOptions {
@@ -196,7 +197,7 @@ impl Judge {
         }
     }
 
-    /// Places of the coordinates of `model` that a fit moves.
+    /// Indices of the coordinates of `model` that a fit varies.
     pub(crate) fn free(&self, model: &Model) -> Vec<usize> {
         let constant = self.options_for(model).constant;
         let coordinates = model.coordinates();
@@ -207,7 +208,7 @@ impl Judge {
         (0..coordinates.len()).filter(moves).collect()
     }
 
-    /// y − y_sim from a sample on; a run that diverges is far off everywhere.
+    /// y − y_sim from a sample on; a large constant error if the run diverges.
     fn error(model: &Model, record: &Record, from: usize) -> Result<Vec<f64>, SimulateError> {
         let measured = record.y.iter().skip(from);
         match model.free_run(record) {
@@ -223,7 +224,7 @@ impl Judge {
         }
     }
 
-    /// Errors of one model per fold on what was held out from it.
+    /// Validation errors of one model per fold.
     pub(crate) fn held_out<'m>(
         &self,
         models: impl Fn(usize) -> &'m Model + Sync,
@@ -257,7 +258,7 @@ impl Judge {
         Ok(HeldOut::new(errors).beside_scatter(measured))
     }
 
-    /// The first fold's fit judged, with the other folds' from there.
+    /// Validates the first fold's fit, and fits the other folds starting from it.
     ///
     /// # Errors
     /// A missing channel, or a free run that diverges in another fold.
@@ -283,7 +284,7 @@ impl Judge {
         })
     }
 
-    /// A model refitted in free run in every fold, its structure kept.
+    /// The model refitted to the free-run error in every fold, with its structure unchanged.
     ///
     /// # Errors
     /// A missing channel, or a free run that diverges.
@@ -292,7 +293,7 @@ impl Judge {
         self.judged_from(fit(model, &self.learning(0), &options)?)
     }
 
-    /// The model that is handed over: fitted to everything that may be learned from.
+    /// The final model, fitted to all estimation records.
     #[must_use]
     pub fn final_fit(&self, judged: &Judged) -> Fit {
         let own = judged.fits[0].clone();
@@ -302,17 +303,17 @@ impl Judge {
         self.fitted_to_all(&own.model).unwrap_or(own)
     }
 
-    /// Every record that may be learned from.
+    /// All estimation records.
     pub(super) fn everything(&self) -> Vec<&Record> {
         self.identify.iter().collect()
     }
 
-    /// A model fitted to everything that may be learned from.
+    /// A model fitted to all estimation records.
     ///
     /// # Errors
     /// As [`fit`].
     pub(super) fn fitted_to_all(&self, model: &Model) -> Result<Fit, SimulateError> {
-        // What is handed over is off by as little as can be, wherever that comes from.
+        // The final model is fitted for the least total error, scatter of the level included.
         let options = FitOptions {
             level_scatter: None,
             ..self.options_for(model)
@@ -320,7 +321,7 @@ impl Judge {
         fit(model, &self.everything(), &options)
     }
 
-    /// The held-out error of the model that is handed over for `judged`, where that can be told.
+    /// The validation error of the final model for `judged`, if there are validation records.
     pub(crate) fn handed_over(&self, judged: &Judged, end: &Model) -> HeldOut {
         let fitted_anew =
             self.held_out_by == HeldOutBy::Records && self.options.level_scatter.is_some();
@@ -328,7 +329,7 @@ impl Judge {
         anew.unwrap_or_else(|| judged.held_out.clone())
     }
 
-    /// Σ e² over Σ (y − ȳ)² on what is judged.
+    /// Unexplained variance Σ e² over Σ (y − ȳ)² on the validation samples.
     pub(crate) fn unexplained_share(&self, held_out: &HeldOut) -> f64 {
         let judging = self.folds.iter().flat_map(|fold| &fold.judging);
         let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
@@ -348,17 +349,17 @@ impl Judge {
         }
     }
 
-    /// e² above the noise, per sample.
+    /// Unexplained variance e² − σ² per sample.
     pub(crate) fn excess(&self, held_out: &HeldOut) -> f64 {
         (held_out.rmse().powi(2) - self.noise_rmse().powi(2)).max(0.0)
     }
 
-    /// p-value of "the error is not above `margin` times the noise floor".
+    /// p-value of "the error is not above `margin` times the noise level".
     pub(crate) fn p_above_noise(&self, held_out: &HeldOut, margin: f64) -> f64 {
         p_above_noise(held_out, &self.floor, margin * margin)
     }
 
-    /// How else than as in `own` the flow may take jets of part strength.
+    /// The other responses to jets of part strength than that of `own`.
     pub(crate) fn other_gradings(&self, own: Grading) -> Vec<Grading> {
         let others = Grading::ALL.into_iter();
         others
@@ -366,8 +367,8 @@ impl Judge {
             .collect()
     }
 
-    /// Whether one model leaves the measurement further than the other where free
-    /// runs are not started anew: what is better in pieces must not drift more.
+    /// Whether one model has a larger free-run error without restarts than the other: a gain with restarts
+    /// must not cost more drift.
     #[must_use]
     pub fn drifts_more(&self, one: &Judged, other: &Judged) -> bool {
         self.whole.is_some() && one.drifted > other.drifted

@@ -1,4 +1,4 @@
-//! Delay laws of the catalogue, where they belong to the base.
+//! Delay laws of the catalogue as parts of the base model.
 
 use super::search::{Hypothesis, Search};
 use crate::fit::rows;
@@ -6,8 +6,8 @@ use model_core::effect::Place;
 use rayon::prelude::*;
 
 impl Search<'_> {
-    /// The same structure after the delay law of the catalogue that does best with it, one of `forgotten` not among
-    /// them; `None` where the law that it has does as well.
+    /// The same structure with the delay law of the catalogue that fits best with it, those in `forgotten`
+    /// excluded. `None` if the present law fits equally well.
     #[must_use]
     pub fn after_another_law(
         &self,

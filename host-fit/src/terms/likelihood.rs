@@ -1,4 +1,4 @@
-//! Models in the metric of the noise: their evidence.
+//! Likelihood and evidence of models under the noise model.
 
 use super::judge::Judge;
 use crate::data::Record;
@@ -9,27 +9,28 @@ use crate::noise::{Metric, NoiseModel, Series, Whitened};
 use crate::residual::{NoiseSource, noise_floor};
 use rayon::prelude::*;
 
-/// A range of a parameter is so many standard deviations of its prior.
+/// The range of a parameter in standard deviations of its prior.
 const RANGE: f64 = 4.0;
 
-/// Variances below this share of their mean count as that: a standard error of 0 comes of too few repeats.
+/// Variances below this share of their mean are raised to it: a standard error of 0 comes from too few
+/// repeats.
 const LEAST_VARIANCE: f64 = 1e-4;
 
-/// A record, and the metric of its scored samples.
+/// A record and the metric (inverse noise covariance) of its scored samples.
 pub(super) struct Weighed {
     record: Record,
     metric: Metric,
 }
 
 impl Weighed {
-    /// ln of the likelihood of a model, nats; `None` where its run diverges.
+    /// ln of the likelihood of a model, nats; `None` if its free run diverges.
     pub(super) fn log_likelihood(&self, model: &Model) -> Option<f64> {
         let run = model.free_run(&self.record).ok()?;
         Some(self.metric.log_likelihood(&residual(&self.record, &run)))
     }
 }
 
-/// The errors of a model over records, and the variance of their noise; `None` where its run diverges.
+/// Errors of a model over records and their noise variance; `None` if the free run diverges.
 pub(super) fn errors(judge: &Judge, model: &Model, records: &[Record]) -> Option<Vec<Series>> {
     let measured: Vec<Vec<f64>> = records.iter().map(|r| r.y.clone()).collect();
     let (variances, _) = noise_floor(&records.iter().collect::<Vec<_>>(), &measured);
@@ -44,7 +45,7 @@ pub(super) fn errors(judge: &Judge, model: &Model, records: &[Record]) -> Option
     each.collect()
 }
 
-/// Records in the metric of `noise`, with these `errors` of a model over them.
+/// Records in the metric of `noise`, with the `errors` of a model over them.
 pub(super) fn weighed(records: &[Record], errors: &[Series], noise: &NoiseModel) -> Vec<Weighed> {
     let each = records.iter().zip(errors);
     each.map(|(record, error)| Weighed {
@@ -54,14 +55,14 @@ pub(super) fn weighed(records: &[Record], errors: &[Series], noise: &NoiseModel)
     .collect()
 }
 
-/// The noise of a bench's records as a good model leaves it, and with it the likelihoods of other models.
+/// The noise model estimated from a good model's residual, and the likelihoods of other models under it.
 pub(crate) struct Likelihood<'a> {
     judge: &'a Judge,
     records: Vec<Weighed>,
 }
 
 impl<'a> Likelihood<'a> {
-    /// The noise as `good` leaves it; `None` where its run diverges.
+    /// The noise model from the residual of `good`; `None` if its free run diverges.
     pub(crate) fn of(judge: &'a Judge, good: &Model) -> Option<Self> {
         let records = judge.scored_records();
         let errors = errors(judge, good, &records)?;
@@ -78,13 +79,13 @@ impl<'a> Likelihood<'a> {
     }
 }
 
-/// ln of the evidence of `records` for a fitted model, nats: its likelihood times the share of its prior that the
-/// records leave, by Laplace's approximation. `None` where it diverges. Coordinates that act in steps have no derivative
-/// and cost nothing.
+/// ln of the evidence of `records` for a fitted model, nats, by Laplace's approximation: the likelihood times
+/// the share of the prior volume that the data leave. `None` if the free run diverges. Coordinates that act
+/// in steps have no derivative and no penalty.
 ///
-/// ln Z = ℓ(θ̂) + ½ gᵀH⁻¹g − ½ ‖θ̂ − μ‖²_Λ + ½ ln|Λ| − ½ ln|H| with H = JᵀΣ⁻¹J + Λ and g = JᵀΣ⁻¹r − Λ(θ̂ − μ), since θ̂ is the best
-/// fit by least squares. Priors are normal: a range of a parameter is four standard deviations, of its logarithm for
-/// times and frequencies; coefficients are of size 1.
+/// ln Z = ℓ(θ̂) + ½ gᵀH⁻¹g − ½ ‖θ̂ − μ‖²_Λ + ½ ln|Λ| − ½ ln|H| with H = JᵀΣ⁻¹J + Λ and g = JᵀΣ⁻¹r − Λ(θ̂ −
+/// μ), since θ̂ is the least-squares estimate. Priors are normal: the range of a parameter is four standard
+/// deviations, of its logarithm for times and frequencies; coefficients are of size 1.
 pub(super) fn evidence(judge: &Judge, model: &Model, records: &[Weighed]) -> Option<f64> {
     let free = judge.free(model);
     let all = model.coordinates();
@@ -95,7 +96,7 @@ pub(super) fn evidence(judge: &Judge, model: &Model, records: &[Weighed]) -> Opt
         .collect::<Option<_>>()?;
     let normal = normal_equations(model, &free, records)?;
     let n = free.len();
-    // In standard deviations of the prior, Λ = 1.
+    // In units of the prior's standard deviation, Λ = 1.
     let deviation: Vec<f64> = priors.iter().map(|prior| prior.deviation).collect();
     let information: Vec<f64> = (0..n * n)
         .map(|at| {
@@ -117,7 +118,7 @@ pub(super) fn evidence(judge: &Judge, model: &Model, records: &[Weighed]) -> Opt
     Some(normal.log_likelihood + 0.5 * (to_the_top - off - occam))
 }
 
-/// Of `model` over these records, by its coordinates with the indices `free`.
+/// Normal equations of `model` over these records for the coordinates with the indices `free`.
 pub(super) fn normal_equations(
     model: &Model,
     free: &[usize],
@@ -163,9 +164,9 @@ pub(super) struct NormalEquations {
 
 /// The prior of one coordinate.
 struct Prior {
-    /// Its standard deviation in the coordinate's own unit, at the value that it has.
+    /// Standard deviation in the coordinate's own unit, at its present value.
     deviation: f64,
-    /// How far the value is from the middle, standard deviations.
+    /// Distance of the value from the prior mean, standard deviations.
     off: f64,
 }
 
@@ -195,18 +196,18 @@ impl Prior {
     }
 }
 
-/// What of a series of the record is scored.
+/// The scored part of a series of the record.
 fn scored<'s>(record: &Record, series: &'s [f64]) -> &'s [f64] {
     series.get(record.lead..).unwrap_or(&[])
 }
 
-/// Measurement minus run, where it is scored.
+/// Measurement minus simulation on the scored samples.
 fn residual(record: &Record, run: &[f64]) -> Vec<f64> {
     let pairs = scored(record, &record.y).iter().zip(scored(record, run));
     pairs.map(|(y, sim)| y - sim).collect()
 }
 
-/// Variances of the scored samples, what the level scatters by not counted; all above 0.
+/// Noise variances of the scored samples without the scatter of the level; all above 0.
 fn scored_variance(judge: &Judge, record: &Record, variance: &[f64]) -> Vec<f64> {
     let mut own = scored(record, variance).to_vec();
     if let Some(scatter) = &judge.options.level_scatter {
@@ -240,7 +241,7 @@ mod tests {
         }
     }
 
-    /// Records of a bilinear flow with noise that remembers eight samples.
+    /// Records of a bilinear flow with noise of correlation time eight samples.
     fn records(seed: u64) -> Vec<Record> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let record = |half: usize| {
@@ -264,8 +265,8 @@ mod tests {
         [70, 110, 170].map(record).into()
     }
 
-    /// More evidence for the true structure than for one without its product, by far, and than for one with a lag too many,
-    /// which fits no worse.
+    /// The true structure has far more evidence than one without its product, and more than one with a
+    /// superfluous lag, which fits equally well.
     #[test]
     fn evidence_is_for_the_true_structure() {
         let judge = Judge::new(&records(2), None, FitOptions::default()).expect("records");
@@ -287,7 +288,7 @@ mod tests {
         );
     }
 
-    /// A lag that is not there is never certified; the product that is there always is.
+    /// A lag that is not in the plant is never certified; the product that is there always is.
     #[test]
     fn certificates_are_of_what_is_there() {
         for seed in 0..12 {

@@ -1,11 +1,10 @@
-//! Which terms a model needs: lags of the flow, the sensor's zero, physical effects.
+//! Structure selection: lags of the flow, the sensor's offset, physical effects.
 //!
-//! A hypothesis is a model with a list of [`Term`]s that were added to the leanest
-//! one. [`Screen`] says what hundreds of further terms would take of its free-run
-//! error, for the price of one run each; [`Search`] refits the few that promise most,
-//! judges them on held-out records and goes on from the best. Lags and effects are
-//! moves of the same search: both have to earn their place, and an effect has to beat
-//! what a base without it can do.
+//! A hypothesis is a model with a list of [`Term`]s added to the base model of the lowest order. [`Screen`]
+//! predicts to first order how much of the free-run error hundreds of further terms would explain, at the
+//! cost of one run each. [`Search`] refits the most promising, scores them on validation records and
+//! continues from the best. Lags and effects are moves of the same search: both must pay for their
+//! parameters, and an effect must beat the best base model without it.
 
 mod again;
 mod automatic;

@@ -1,4 +1,4 @@
-//! Sets of candidates that are worth their price together.
+//! Sets of candidates whose joint gain pays for their parameters.
 
 use super::RULES;
 use super::screen::Screen;
@@ -8,21 +8,21 @@ use crate::linalg::{dot, solve_symmetric};
 use model_core::effect::Place;
 use rayon::prelude::*;
 
-/// Terms to add together, and what they are expected to leave.
+/// Terms to add together, with their predicted gain.
 #[derive(Clone, Debug)]
 pub struct Proposal {
     /// The terms.
     pub terms: Vec<Term>,
-    /// First values of the coefficients of each.
+    /// Initial values of the coefficients of each term.
     pub coefficients: Vec<Vec<f64>>,
-    /// Expected held-out mean square over the present one.
+    /// Predicted validation mean square error over the present one.
     pub left: f64,
-    /// ½ ln of that, and the price of the terms: below 0 is worth it.
+    /// ½ ln of `left` plus the penalty of the terms; negative if the set pays.
     pub score: f64,
 }
 
 impl Screen<'_> {
-    /// Single terms and pairs that are worth their price, the best first.
+    /// Single terms and pairs whose gain pays for their parameters, best first.
     #[must_use]
     pub fn proposals(&self, table: &Table) -> Vec<Proposal> {
         let candidates = &table.candidates;
@@ -84,8 +84,7 @@ impl Screen<'_> {
         proposals.collect()
     }
 
-    /// What a candidate alone is expected to leave, as a proposal; `None` if it makes
-    /// no sense.
+    /// A single candidate as a proposal; `None` if its coefficient is not feasible.
     #[must_use]
     pub fn alone(&self, table: &Table, candidate: &Candidate) -> Option<Proposal> {
         let own: Vec<&[f64]> = candidate
@@ -127,11 +126,11 @@ fn clash(a: &Candidate, b: &Candidate) -> bool {
     }
 }
 
-/// Products of all columns, so that sets of them cost nothing.
+/// Inner products of all columns, computed once for all sets.
 struct Sets<'t> {
     candidates: &'t [Candidate],
     count: usize,
-    /// Learned and held-out products of the columns, row-major.
+    /// Inner products of the columns over estimation and validation samples, row-major.
     products: Vec<(f64, f64)>,
     with_error: Vec<(f64, f64)>,
     error: f64,
@@ -146,7 +145,7 @@ impl<'t> Sets<'t> {
         };
         let columns = &table.columns;
         let count = columns.len();
-        // Columns that no candidate kept are left out.
+        // Columns that belong to no kept candidate are left out.
         let used: Vec<bool> = {
             let mut used = vec![false; count];
             let kept = table.candidates.iter().flat_map(|c| &c.columns);
@@ -183,8 +182,8 @@ impl<'t> Sets<'t> {
         }
     }
 
-    /// The held-out share that a set leaves, and the coefficients of its columns;
-    /// `None` if they make no sense.
+    /// The validation error share that remains with a set, and the coefficients of its columns; `None` if
+    /// they are not feasible.
     fn left(&self, set: &[usize]) -> Option<(f64, Vec<f64>)> {
         let own = set.iter().flat_map(|c| &self.candidates[*c].columns);
         let index: Vec<usize> = own.copied().collect();
@@ -209,7 +208,7 @@ impl<'t> Sets<'t> {
                 left += scale[i] * scale[j] * cell(i, j).1;
             }
         }
-        // First order: less than nothing is never left.
+        // A first-order prediction may be negative; the remaining error is not.
         Some(((left / self.error).max(1e-6), scale))
     }
 }

@@ -1,4 +1,4 @@
-//! Which model would have been chosen, had other records been held out.
+//! Stability of the choice of a model under bootstrap resampling of the validation records.
 
 use super::RULES;
 use super::evidence::HeldOut;
@@ -6,11 +6,10 @@ use crate::linalg::dot;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Shares of the resamples in which each model has the smallest held-out error.
+/// Shares of the bootstrap resamples in which each model has the smallest validation error.
 ///
-/// Conditions are records, and what is held out of one is as good as its blocks that are independent of each other:
-/// records are drawn first and blocks of each of them then, both with replacement, the same for all models. The draws
-/// are the same in every run.
+/// Two-stage resampling with replacement: records first, then independent blocks of each record. All models
+/// get the same draws, and the draws are the same in every run.
 pub(crate) fn shares_won(models: &[&HeldOut]) -> Vec<f64> {
     let Some(block) = models.iter().map(|model| model.block()).max() else {
         return Vec::new();
@@ -39,7 +38,7 @@ pub(crate) fn shares_won(models: &[&HeldOut]) -> Vec<f64> {
     won
 }
 
-/// Σ e² of each block of a record, for each model; warm-ups differ, and what they have in common is their end.
+/// Σ e² of each block of a record for each model, over the common end of the series (warm-ups differ).
 fn sums(models: &[&HeldOut], record: usize, block: usize) -> Vec<Vec<f64>> {
     let ends = models.iter().map(|model| &model.errors[record][..]);
     let common = ends.clone().map(<[f64]>::len).min().unwrap_or(0);
@@ -56,8 +55,8 @@ fn sums(models: &[&HeldOut], record: usize, block: usize) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Whether resamples choose `own`, one of the shares, so much less often than the best that it is out of the question:
-/// the inflated argmax (Adrian, Soloff and Willett, arXiv 2410.18268) of two.
+/// Whether a model with share `own` is excluded: it wins so much less often than the best (inflated argmax of
+/// two; Adrian, Soloff and Willett, arXiv 2410.18268).
 pub(crate) fn is_out(shares: &[f64], own: usize) -> bool {
     let most = shares.iter().copied().fold(0.0, f64::max);
     shares[own] <= most - RULES.inflation / std::f64::consts::SQRT_2
@@ -88,8 +87,8 @@ mod tests {
         assert!(shares[0] > 0.99 && !is_out(&shares, 0));
     }
 
-    /// A gain that one of three records shows is lost in more than a quarter of the resamples, and a model that is
-    /// the same elsewhere stays out of the question.
+    /// A gain that only one of three records shows is lost in more than a quarter of the resamples; an
+    /// otherwise equal model stays excluded.
     #[test]
     fn a_gain_in_one_record_is_less_stable() {
         let good = noise(4, 1.0);

@@ -1,15 +1,14 @@
-//! Hundreds of candidates for the price of a few free runs each.
+//! First-order screening: hundreds of candidates at the cost of a few free runs each.
 //!
-//! At a fitted model with the free-run error e and the sensitivities J of its
-//! parameters, a candidate changes the free run by s: the difference of two runs for
-//! effects (which holds for thresholds too), a derivative for lags. What is left of s
-//! after everything else has been refitted to first order is
+//! At a fitted model with the free-run error e and the sensitivities J of its parameters, a candidate changes
+//! the free run by s: the difference of two runs for effects (valid for thresholds too), a derivative for
+//! lags. After a first-order refit of all other parameters, what remains of s is
 //!
 //! s⊥ = s − J(JᵀJ)⁻¹Jᵀs,
 //!
-//! and the candidate takes (s⊥ᵀe)²/(s⊥ᵀs⊥) of the error. Sets of candidates are
-//! judged together by regression on their s⊥. Coefficients come from the records that
-//! are learned from, what they leave is counted on those that are held out.
+//! and the candidate explains (s⊥ᵀe)²/(s⊥ᵀs⊥) of the error energy. Sets of candidates are judged together by
+//! regression on their s⊥. Coefficients are estimated on the estimation samples, gains on the validation
+//! samples.
 
 use super::RULES;
 use super::judge::Judge;
@@ -22,52 +21,51 @@ use model_core::effect::Spec;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// What the parameters of one effect do together.
+/// First-order prediction for all parameters of one effect together.
 pub(crate) struct Tangent {
-    /// By how much each should change, to first order.
+    /// Predicted change of each parameter.
     pub(crate) coefficients: Vec<f64>,
-    /// Share of the error energy that they take where it is learned.
+    /// Share of the error energy explained on the estimation samples.
     pub(crate) learned: f64,
-    /// The same on what is held out.
+    /// The same on the validation samples.
     pub(crate) held_out: f64,
-    /// What they change in the free run, as far as the model itself cannot.
+    /// Their change of the free run, orthogonal to the model's own sensitivities.
     pub(crate) direction: Vec<f64>,
 }
 
-/// A fitted model, ready to be asked what a change would do.
+/// A fitted model with its sensitivities, ready to predict the gain of changes.
 pub struct Screen<'a> {
     pub(super) judge: &'a Judge,
     pub(super) model: &'a Model,
-    /// Records that are learned from, then those that are judged.
+    /// Estimation records, then validation records.
     pub(super) records: Vec<&'a Record>,
-    /// The first sample of each that counts.
+    /// First scored sample of each record.
     from: Vec<usize>,
-    /// Neighbours that are averaged.
+    /// Number of neighbouring samples that are averaged.
     stride: usize,
-    /// Joined numbers that are learned from.
+    /// Number of joined values that belong to the estimation samples.
     pub(super) learned: usize,
     pub(super) runs: Vec<Vec<f64>>,
     pub(super) error: Vec<f64>,
-    /// Directions that the model's own parameters can follow, orthonormal on what is
-    /// learned from.
+    /// Directions that the model's own parameters can follow, orthonormal on the estimation samples.
     pub(super) basis: Vec<Vec<f64>>,
-    /// Of the first of these directions: the coordinate that gave it, and how much of each direction a unit of
-    /// that coordinate makes. The others are fixed delays.
+    /// For each leading direction of the basis: the coordinate it came from, and the components of that
+    /// coordinate's sensitivity. The remaining directions are fixed delays.
     made_by: Vec<(usize, Vec<f64>)>,
-    /// How much of each direction the error held.
+    /// Component of the error along each direction.
     own: Vec<f64>,
 }
 
-/// Where lags should move, and what the model's parameters would do of that.
+/// Predicted moves of the lags, and the accompanying change of the model's parameters.
 pub(super) struct Moves {
-    /// For each term by how many samples, 0 where it is right or the term has no lag.
+    /// Move of each term's lag in samples; 0 for terms without a lag.
     pub(super) steps: Vec<i32>,
-    /// For each term how much of each direction of the basis a sample makes.
+    /// For each term, the components of a move by one sample along the basis.
     along: Vec<Vec<f64>>,
 }
 
 impl<'a> Screen<'a> {
-    /// Makes `model`, fitted to the first fold, ready. `None` if it diverges.
+    /// Prepares `model`, fitted to the first fold. `None` if its free run diverges.
     #[must_use]
     pub fn new(judge: &'a Judge, model: &'a Model) -> Option<Self> {
         let fold = &judge.folds[0];
@@ -114,7 +112,7 @@ impl<'a> Screen<'a> {
         Some(screen)
     }
 
-    /// y − y_sim, joined.
+    /// y − y_sim of all records, joined.
     fn error_with(&self, runs: &[Vec<f64>]) -> Vec<f64> {
         let pairs = self.records.iter().zip(runs);
         let each =
@@ -123,7 +121,7 @@ impl<'a> Screen<'a> {
         self.joined(errors.iter().map(Vec::as_slice))
     }
 
-    /// The error of another model, joined; `None` if it diverges.
+    /// The joined error of another model; `None` if it diverges.
     pub(super) fn error_of(&self, other: &Model) -> Option<Vec<f64>> {
         let runs: Option<Vec<Vec<f64>>> = (self.records.iter())
             .map(|record| other.free_run(record).ok())
@@ -131,9 +129,8 @@ impl<'a> Screen<'a> {
         Some(self.error_with(&runs?))
     }
 
-    /// The joined series in pieces whose errors are independent of each other: whole records, for what
-    /// scatters between records is the same all through one; where there are few, pieces of them, of
-    /// so many samples at least.
+    /// Independent blocks of the joined series: whole records, because record-to-record scatter is constant
+    /// within one. If records are few, pieces of them of at least so many samples.
     pub(super) fn blocks(&self, samples: usize) -> Vec<Range<usize>> {
         let most = self.records.iter().map(|r| r.len()).max().unwrap_or(0);
         let pieces = RULES.fewest_pieces.div_ceil(self.records.len().max(1));
@@ -149,27 +146,27 @@ impl<'a> Screen<'a> {
         blocks
     }
 
-    /// How many of the records are learned from.
+    /// Number of estimation records.
     pub(super) fn learning(&self) -> usize {
         self.judge.folds[0].learning.len()
     }
 
-    /// Records that are learned from, then those that are judged.
+    /// Estimation records, then validation records.
     pub(crate) fn records(&self) -> &[&'a Record] {
         &self.records
     }
 
-    /// The model that is asked about.
+    /// The screened model.
     pub(crate) fn model(&self) -> &'a Model {
         self.model
     }
 
-    /// Judged samples of all records, joined and averaged over neighbours.
+    /// Scored samples of all records, joined and averaged over neighbours.
     pub(super) fn joined<'s>(&self, series: impl Iterator<Item = &'s [f64]>) -> Vec<f64> {
         self.joined_from(0, series)
     }
 
-    /// The same of the records from one on.
+    /// The same for the records from `first` on.
     fn joined_from<'s>(&self, first: usize, series: impl Iterator<Item = &'s [f64]>) -> Vec<f64> {
         let mut all = Vec::new();
         for (index, series) in (first..).zip(series) {
@@ -184,14 +181,14 @@ impl<'a> Screen<'a> {
         all
     }
 
-    /// Joins judged samples of one record, averaged over neighbours.
+    /// Appends the scored samples of one record, averaged over neighbours.
     fn join(&self, record: usize, series: &[f64], all: &mut Vec<f64>) {
         let judged = series.get(self.from[record]..).unwrap_or(&[]);
         let means = judged.chunks_exact(self.stride);
         all.extend(means.map(|chunk| chunk.iter().sum::<f64>() / self.stride as f64));
     }
 
-    /// What moving each fixed delay by a sample does: they have no derivative.
+    /// Change of the free run by moving each fixed delay by one sample; delays have no derivative.
     fn fixed_delays(&self) -> Vec<Vec<f64>> {
         let Delay::Fixed { delays } = &self.model.delay else {
             return Vec::new();
@@ -207,11 +204,11 @@ impl<'a> Screen<'a> {
         (0..delays.len()).filter_map(later).collect()
     }
 
-    /// Adds a direction to those that the model can follow, and says how much of each the column was; `None` if
-    /// it follows that one already.
+    /// Adds a column to the basis and returns its components along it; `None` if the column is linearly
+    /// dependent.
     fn follow(&mut self, mut column: Vec<f64>) -> Option<Vec<f64>> {
         let size = self.learned_square(&column).sqrt();
-        // Twice is enough (Kahan, in Parlett 1980).
+        // Orthogonalising twice is enough (Kahan, in Parlett 1980).
         let mut made = self.residualise(&mut column);
         let again = self.residualise(&mut column);
         made.iter_mut().zip(again).for_each(|(sum, x)| *sum += x);
@@ -229,8 +226,8 @@ impl<'a> Screen<'a> {
         self.product(column, column)
     }
 
-    /// Takes away what the model's own parameters can do, to first order, and says how much of each
-    /// direction that was: of a column that ends with what is learned from, the rest has to lose as much.
+    /// Subtracts from a column what the model's own parameters can follow to first order, and returns the
+    /// components. A column that covers only the estimation samples is extended accordingly.
     pub(super) fn residualise(&self, column: &mut [f64]) -> Vec<f64> {
         let taken = self.basis.iter().map(|direction| {
             let along = dot(&direction[..self.learned], &column[..self.learned]);
@@ -241,7 +238,7 @@ impl<'a> Screen<'a> {
         taken.collect()
     }
 
-    /// What another model changes in the free run; `None` if it diverges.
+    /// The change of the free run with another model; `None` if it diverges.
     pub(super) fn change(&self, other: &Model) -> Option<Vec<f64>> {
         self.change_on(0..self.records.len(), other)
     }
@@ -262,13 +259,13 @@ impl<'a> Screen<'a> {
         joined.iter().all(|x| x.is_finite()).then_some(joined)
     }
 
-    /// Coefficients of columns fitted to the error, and the shares of the error's
-    /// energy that are left where it was learned and held out.
+    /// Least-squares coefficients of columns on the error, and the remaining shares of the error energy on
+    /// estimation and validation samples.
     pub(super) fn regress(&self, columns: &[&[f64]]) -> Option<(Vec<f64>, f64, f64)> {
         self.regress_with(columns, 0.0)
     }
 
-    /// The same with a ridge, as a share of the mean square of the columns.
+    /// The same with ridge regularisation, as a share of the mean square of the columns.
     fn regress_with(&self, columns: &[&[f64]], ridge: f64) -> Option<(Vec<f64>, f64, f64)> {
         let scale = self.coefficients(&self.error, columns, ridge)?;
         let rest = less(&self.error, columns, &scale);
@@ -280,7 +277,7 @@ impl<'a> Screen<'a> {
         Some((scale, share(before, own), share(after, other)))
     }
 
-    /// Coefficients of columns fitted to a series where it is learned.
+    /// Least-squares coefficients of columns on a series over the estimation samples.
     fn coefficients(&self, series: &[f64], columns: &[&[f64]], ridge: f64) -> Option<Vec<f64>> {
         let products = self.square(columns, ridge);
         let right: Vec<f64> = columns.iter().map(|c| self.product(c, series)).collect();
@@ -291,7 +288,7 @@ impl<'a> Screen<'a> {
         dot(&a[..self.learned], &b[..self.learned])
     }
 
-    /// Products of columns with each other where it is learned, and a ridge as a share of their mean square.
+    /// Gram matrix of columns over the estimation samples, with a ridge as a share of their mean square.
     pub(super) fn square(&self, columns: &[&[f64]], ridge: f64) -> Vec<f64> {
         let n = columns.len();
         let mut products: Vec<f64> = (0..n * n)
@@ -305,13 +302,13 @@ impl<'a> Screen<'a> {
         products
     }
 
-    /// What columns fitted to a series leave of it.
+    /// The residual of a series after regression on columns.
     pub(super) fn rest_of(&self, series: &[f64], columns: &[&[f64]]) -> Option<Vec<f64>> {
         let scale = self.coefficients(series, columns, 0.0)?;
         Some(less(series, columns, &scale))
     }
 
-    /// Where the lags of the terms should move, to first order.
+    /// First-order prediction of the best moves of the terms' lags.
     #[must_use]
     pub(super) fn moves_of(&self, terms: &[Term]) -> Moves {
         let probed = terms.par_iter().enumerate().filter_map(|(index, term)| {
@@ -339,7 +336,7 @@ impl<'a> Screen<'a> {
         moves
     }
 
-    /// The parameters that go with lags moved by so many samples, to first order.
+    /// The parameters after moving the lags by so many samples, to first order.
     pub(super) fn values_with(&self, moves: &Moves, steps: &[i32]) -> Vec<f64> {
         let wanted = |direction: usize| {
             let of_term = |(along, step): (&Vec<f64>, &i32)| {
@@ -363,8 +360,8 @@ impl<'a> Screen<'a> {
         values
     }
 
-    /// What each parameter of an effect does, from where `other` has it: the model with that effect, which runs as
-    /// this one does. `None` if it diverges.
+    /// Change of the free run by each parameter of an effect, linearised at its values in `other`: this model
+    /// with the effect, at an amplitude that leaves the run unchanged. `None` if it diverges.
     pub(crate) fn columns(&self, other: &Model, effect: &str) -> Option<Vec<Vec<f64>>> {
         let coordinates = other.coordinates();
         let own = |name: &str| name.split('.').next() == Some(effect);
@@ -385,7 +382,7 @@ impl<'a> Screen<'a> {
         Some(columns.collect())
     }
 
-    /// What they do together; `None` if that is nothing.
+    /// First-order prediction for those parameters together; `None` if they change nothing.
     pub(crate) fn tangent(&self, other: &Model, effect: &str) -> Option<Tangent> {
         let columns = self.columns(other, effect)?;
         let all: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
@@ -404,7 +401,7 @@ impl<'a> Screen<'a> {
         })
     }
 
-    /// Whether an effect cannot be tried here, and why.
+    /// Why an effect cannot be tried on these records; none if it can.
     pub(crate) fn pointless(&self, spec: &Spec) -> Option<String> {
         if self
             .model
@@ -421,7 +418,7 @@ impl<'a> Screen<'a> {
     }
 }
 
-/// A series less so many times each column.
+/// A series minus a linear combination of columns.
 fn less(series: &[f64], columns: &[&[f64]], scales: &[f64]) -> Vec<f64> {
     let mut rest = series.to_vec();
     for (column, scale) in columns.iter().zip(scales) {

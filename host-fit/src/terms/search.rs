@@ -1,4 +1,4 @@
-//! One search over lags, the sensor's zero and effects.
+//! The search over lags, the sensor's offset and effects.
 
 use super::RULES;
 use super::grid::hides;
@@ -17,16 +17,16 @@ use rayon::prelude::*;
 use std::cmp::Ordering;
 use std::sync::atomic::{AtomicBool, Ordering as Memory};
 
-/// A model with the terms that were added to the leanest one.
+/// A model with the terms that were added to the base model of the lowest order.
 #[derive(Clone, Debug)]
 pub struct Hypothesis {
     /// The terms.
     pub terms: Vec<Term>,
-    /// Its fits and its held-out error.
+    /// Its fits and its validation error.
     pub judged: Judged,
-    /// Whether further terms were screened for it.
+    /// Whether further terms were already screened on it.
     pub(super) expanded: bool,
-    /// Whether it descends from the given structure, and not from the leanest one.
+    /// Whether it descends from the given structure rather than from the lowest-order model.
     pub(super) from_given: bool,
 }
 
@@ -42,7 +42,7 @@ impl Hypothesis {
         }
     }
 
-    /// What a search found that tried nothing else.
+    /// The result of a search that ends with this hypothesis alone.
     pub(crate) fn alone(self) -> Found {
         Found {
             root: self.clone(),
@@ -53,25 +53,25 @@ impl Hypothesis {
         }
     }
 
-    /// Whether no effect is among its terms.
+    /// Whether it has no effect among its terms.
     #[must_use]
     pub fn is_bare(&self) -> bool {
         self.terms.iter().all(|term| term.effect().is_none())
     }
 
-    /// What its terms cost.
+    /// Number of parameters of its terms, as the penalty counts them.
     #[must_use]
     pub fn cost(&self) -> usize {
         self.terms.iter().map(Term::cost).sum()
     }
 
-    /// ln of the held-out error, and the price of the terms: the lower the better.
+    /// ln of the validation error plus the penalty of the terms; the lower the better.
     #[must_use]
     pub fn score(&self) -> f64 {
         score(self.judged.rmse(), self.cost())
     }
 
-    /// Whether `other` is built as it is: fitted anew that is no other place to set out from.
+    /// Whether `other` has the same structure, so that refitting it gives no second starting point.
     pub(crate) fn is_built_as(&self, other: &Model) -> bool {
         Term::all_of(other, self.judged.model()).is_some_and(|terms| terms.is_empty())
     }
@@ -92,24 +92,23 @@ pub(super) fn score(rmse: f64, cost: usize) -> f64 {
     rmse.ln() + RULES.price * cost as f64
 }
 
-/// What a search found.
+/// The result of a search.
 #[derive(Clone, Debug)]
 pub struct Found {
-    /// The leanest model.
+    /// The base model of the lowest order.
     pub root: Hypothesis,
-    /// The best hypothesis, all its terms needed.
+    /// The best hypothesis, pruned to the terms that are needed.
     pub best: Hypothesis,
-    /// The best without effects, its lags searched as hard.
+    /// The best hypothesis without effects, with equally thorough lags.
     pub bare: Hypothesis,
-    /// Everything that was fitted to the end.
+    /// All hypotheses that were refitted in full.
     pub all: Vec<Hypothesis>,
-    /// Alternatives that were looked at in full refits.
+    /// Number of candidates that were refitted in full.
     pub tried: usize,
 }
 
 impl Found {
-    /// Other models that were fitted to the end, with the same effects as `last` and no worse than it
-    /// by anything that counts.
+    /// Other refitted models with the same effects as `last` whose error is not significantly larger.
     pub(crate) fn as_good_as(&self, last: &Hypothesis) -> Vec<&Model> {
         let names = |hypothesis: &Hypothesis| {
             let effects = hypothesis.terms.iter().filter_map(Term::effect);
@@ -124,26 +123,26 @@ impl Found {
         alike.map(|other| other.judged.model()).collect()
     }
 
-    /// Whether the given structure was a second place to set out from.
+    /// Whether the given structure was a second starting point.
     #[must_use]
     pub fn set_out_twice(&self) -> bool {
         self.all.iter().any(|hypothesis| hypothesis.from_given)
     }
 }
 
-/// The search and what it works on.
+/// The search with its data and options.
 pub struct Search<'a> {
     /// The bench.
     pub judge: &'a Judge,
-    /// What the records say.
+    /// Facts about the records that limit the candidates.
     pub known: Known,
     /// Whether effects may be added.
     pub effects: bool,
-    /// Most effects.
+    /// Largest number of effects.
     pub most_effects: usize,
-    /// Set to end with the best so far.
+    /// When set, the search ends with the best hypothesis so far.
     pub interrupt: &'a AtomicBool,
-    /// Told what is being tried.
+    /// Receives progress messages.
     pub progress: &'a (dyn Fn(&str) + Sync),
 }
 
@@ -156,21 +155,20 @@ impl Search<'_> {
         self.judge.over_noise(hypothesis.judged.rmse())
     }
 
-    /// Whether much is left that something could explain, where that is known.
+    /// Whether the error is far above a known noise level.
     fn leaves_much(&self, hypothesis: &Hypothesis) -> bool {
         self.judge.noise_source != NoiseSource::Scatter && self.over(hypothesis) > RULES.much
     }
 
-    /// The leanest model with the kind of delay law and the effects that `given` has;
-    /// in `mid_run`, its free runs begin from the measurement.
+    /// The lowest-order model with the kind of delay law and the effects of `given`. With `mid_run`, free
+    /// runs start from the measurement.
     ///
     /// # Errors
-    /// When no starting point gives a stable free run.
+    /// No starting point gives a stable free run.
     pub fn root(&self, given: &Model, mid_run: bool) -> Result<Hypothesis, SimulateError> {
         let learning = self.judge.learning(0);
         let mut bare = given.clone();
-        // What was added before stays: the question is what is missing still.
-        // Nuisances have to earn their place again.
+        // Effects that the user added stay; drift and other disturbance terms must earn their place again.
         let mut kept = std::mem::take(&mut bare.effects);
         kept.retain(|added| NUISANCES.iter().all(|spec| spec.name != added.name));
         let mut model = lean_base(&bare, &learning)?.model;
@@ -181,7 +179,7 @@ impl Search<'_> {
         }
         let mut judged = self.judge.refitted(&model)?;
         if !self.judge.on_off {
-            // Graded commands show how the flow takes jets of part strength.
+            // Graded commands identify the response to jets of part strength.
             let others = self.judge.other_gradings(judged.model().grading);
             let others: Vec<Judged> = others
                 .into_par_iter()
@@ -203,8 +201,8 @@ impl Search<'_> {
         Ok(Hypothesis::new(judged))
     }
 
-    /// The structure of `given`, refitted, as terms on top of `root`: a second place to
-    /// set out from. `None` where it is not made of such terms, or of too many.
+    /// The structure of `given`, refitted and expressed as terms on top of `root`: a second starting point.
+    /// `None` if it has other or too many terms.
     #[must_use]
     pub fn second_root(&self, given: &Model, root: &Hypothesis) -> Option<Hypothesis> {
         let mut model = given.clone();
@@ -220,9 +218,9 @@ impl Search<'_> {
         })
     }
 
-    /// From `root`, and from the `second` one where the first step did not reach the
-    /// floor, round by round, until nothing that is left is worth its price. Where much is left
-    /// then, what promised less is followed too, once: from the root and from the best.
+    /// Searches from `root`, and from `second` unless the first round reaches the noise level, until no
+    /// remaining candidate pays for its parameters. If the error is still far above the noise, one extension
+    /// follows the less promising candidates of the root and of the best hypothesis.
     #[must_use]
     pub fn run(&self, root: Hypothesis, second: impl FnOnce() -> Option<Hypothesis>) -> Found {
         let mut all = vec![root];
@@ -269,7 +267,7 @@ impl Search<'_> {
         let end = best(&all, |_| true);
         let bare_end = best(&all, Hypothesis::is_bare);
         let found = self.pruned(all[end].clone(), &root);
-        // The best without effects is asked for before effects are tried in the place of its terms.
+        // The best hypothesis without effects is determined before terms are exchanged for effects.
         let bare = if bare_end == end {
             found.clone()
         } else {
@@ -286,8 +284,8 @@ impl Search<'_> {
         }
     }
 
-    /// One round: screens for those that are `chosen`, refits `width` times what is refitted as a rule,
-    /// and keeps it in `all`. Whether there was anything to refit.
+    /// One round: screens on the `chosen` hypotheses, refits `width` times the usual number of proposals, and
+    /// adds them to `all`. Returns whether there was anything to refit.
     fn advance(
         &self,
         round: usize,
@@ -319,14 +317,13 @@ impl Search<'_> {
         true
     }
 
-    /// Whom to screen further terms for, and whether effects may be among them; those from `since` on came
-    /// of a wider round.
+    /// The hypotheses to screen next, and whether effects are candidates for each. Those from `since` on come
+    /// from a wider round.
     fn chosen(&self, all: &[Hypothesis], since: Option<usize>) -> Vec<(usize, bool)> {
         let (end, bare) = (best(all, |_| true), best(all, Hypothesis::is_bare));
         let settled = all[end].expanded;
         let open = |i: &usize| !all[*i].expanded;
-        // Once the best has nothing to gain, only a base that was searched less hard
-        // can still say something.
+        // If the best hypothesis is at the noise level, only the base model can still improve.
         let bare_is_done = bare == end
             || all[bare].expanded
             || all[bare].cost() >= all[end].cost() + RULES.head_start;
@@ -345,14 +342,14 @@ impl Search<'_> {
         {
             chosen.push((rival, self.effects));
         }
-        // What a wider round brought is followed whether or not it leads.
+        // Results of a wider round are screened whether or not they lead.
         let new = leading(all, |i| {
             since.is_some_and(|since| *i >= since) && !chosen.iter().any(|(c, _)| c == i)
         });
         if let Some(new) = new.filter(|i| open(i) && near(*i)) {
             chosen.push((new, self.effects));
         }
-        // Two lines of descent, until the one that is behind has become the dearer.
+        // Two lines of descent are followed until the worse one also has more parameters.
         let line = all[end].from_given;
         let other = leading(all, |i| all[*i].from_given != line);
         if let Some(other) = other.filter(open)
@@ -369,7 +366,7 @@ impl Search<'_> {
         chosen
     }
 
-    /// What to refit for a hypothesis: some with effects, some without.
+    /// The proposals to refit for a hypothesis: some with effects, some without.
     fn proposals(
         &self,
         hypothesis: &Hypothesis,
@@ -392,7 +389,7 @@ impl Search<'_> {
             let enough = if added > 0 {
                 with >= RULES.with_effects * width
             } else {
-                // Lags move: neighbours are one proposal.
+                // Lags move in a fit: neighbouring lags count as one proposal.
                 without >= RULES.without_effects * width
                     || kept.iter().filter(again).count() >= RULES.of_one_kind
             };
@@ -415,7 +412,7 @@ impl Search<'_> {
         kept
     }
 
-    /// Effects that hide, whatever the screening says of them.
+    /// Effects that a first-order screening cannot rate.
     fn unseen(&self, screen: &Screen<'_>) -> impl Iterator<Item = Proposal> {
         let model = screen.model();
         let specs = model
@@ -438,7 +435,8 @@ impl Search<'_> {
         })
     }
 
-    /// Every proposal for a few steps, the best of them, `width` times as many as a rule, to the end.
+    /// Fits every proposal for a few iterations, and the best of them in full: `width` times the usual
+    /// number.
     fn refitted(
         &self,
         all: &[Hypothesis],
@@ -461,8 +459,8 @@ impl Search<'_> {
             .collect();
         let mut brief: Vec<(f64, usize, Fit)> = brief.into_iter().flatten().collect();
         brief.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // One without effects is among those that are followed to the end, and one of each model that was screened:
-        // a few steps say less where it is further to go. What ends as another does is not.
+        // Refitted in full in any case: the best without effects and the best on each screened model, for
+        // which a brief fit says less. Proposals that converge to the same model are fitted once.
         let mut leading: Vec<(usize, Fit)> = Vec::new();
         let (mut has_bare, mut met): (bool, Vec<Vec<Term>>) = (false, Vec::new());
         let mut heirless: Vec<usize> = pool.iter().map(|(index, _)| *index).collect();
@@ -495,8 +493,8 @@ impl Search<'_> {
         finished.into_iter().flatten().collect()
     }
 
-    /// The best of `finished` with another response to jets of part strength, if that
-    /// is better: it shows only once effects make such jets.
+    /// The best of `finished` with another response to jets of part strength, if that lowers the error. Only
+    /// models with effects that cause part strengths are tried.
     fn regraded(&self, finished: &[Hypothesis]) -> Option<Hypothesis> {
         let leader = finished.get(best(finished, |_| true))?;
         let model = leader.judged.model();
@@ -547,7 +545,7 @@ impl Search<'_> {
         self.less(hypothesis, index, &model)
     }
 
-    /// A hypothesis refitted without those of its effects that are `unwanted`, the last first.
+    /// A hypothesis refitted without its `unwanted` effects, removed from the last to the first.
     #[must_use]
     pub fn without_effects(
         &self,
@@ -566,7 +564,7 @@ impl Search<'_> {
         rest
     }
 
-    /// The same from `model`, which is without the term.
+    /// The same, starting from `model`, which already lacks the term.
     pub(super) fn less(
         &self,
         hypothesis: &Hypothesis,
@@ -584,7 +582,7 @@ impl Search<'_> {
     }
 }
 
-/// Adds a hypothesis, or puts it in the place of one that it is alike but for its error.
+/// Adds a hypothesis to the list, or replaces one with the same terms if the error is smaller.
 fn keep(all: &mut Vec<Hypothesis>, mut hypothesis: Hypothesis) {
     let alike = |other: &&mut Hypothesis| Term::are_alike(&other.terms, &hypothesis.terms);
     let Some(other) = all.iter_mut().find(alike) else {
@@ -592,13 +590,13 @@ fn keep(all: &mut Vec<Hypothesis>, mut hypothesis: Hypothesis) {
         return;
     };
     if hypothesis.score() < other.score() {
-        // What follows from it was looked at, unless it has become another model.
+        // Candidates were screened on it already, unless its terms have changed.
         hypothesis.expanded = other.expanded && hypothesis.score() > other.score() - RULES.price;
         *other = hypothesis;
     }
 }
 
-/// What the key of a term looks like.
+/// Key by which terms are compared.
 type TermKey = (String, Option<model_core::recursion::Grading>);
 
 fn signature(before: &[Term], added: &[Term]) -> Vec<TermKey> {

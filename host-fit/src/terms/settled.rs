@@ -1,4 +1,4 @@
-//! Lags and delays of a chosen structure, settled by mesh adaptive direct search on the free run.
+//! Mesh adaptive direct search over the lags and delays of a chosen structure, on the free-run error.
 
 use super::RULES;
 use super::judge::{Judge, Judged};
@@ -11,20 +11,20 @@ use crate::search::{
 };
 use std::sync::atomic::AtomicBool;
 
-/// What a variable of the search moves.
+/// The quantity that a search variable moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Moves {
-    /// A state lag, by its place.
+    /// A lag of y, by its index.
     State(usize),
-    /// A product lag, by its place.
+    /// A lag of a product, by its index.
     Product(usize),
-    /// A fixed input delay, by its place.
+    /// A fixed input delay, by its index.
     Input(usize),
-    /// A delay law as a whole: samples later.
+    /// A shift of a whole delay law, samples.
     Later,
 }
 
-/// The free-run error as a function of lags and delays, the coefficients fitted for each.
+/// The free-run error as a function of lags and delays; coefficients are refitted at each point.
 struct Delays<'a> {
     model: &'a Model,
     learning: Vec<&'a Record>,
@@ -33,10 +33,10 @@ struct Delays<'a> {
     moves: Vec<Moves>,
 }
 
-/// What the search came to.
+/// The result of the search.
 #[derive(Clone, Debug)]
 pub(super) struct Settled {
-    /// The model with the delays that were found, refitted and judged; as it was where none are better.
+    /// The refitted model with the best delays, or the unchanged model if none are better.
     pub(super) judged: Judged,
     /// Evaluations of the objective.
     pub(super) evaluations: usize,
@@ -44,8 +44,8 @@ pub(super) struct Settled {
     pub(super) stop: StopReason,
 }
 
-/// Moves lags (all but the newest) and delays of `judged` to where the free run over the estimation records errs
-/// least; the move is kept if the validation error does not rise.
+/// Moves lags (all but the newest) and delays of `judged` to the least free-run error on the estimation
+/// records. The move is kept if the validation error does not rise.
 pub(super) fn settled(
     judge: &Judge,
     judged: Judged,
@@ -149,7 +149,7 @@ impl<'a> Delays<'a> {
         }
     }
 
-    /// Where the model is.
+    /// The point of the present model.
     fn point(&self) -> Point {
         let of = |what: &Moves| match (what, &self.model.delay) {
             (Moves::State(i), _) => i64::from(self.model.state_lags[*i]),
@@ -160,7 +160,7 @@ impl<'a> Delays<'a> {
         self.moves.iter().map(of).collect()
     }
 
-    /// The model with its lags and delays at a point; none where two of one kind are the same.
+    /// The model with its lags and delays at a point; none if two of one kind coincide.
     fn at(&self, point: &[i64]) -> Option<Model> {
         let mut model = self.model.clone();
         for (what, at) in self.moves.iter().zip(point) {
@@ -205,7 +205,7 @@ mod tests {
     use crate::data::Use;
     use crate::terms::Bench;
 
-    /// y_{k+1} = 0.9 y_k + 0.06 y_{k−30} + 0.05 u_{k−23}, by hand.
+    /// A record of y_{k+1} = 0.9 y_k + 0.06 y_{k−30} + 0.05 u_{k−23}.
     fn record(name: &str, role: Use, period: usize) -> Record {
         let n = 2500;
         let u: Vec<f64> = (0..n)

@@ -1,4 +1,4 @@
-//! What a change of the model shows beside what needs no name.
+//! How much of a candidate's change of the free run unnamed terms cannot imitate.
 
 use super::screen::Screen;
 use super::table::Table;
@@ -9,37 +9,37 @@ use crate::model::Model;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Two columns are one where less than this share of them is apart.
+/// Two columns are linearly dependent if the residual share of their energy is below this.
 const SAME: f64 = 1e-6;
 
-/// What a change of the model shows in the free run, on what is held out.
+/// The change of the free run by a candidate, on the validation samples.
 #[derive(Clone, Debug)]
 pub(crate) struct Shown {
-    /// Energy of the error.
+    /// Energy of the model's error.
     pub(crate) error: f64,
-    /// What is left of the change beside ever more terms without a name; first, beside none.
+    /// What remains of the change after regression on 0, 1, 2 … unnamed terms.
     pub(crate) beside: Vec<Left>,
 }
 
-/// What is left of a change.
+/// The part of a change that other terms cannot imitate.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Left {
     /// Its energy.
     pub(crate) energy: f64,
-    /// Standard deviation of it times the error.
+    /// Standard deviation of the inner product of that part with the error.
     pub(crate) deviation: f64,
 }
 
-/// What a model may have without a name, and how alike that is.
+/// Candidate terms without a name, with their Gram matrix.
 pub(crate) struct Unnamed {
     columns: Vec<Vec<f64>>,
-    /// Products of the columns with each other where they are learned.
+    /// Gram matrix of the columns over the estimation samples.
     products: Vec<Vec<f64>>,
 }
 
 impl Unnamed {
-    /// All that could be added to the screen's model without a name and in any amount: a term in the path of the jets
-    /// is there with its time or is not.
+    /// All unnamed terms that are linear in an amplitude on the screen's model. A term in the jet path is
+    /// excluded: it is present with its time constant or absent.
     pub(crate) fn of(screen: &Screen, known: &Known) -> Self {
         let Table {
             candidates,
@@ -69,9 +69,9 @@ impl Unnamed {
 }
 
 impl Screen<'_> {
-    /// What `other` changes that this model's own parameters cannot do in its place, nor up to `most`
-    /// columns of `unnamed`, the best first; `block` samples of the error are independent of the next.
-    /// `None` if it diverges or changes nothing.
+    /// The part of the change by `other` that neither this model's parameters nor up to `most` columns of
+    /// `unnamed` (greedily selected) can imitate. Blocks of `block` samples of the error count as
+    /// independent. `None` if it diverges or changes nothing.
     pub(crate) fn shown(
         &self,
         unnamed: &Unnamed,
@@ -109,8 +109,9 @@ impl Screen<'_> {
         (shown.beside.last()?.energy > 0.0).then_some(shown)
     }
 
-    /// The best column in the place of a change where it is learned, the best two, and those with ever more, each the best beside
-    /// the others. Two that are worth little alone may be worth all: lags side by side are the rate of the past.
+    /// Greedy selection of columns that imitate a change on the estimation samples; the first two are
+    /// selected as a pair. Two neighbouring lags may explain little alone and much together, because their
+    /// difference is a derivative.
     fn ever_more(&self, unnamed: &Unnamed, change: &[f64], most: usize) -> Vec<Vec<usize>> {
         let columns: Vec<&[f64]> = (unnamed.columns.iter())
             .map(|column| &column[..self.learned])
@@ -166,7 +167,8 @@ mod tests {
     use crate::terms::Bench;
     use model_core::effects::spec;
 
-    /// Telegraphs on a flow that attaches as fast as it separates: its jet is its rate and its level, so that an echo is two lags.
+    /// On/off commands on a flow with equal attachment and separation times: it is linear, so an echo equals
+    /// two lags.
     fn linear() -> (Model, Vec<Record>) {
         let model = Model {
             a: vec![0.97],
@@ -218,7 +220,7 @@ mod tests {
         };
         let echo = left("echo-path", &[0.1, 0.142]);
         assert!(echo[1] > 0.02 && echo[2] < 1e-3, "{echo:?}");
-        // No lag of y is there before y moves.
+        // No lag of y acts before y moves.
         let pickup = left("electrical-pickup", &[0.1]);
         assert!(pickup.len() == 5 && pickup[4] > 0.2, "{pickup:?}");
     }

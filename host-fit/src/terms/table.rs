@@ -1,4 +1,4 @@
-//! Everything that could be added to a model, and what it takes of the error alone.
+//! All candidate terms of a model, with the share of the error that each explains alone.
 
 use super::RULES;
 use super::chance::{Chance, Noise, Taken};
@@ -13,48 +13,49 @@ use model_core::effects::{LEVEL_RATE, PATH_TERMS, SLOW_WAKE, ZERO_OFFSET};
 use model_core::recursion::Grading;
 use rayon::prelude::*;
 
-/// Lags whose derivatives are carried by one run, two each.
+/// Number of lags whose derivatives one run computes, two each.
 const LAGS_AT_ONCE: usize = 4;
 
-/// A term that could be added, and what it takes alone.
+/// A candidate term with the share of the error that it explains alone.
 #[derive(Clone, Debug)]
 pub struct Candidate {
-    /// The term, an effect's amplitude as it fits best.
+    /// The term; an effect with its least-squares amplitude.
     pub term: Term,
-    /// Share of the error energy that it takes where it was learned.
+    /// Share of the error energy explained on the estimation samples.
     pub learned: f64,
-    /// The same on what was held out.
+    /// The same on the validation samples.
     pub held_out: f64,
     /// Its columns in the table of changes.
     pub(super) columns: Vec<usize>,
 }
 
-/// An effect as it was screened.
+/// A screened effect.
 struct Rated {
     term: Term,
     /// The model with it.
     with: Model,
-    /// What it changes, as far as the model itself cannot, at least where it is learned.
+    /// Its change of the free run orthogonal to the model's own sensitivities, at least on the estimation
+    /// samples.
     column: Vec<f64>,
-    /// How much of each direction that the model can follow was taken away.
+    /// The components of its change along the directions of the basis, which were subtracted.
     along: Vec<f64>,
-    /// How many times that fits the error best.
+    /// Factor on its amplitude that fits the error best.
     scale: f64,
-    /// Share of the error energy that it takes where it was learned.
+    /// Share of the error energy explained on the estimation samples.
     learned: f64,
 }
 
-/// Everything that could be added, and its changes to the free run.
+/// All candidates, and their changes of the free run.
 pub struct Table {
-    /// The candidates, the best held-out share first.
+    /// The candidates by descending share of the validation error energy.
     pub candidates: Vec<Candidate>,
     pub(super) columns: Vec<Vec<f64>>,
-    /// What noise alone would make of the best of the effects; of nothing where it was not asked for.
+    /// Distribution of the best effect's gain under noise alone; empty if it was not requested.
     pub chance: Chance,
 }
 
 impl Table {
-    /// Everything that could be added to the screen's model: lags and the zero, and effects if wanted.
+    /// All candidates for the screen's model: lags and the offset, and effects if `effects` is set.
     #[must_use]
     pub fn of(screen: &Screen, known: &Known, effects: bool) -> Self {
         let mut columns = Vec::new();
@@ -65,7 +66,7 @@ impl Table {
         Self::sorted(candidates, columns, Chance::default())
     }
 
-    /// The same with effects, and what `noise` alone would make of them.
+    /// The same with effects and the distribution of their best gain under `noise` alone.
     pub(crate) fn with_chance(screen: &Screen, known: &Known, noise: &Noise) -> Self {
         let mut columns = Vec::new();
         let mut candidates = screen.base_candidates(&mut columns);
@@ -83,14 +84,14 @@ impl Table {
         }
     }
 
-    /// Whether two candidates change the free run so alike that refits may not tell them apart.
+    /// Whether two candidates change the free run so similarly that a refit may not distinguish them.
     pub(crate) fn are_alike(&self, screen: &Screen, one: &Candidate, other: &Candidate) -> bool {
         let directions = one.columns.iter().map(|i| &self.columns[*i]);
         let likeness = directions.map(|direction| self.likeness(screen, other, direction));
         likeness.fold(0.0, f64::max) > RULES.alike
     }
 
-    /// Correlation of what a candidate changes with a direction, where it is learned.
+    /// Correlation of a candidate's change with a direction over the estimation samples.
     pub(crate) fn likeness(
         &self,
         screen: &Screen,
@@ -122,8 +123,7 @@ impl Screen<'_> {
             .collect()
     }
 
-    /// Changes by lags: the derivatives by a coefficient that is 0, of y and of y
-    /// times the jet.
+    /// Changes by lags: derivatives with respect to a zero coefficient of y and of y times the jet.
     fn lag_columns(&self) -> Vec<(u16, [Vec<f64>; 2])> {
         let (n1, n2) = (self.model.a.len(), self.model.product_lags.len());
         let lags = self.lags();
@@ -134,7 +134,7 @@ impl Screen<'_> {
         let each = lags.par_chunks(LAGS_AT_ONCE).map(|lags| {
             let terms = lags.iter().map(|lag| Term::Memory(*lag));
             let model = terms.fold(self.model.clone(), |m, term| term.added_to(&m, &[]));
-            // The vector is d, a, b, c by columns: the first input's c at the end of its own.
+            // The coordinate vector is d, a, b, c by columns; the first input's c is at its end.
             let first = 1 + n1;
             let product = 1 + n1 + lags.len() + model.b.len() + n2;
             let indices: Vec<usize> = (0..lags.len())
@@ -174,7 +174,7 @@ impl Screen<'_> {
         changes.collect()
     }
 
-    /// Changes by terms in the path of the jets, from all starting values of their cards.
+    /// Changes by terms in the jet path, from all starting values of their cards.
     fn paths(&self) -> Vec<(Term, Vec<f64>)> {
         let absent = |spec: &&'static Spec| !self.model.has_effect(spec.name);
         let terms = PATH_TERMS.into_iter().filter(absent).flat_map(path_terms);
@@ -188,7 +188,7 @@ impl Screen<'_> {
         changes.collect()
     }
 
-    /// Changes by a slow wake, per pull.
+    /// Changes by a slow wake, per unit of its strength.
     fn wakes(&self) -> Vec<(Term, Vec<f64>)> {
         if self.model.has_effect(SLOW_WAKE.name) {
             return Vec::new();
@@ -217,7 +217,7 @@ impl Screen<'_> {
         Some([of([RULES.slope, 0.0])?, of([0.0, RULES.slope])?])
     }
 
-    /// The model's lags and the sensor's zero, with what each takes alone.
+    /// Lags and the sensor's offset, with the share of the error that each explains alone.
     fn base_candidates(&self, columns: &mut Vec<Vec<f64>>) -> Vec<Candidate> {
         let mut all: Vec<(Term, Vec<usize>)> = Vec::new();
         for (lag, [state, product]) in self.lag_columns() {
@@ -263,7 +263,7 @@ impl Screen<'_> {
             })
             .collect();
         rated.sort_by(|a, b| b.learned.total_cmp(&a.learned));
-        // Neighbours say the same: the best of each neighbourhood.
+        // Neighbouring lags are equivalent: only the best of each neighbourhood is kept.
         let mut kept: Vec<Candidate> = Vec::new();
         for candidate in rated {
             let same_kind = |k: &&Candidate| {
@@ -275,7 +275,7 @@ impl Screen<'_> {
                 }
                 _ => true,
             };
-            // Time constants say different things: which one shows beside an effect.
+            // Time constants are kept all: which one matters beside an effect is not known yet.
             let alike: Vec<&Candidate> = kept.iter().filter(same_kind).collect();
             let has_time = matches!(
                 candidate.term,
@@ -288,7 +288,7 @@ impl Screen<'_> {
         kept
     }
 
-    /// Whether so many times its change makes sense for a term.
+    /// Whether a factor on a term's amplitude is physically possible.
     pub(super) fn is_feasible(term: &Term, scale: f64) -> bool {
         let (spec, parameters) = match term {
             Term::Effect {
@@ -303,12 +303,12 @@ impl Screen<'_> {
                 let physical = spec.parameters[index].sign == Sign::Either;
                 physical || parameters[index] * scale >= 0.0
             }
-            // What is not proportional keeps its direction, and some of its size.
+            // If the change is not proportional to the amplitude, its sign and part of its size must remain.
             None => spec.parameters.is_empty() || scale > RULES.some,
         }
     }
 
-    /// An effect with its amplitude so many times as large.
+    /// An effect with its amplitude multiplied by `scale`.
     pub(super) fn scaled(term: &Term, scale: f64) -> Term {
         let mut term = term.clone();
         if let Term::Effect {
@@ -324,9 +324,9 @@ impl Screen<'_> {
         term
     }
 
-    /// Effects with what they change where it is learned, best first; those that make no sense left out.
-    /// What each takes of noise alone is added to `by_chance`; for that, and only for that, every
-    /// free run goes over what is held out too.
+    /// Screened effects with their changes on the estimation samples, best first; infeasible ones are left
+    /// out. The share of noise alone that each explains is added to `by_chance`; only for this do the free
+    /// runs cover the validation samples too.
     fn rated(
         &self,
         terms: Vec<Term>,
@@ -369,7 +369,7 @@ impl Screen<'_> {
         rated
     }
 
-    /// A rated effect with what it changes on what is held out; `None` if it diverges there.
+    /// A screened effect with its change on the validation samples; `None` if it diverges there.
     fn held_out(&self, rated: Rated) -> Option<(Candidate, Vec<f64>)> {
         let mut changed = rated.column;
         if changed.len() < self.error.len() {
@@ -417,7 +417,7 @@ impl Screen<'_> {
             .map(|(spec, parameters)| with_grading(spec, parameters, self.model.grading))
             .collect();
         let mut rated = self.rated(terms, noise, &mut by_chance);
-        // How the flow takes jets of part strength shows only once there are some.
+        // The response to jets of part strength can only be identified if there are such jets.
         if self.judge.on_off && !has_jet_effect(self.model) {
             let mut met: Vec<&str> = Vec::new();
             let mut others = Vec::new();
@@ -462,7 +462,7 @@ impl Screen<'_> {
     }
 }
 
-/// A term in the path of the jets from all starting values of its card.
+/// A term in the jet path at all starting values of its card.
 pub(super) fn path_terms(spec: &'static Spec) -> Vec<Term> {
     let each = spec.parameters.iter().map(|parameter| parameter.starts);
     let points = each.fold(vec![Vec::new()], |points: Vec<Vec<f64>>, starts| {
@@ -476,7 +476,7 @@ pub(super) fn path_terms(spec: &'static Spec) -> Vec<Term> {
     points.into_iter().map(term).collect()
 }
 
-/// Whether the model has an effect on the jet: it has a response to part jets then.
+/// Whether the model has an effect on the jet, and therefore a response to jets of part strength.
 pub(super) fn has_jet_effect(model: &Model) -> bool {
     let places = model.effects.iter().filter_map(|e| model.spec(&e.name));
     places.into_iter().any(|spec| spec.place == Place::Jet)

@@ -1,4 +1,4 @@
-//! What can be added to a model: the moves of the search.
+//! Terms: the moves of the structure search.
 
 use super::RULES;
 use crate::model::{Delay, Model};
@@ -6,46 +6,45 @@ use model_core::effect::{Effect as _, Instant, Place, Setting, Spec};
 use model_core::effects::{AnyEffect, LEVEL_RATE, PATH_TERMS, SLOW_WAKE, ZERO_OFFSET};
 use model_core::recursion::Grading;
 
-/// An addition to a model.
+/// A term that can be added to a model.
 #[derive(Clone, Debug)]
 pub enum Term {
-    /// The flow feels y of so many samples ago, alone and times the arriving jet.
+    /// y at this lag (samples), alone and multiplied by the arriving jet.
     Memory(u16),
-    /// Alone.
+    /// y at this lag, alone.
     State(u16),
-    /// Times the arriving jet.
+    /// y at this lag, multiplied by the arriving jet.
     Product(u16),
-    /// A flow of second order, from a second lag of so many samples in series.
+    /// A second first-order lag in series, time constant in samples: a flow of second order.
     Inertia(f64),
-    /// The rate of the flow depends on its level, which is no missing physics.
+    /// A rate of the flow that depends on its level; part of the base, no missing effect.
     LevelRate,
-    /// A slow wake of so many inner seconds, a memory of the flow.
+    /// A slow wake with this time constant (inner seconds): a memory of the flow.
     Wake(f64),
-    /// A base term in the path of the jets, with the values from which it is fitted.
+    /// A base term in the jet path, with starting values.
     Path {
         /// Its card.
         spec: &'static Spec,
-        /// Parameters from which to set out.
+        /// Starting values of its parameters.
         parameters: Vec<f64>,
     },
-    /// The sensor's zero, which is no missing physics.
+    /// The offset of the sensor; part of the base, no missing effect.
     Offset,
-    /// A physical effect, with the values from which it is fitted.
+    /// A physical effect, with starting values.
     Effect {
         /// Its card.
         spec: &'static Spec,
-        /// Parameters from which to set out.
+        /// Starting values of its parameters.
         parameters: Vec<f64>,
-        /// How the flow takes jets of part strength, if the effect makes them.
+        /// The response of the flow to jets of part strength, if the effect causes them.
         grading: Grading,
-        /// The reference of its channel.
+        /// Reference value of its channel.
         reference: Option<f64>,
     },
 }
 
 impl Term {
-    /// What a base may have without its being a missing effect, and what imitates some
-    /// effects; their values are the search's.
+    /// Terms of the base that are not missing effects but imitate some; their values come from the search.
     pub(crate) const UNNAMED: [Self; 3 + PATH_TERMS.len()] = [
         Self::LevelRate,
         Self::Wake(0.0),
@@ -61,7 +60,7 @@ impl Term {
         }
     }
 
-    /// The lags of `model` that can move, as terms.
+    /// The movable lags of `model`, as terms.
     pub(crate) fn lags_of(model: &Model) -> Vec<Self> {
         let mut lags = [&model.state_lags[..], &model.product_lags].concat();
         lags.sort_unstable();
@@ -78,8 +77,7 @@ impl Term {
         lags.into_iter().map(term).collect()
     }
 
-    /// The terms that make `model` of the structure of `lean`; `None` where it is built
-    /// otherwise.
+    /// The terms that turn `lean` into `model`; `None` if they differ otherwise.
     pub(super) fn all_of(model: &Model, lean: &Model) -> Option<Vec<Self>> {
         let mut terms = Vec::new();
         if model.state_lags.contains(&BEFORE) {
@@ -117,7 +115,7 @@ impl Term {
         (frame(&bare) == frame(lean)).then_some(terms)
     }
 
-    /// The effect, if it is one.
+    /// The effect, if the term is one.
     #[must_use]
     pub fn effect(&self) -> Option<&'static Spec> {
         match self {
@@ -126,7 +124,7 @@ impl Term {
         }
     }
 
-    /// The lag, if it is one that can move.
+    /// The lag, if the term is a movable one.
     #[must_use]
     pub fn lag(&self) -> Option<u16> {
         match self {
@@ -135,7 +133,7 @@ impl Term {
         }
     }
 
-    /// The same kind of lag elsewhere.
+    /// The same kind of term at another lag.
     #[must_use]
     pub fn with_lag(&self, lag: u16) -> Self {
         match self {
@@ -146,7 +144,7 @@ impl Term {
         }
     }
 
-    /// The same with jets of part strength taken otherwise.
+    /// The same term with another response to jets of part strength.
     #[must_use]
     pub fn with_grading(&self, grading: Grading) -> Self {
         let mut other = self.clone();
@@ -156,7 +154,7 @@ impl Term {
         other
     }
 
-    /// The same from other values of an effect's parameters.
+    /// The same effect with other starting values.
     #[must_use]
     pub fn with_parameters(&self, values: Vec<f64>) -> Self {
         let mut other = self.clone();
@@ -166,7 +164,7 @@ impl Term {
         other
     }
 
-    /// What it costs: the parameters that are fitted and the places that are searched.
+    /// Penalty of the term: number of fitted parameters and searched lags.
     #[must_use]
     pub fn cost(&self) -> usize {
         match self {
@@ -183,7 +181,7 @@ impl Term {
         }
     }
 
-    /// What it is called in progress lines and tables.
+    /// Its name in progress messages and tables.
     #[must_use]
     pub fn name(&self) -> String {
         match self {
@@ -198,26 +196,26 @@ impl Term {
         }
     }
 
-    /// Whether two terms are the same for a search that has tried one of them.
+    /// Key under which a term that was tried is remembered.
     #[must_use]
     pub fn key(&self) -> (String, Option<Grading>) {
         match self {
             Self::Effect { spec, grading, .. } => (spec.name.to_owned(), Some(*grading)),
             term => match term.lag() {
-                // Lags settle within a few samples of where they set out.
+                // Lags converge within a few samples of their start, so that neighbours share a key.
                 Some(lag) => (term.with_lag(lag / 12).name(), None),
                 None => (term.name(), None),
             },
         }
     }
 
-    /// What sort of term it is: its name, wherever its lag is.
+    /// The kind of term: its name without the lag.
     #[must_use]
     pub fn kind(&self) -> String {
         self.with_lag(0).name()
     }
 
-    /// Whether two lists of terms make the same model once it is fitted, for lags settle.
+    /// Whether two lists of terms lead to the same fitted model; neighbouring lags converge.
     #[must_use]
     pub(super) fn are_alike(one: &[Self], other: &[Self]) -> bool {
         let sorted = |terms: &[Self]| {
@@ -236,7 +234,7 @@ impl Term {
                 .all(|(a, b)| a.0 == b.0 && usize::from(a.1.abs_diff(b.1)) <= RULES.lags_apart)
     }
 
-    /// Whether two lists of terms differ in where they are only: in lags, times and starting values.
+    /// Whether two lists differ only in lags, time constants and starting values.
     #[must_use]
     pub(super) fn are_of_one_kind(one: &[Self], other: &[Self]) -> bool {
         let sorted = |terms: &[Self]| {
@@ -255,8 +253,8 @@ impl Term {
         matches!(self, Self::Memory(_) | Self::Product(_))
     }
 
-    /// The model with it. Coefficients of new lags are `coefficients`, one for each
-    /// column of the term, for every input; missing ones are 0.
+    /// The model with the term added. New lags get these `coefficients`, one per column of the term and
+    /// input; missing ones are 0.
     #[must_use]
     pub fn added_to(&self, model: &Model, coefficients: &[f64]) -> Model {
         let mut model = model.clone();
@@ -318,7 +316,7 @@ impl Term {
         model
     }
 
-    /// The model without it; a delay law goes back to that of `base`.
+    /// The model without the term; a delay law is replaced by that of `base`.
     #[must_use]
     pub fn taken_from(&self, model: &Model, base: &Model) -> Model {
         let mut model = model.clone();
@@ -362,8 +360,7 @@ impl Term {
         model
     }
 
-    /// The model with this term's lag moved to `lag`; `None` where it is already, or
-    /// another term is.
+    /// The model with this term's lag moved to `lag`; `None` if it exists already or another term is.
     #[must_use]
     pub fn moved_in(&self, model: &Model, lag: u16) -> Option<Model> {
         let old = self.lag().filter(|old| *old != lag)?;
@@ -382,7 +379,7 @@ impl Term {
     }
 }
 
-/// The mean delay of a step through a term in the path of the jets, samples.
+/// Mean delay of a step through a term in the jet path, samples.
 fn mean_delay(spec: &Spec, parameters: &[f64], period: f64) -> f64 {
     let setting = Setting {
         period,
@@ -404,11 +401,11 @@ fn mean_delay(spec: &Spec, parameters: &[f64], period: f64) -> f64 {
     missing.sum()
 }
 
-/// Samples after which a step is through.
+/// Samples after which a step response has settled.
 const PATH_SETTLED: usize = 4000;
 
-/// Gives a model another's delay law, about where its own was: the other may have been fitted
-/// beside quite other terms.
+/// Gives a model the delay law of another one, shifted to the mean of its own: the other was fitted beside
+/// different terms.
 pub(super) fn take_delay_law(model: &mut Model, law: &Delay) {
     let level = |delay: &Delay| delay.present(RULES.middle, model.sample_period_s);
     let later = level(&model.delay) - level(law);
@@ -416,15 +413,14 @@ pub(super) fn take_delay_law(model: &mut Model, law: &Delay) {
     model.delay_later(later);
 }
 
-/// The newest lag, and the one before.
+/// The lag of one sample.
 const NEWEST: u16 = 1;
 const BEFORE: u16 = 2;
 
-/// Puts a first-order lag of so many samples behind the flow; its delay moves into
-/// the second order.
+/// Adds a first-order lag of so many samples in series with the flow and shortens the delay accordingly.
 ///
-/// With z the flow as it was and y_k = (1 − α) y_{k−1} + α z_k, the newest lag's terms
-/// become those of two lags, exactly; memories change slowly and are scaled by α.
+/// With z the present flow and y_k = (1 − α) y_{k−1} + α z_k, the terms of the newest lag become exactly
+/// those of two lags; slow memories are scaled by α.
 fn in_series(model: &mut Model, samples: f64) {
     let keep = (-1.0 / samples).exp();
     let newest = |lags: &[u16]| lags.iter().position(|lag| *lag == NEWEST);
@@ -455,13 +451,13 @@ fn in_series(model: &mut Model, samples: f64) {
     model.delay_later(-samples);
 }
 
-/// Where the newest lag and the one before stand among those of y, and what the faster of the
-/// two lags in series keeps of itself in a sample; none of a first order.
+/// Indices of lags 1 and 2 among the lags of y, and the pole of the faster of the two first-order lags; none
+/// for a model of first order.
 fn faster(model: &Model) -> Option<(usize, usize, f64)> {
     let at = |lag: u16| model.state_lags.iter().position(|l| *l == lag);
     let (first, second) = (at(NEWEST)?, at(BEFORE)?);
     let (sum, product) = (model.a[first], -model.a[second]);
-    // The roots of λ² − sum·λ + product; where they are complex, their size.
+    // The roots of λ² − sum·λ + product; the modulus of complex ones.
     let spread = sum * sum / 4.0 - product;
     let keep = if spread >= 0.0 {
         sum / 2.0 - spread.sqrt()
@@ -471,14 +467,13 @@ fn faster(model: &Model) -> Option<(usize, usize, f64)> {
     Some((first, second, keep.clamp(0.0, 0.99)))
 }
 
-/// The faster of the two lags in series of a flow of second order, s; none of a first order.
+/// Time constant of the faster of the two lags of a second-order flow, s; none for a model of first order.
 pub(crate) fn second_lag_s(model: &Model) -> Option<f64> {
     let (.., keep) = faster(model)?;
     (keep > 0.0).then(|| -model.sample_period_s / keep.ln())
 }
 
-/// Takes the faster of the two lags of a second order away; its delay goes back to the
-/// command.
+/// Removes the faster lag of a second-order flow and adds its delay to that of the command.
 fn out_of_series(model: &mut Model) {
     let Some((first, second, keep)) = faster(model) else {
         return;
@@ -560,7 +555,7 @@ mod tests {
         }
     }
 
-    /// The delay is shorter by the mean of what the term adds, and comes back.
+    /// The input delay is shortened by the mean delay of the term and restored when it is removed.
     #[test]
     fn a_term_in_the_path_of_the_jets_takes_its_mean_from_the_delay() {
         let mut model = base();
@@ -590,7 +585,7 @@ mod tests {
         }
     }
 
-    /// A first order, put behind a lag, and taken out of it again.
+    /// Adding a lag to a first-order flow and removing it again restores the model.
     #[test]
     fn a_lag_in_series_is_found_again() {
         let mut model = base();
@@ -639,7 +634,7 @@ mod tests {
         assert!(Term::all_of(&other, &lean).is_none());
     }
 
-    /// y behind a lag of 8 samples is what the two lags give, sample by sample.
+    /// A first-order flow followed by a lag of 8 samples equals the second-order recursion sample by sample.
     #[test]
     fn a_lag_in_series_is_a_second_order() {
         let model = Model {

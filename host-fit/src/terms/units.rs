@@ -1,8 +1,8 @@
-//! Units do not matter: the search works in the data's own.
+//! Conversion between the user's units and the search's inner units.
 //!
-//! Cards are written for y of order 1, u up to 1 and a sample of 1 ms. Records are
-//! brought there before anything is judged, and the model that is found is brought
-//! back: names stay, parameters change with their units.
+//! Cards are written for y of order 1, u up to 1 and a sample period of 1 ms. Records are scaled to that
+//! before anything is fitted, and the final model is scaled back: names stay, parameters change with their
+//! units.
 
 use super::RULES;
 use crate::data::Record;
@@ -15,21 +15,21 @@ use model_core::effects::ZERO_OFFSET;
 /// The sample period that cards are written for, s.
 const PERIOD_S: f64 = 0.001;
 
-/// What an inner unit is in outer ones.
+/// The inner units in the user's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Units {
-    /// y where the sensor shows nothing.
+    /// Sensor reading that is y = 0 inside.
     pub zero: f64,
-    /// Size of y.
+    /// Inner unit of y.
     pub y: f64,
-    /// The commands of no jet and of a full one: 0 and 1 within.
+    /// The commands that are 0 (no jet) and 1 (full jet) inside.
     pub command: CommandRange,
-    /// Size of times.
+    /// Inner unit of time.
     pub time: f64,
 }
 
 impl Units {
-    /// No change.
+    /// Identity.
     pub const NONE: Self = Self {
         zero: 0.0,
         y: 1.0,
@@ -37,11 +37,11 @@ impl Units {
         time: 1.0,
     };
 
-    /// The units of prepared records for a search that starts from `model`. A user's own
-    /// effects are written for the data as they are.
+    /// The units of prepared records for a search that starts from `model`. Effects of the user are written
+    /// in the user's units, which are then kept.
     #[must_use]
     pub fn of(model: &Model, prepared: &Preparation) -> Self {
-        // What a model calls a full jet stays one; jet effects that are there already know no other.
+        // A model's definition of a full jet is kept, because its jet effects are written for it.
         let command = if model.command.is_unit() && !has_jet_effects(model) {
             prepared.command
         } else {
@@ -106,7 +106,7 @@ impl Units {
             .collect()
     }
 
-    /// A model with all that has units scaled, but for the zero.
+    /// A model with everything but its offset scaled.
     fn scale(&self, model: &Model, inward: bool) -> Model {
         let by = |x: f64| if inward { 1.0 / x } else { x };
         let (y, time) = (by(self.y), by(self.time));
@@ -122,7 +122,7 @@ impl Units {
                 let added = &mut model.effects[i];
                 added.parameters = self.scaled(spec, &added.parameters, inward);
                 if spec.calibrated {
-                    // What the card says is not written.
+                    // A reference equal to the card's is not written.
                     let reference = added.reference() * y;
                     added.reference = Some(reference).filter(|r| (r - 1.0).abs() > 1e-9);
                 }
@@ -131,11 +131,12 @@ impl Units {
         model
     }
 
-    /// A model in inner units, its sensor's zero where the records' is.
+    /// A model in inner units, its sensor's offset included.
     #[must_use]
     pub fn model_in(&self, model: &Model) -> Model {
         let mut model = self.scale(&self.commanded_in(model), true);
-        // y of order one is friction and calibrated as cards say; in other units nobody knows, and the size of y will do.
+        // y of order one is friction with the calibration of the card; otherwise the size of y is the
+        // calibration.
         let of_order_one = (FIT.order_one_low..FIT.order_one_high).contains(&self.y);
         model.calibrated_at = of_order_one.then(|| 1.0 / self.y);
         self.move_zero(&mut model, -self.zero / self.y);
@@ -152,15 +153,15 @@ impl Units {
         model
     }
 
-    /// A model whose commands are shares of a full jet: one that was written for the commands as they are takes their
-    /// size and their zero into its coefficients.
+    /// A model whose commands are fractions of a full jet: size and zero of other commands are moved into the
+    /// coefficients.
     fn commanded_in(&self, model: &Model) -> Model {
         let mut inner = model.clone();
         inner.command = CommandRange::UNIT;
         if model.command == self.command {
             return inner;
         }
-        // u = off + size·share, where u is a share of what the model calls a full jet.
+        // u = off + size·share, where u is a share of the model's own full jet.
         let off = model.command.share(self.command.off);
         let size = model.command.share(self.command.full) - off;
         let count = model.product_lags.len();
@@ -190,13 +191,13 @@ impl Units {
         value * unit.scale(self.y, self.time, 1.0)
     }
 
-    /// Shifts what the model reads by `by`.
+    /// Adds `by` to the offset of a model's readings.
     fn move_zero(&self, model: &mut Model, by: f64) {
         if by == 0.0 {
             return;
         }
         if model.start == Start::Measured && model.effects.is_empty() {
-            // The recursion reads the sensor: its own constants take the shift.
+            // The recursion works on the sensor's reading: its constants absorb the shift.
             let kept: f64 = 1.0 - model.a.iter().sum::<f64>();
             model.constant += by * kept;
             let count = model.product_lags.len();
@@ -214,7 +215,7 @@ impl Units {
     }
 }
 
-/// Whether a model has effects at the jet.
+/// Whether a model has effects on the jet.
 fn has_jet_effects(model: &Model) -> bool {
     let place = |name: &str| model.spec(name).map(|spec| spec.place);
     let mut own = model.effects.iter();
@@ -242,7 +243,7 @@ mod tests {
         Record::new("r", Use::Identify, c * 0.001, u, y)
     }
 
-    /// Whatever the units are, the search sees the same records.
+    /// Records in different user units are equal in inner units.
     #[test]
     fn records_look_alike_from_within() {
         let seen = |a: f64, b: f64, c: f64| {
@@ -263,7 +264,7 @@ mod tests {
         }
     }
 
-    /// A model that was written for commands in volts runs within as it does outside.
+    /// A model for commands in volts gives the same run in inner units.
     #[test]
     fn commands_in_other_units_go_into_the_coefficients() {
         let mut record = record(1.0, 0.0, 1.0);
@@ -288,7 +289,7 @@ mod tests {
         }
     }
 
-    /// A film's calibration is that of its card where y is friction, and where y is full in other units.
+    /// A film's calibration is the card's where y is friction, and scales with y in other units.
     #[test]
     fn king_s_law_keeps_what_it_was_calibrated_at() {
         let film = spec("hot-film-nonlinearity").unwrap();
@@ -312,7 +313,7 @@ mod tests {
         assert!((volts - 5.0).abs() < 0.1, "{volts}");
     }
 
-    /// A model that is brought in and out again runs as it did.
+    /// Scaling a model to inner units and back leaves its run unchanged.
     #[test]
     fn models_survive_the_way_in_and_out() {
         let record = record(40.0, 12.0, 20.0);
@@ -341,7 +342,8 @@ mod tests {
         }
     }
 
-    /// A model that starts from measurements and gets an effect within: its zero is the sensor's outside.
+    /// An effect found in inner units on a model that starts from measurements runs in the user's units; the
+    /// offset becomes the sensor's.
     #[test]
     fn effects_that_were_found_inside_run_outside_as_they_do_there() {
         let record = record(40.0, 300.0, 20.0);

@@ -1,5 +1,5 @@
-//! From an expression in Rust syntax to a [`Program`](super::program::Program):
-//! a small safe subset is allowed, the rest is refused with its column.
+//! Compilation of an expression in Rust syntax to a [`Program`](super::program::Program): a small safe subset
+//! is allowed, the rest is rejected with its column.
 
 use super::program::{Binary, Builder, Line, Lines, Op, Register, Unary};
 use proc_macro2::{Delimiter, Span, TokenStream, TokenTree};
@@ -8,18 +8,17 @@ use syn::parse::Parser;
 use syn::spanned::Spanned;
 use syn::{BinOp, Block, Expr, Lit, Pat, Stmt, UnOp};
 
-/// Longest expression, tokens: bounds the depth of nesting, and what a sample costs.
+/// Longest expression, tokens: limits nesting depth and cost per sample.
 const MOST_TOKENS: usize = 400;
 /// Deepest nesting of brackets.
 const DEEPEST: usize = 32;
 /// Punctuation of the subset.
 const PUNCTUATION: &str = "+-*/<>=!&|,;.";
-/// Words of Rust that open constructs outside the subset; the parser of Rust
-/// would accept them.
+/// Keywords of Rust outside the subset, which the Rust parser would accept.
 const SUBSET: &str = "allowed are numbers, names, + - * /, comparisons, && || !, `if … else …`, \
      `let`, and abs, min, max, sqrt, exp, cbrt, sin, cos, delayed, table";
 
-/// What is wrong with an expression, and where.
+/// A problem of an expression, with its position.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Fault {
     /// From 1.
@@ -40,7 +39,7 @@ impl Fault {
     }
 }
 
-/// What a name stands for.
+/// Meaning of a name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Meaning {
     /// An operation without operands.
@@ -131,7 +130,7 @@ impl Compiler {
         let local = match statement {
             Stmt::Local(local) => local,
             Stmt::Expr(value, _) => {
-                let problem = "this value goes nowhere; write `let name = …;`, and put an \
+                let problem = "this value is not used; write `let name = …;`, and put an \
                      `if … else …` that is part of a sum or product in parentheses";
                 return Err(Fault::at(value.span(), problem));
             }
@@ -149,7 +148,7 @@ impl Compiler {
         }
         let name = pattern.ident.to_string();
         if self.names.iter().any(|(known, _)| *known == name) {
-            let problem = format!("`{name}` has a meaning already; take another name");
+            let problem = format!("`{name}` is already defined; choose another name");
             return Err(Fault::at(pattern.ident.span(), problem));
         }
         let value = self.value(&init.expr)?;
@@ -329,7 +328,7 @@ impl Compiler {
         Ok(self.push(op, Kind::Number))
     }
 
-    /// `table(x, x1, v1, x2, v2, …)`: straight lines between points, level beyond them.
+    /// `table(x, x1, v1, x2, v2, …)`: linear between points, constant outside.
     fn table(
         &mut self,
         span: Span,
@@ -346,7 +345,7 @@ impl Compiler {
         let mut lines = Vec::new();
         for (i, pair) in points.windows(4).step_by(2).enumerate() {
             let (from, to) = (self.builder.number(pair[0]), self.builder.number(pair[2]));
-            // Single precision, in which the board calculates, must tell them apart.
+            // The points must differ in single precision, in which the board calculates.
             let width = from
                 .zip(to)
                 .map(|(from, to)| (to - from, to as f32 > from as f32));
@@ -386,7 +385,7 @@ impl Compiler {
     }
 }
 
-/// How a table is written.
+/// Syntax of a table.
 const TABLE: &str = "a table is written table(x, x1, v1, x2, v2, …): at least two points, the places \
      numbers that rise";
 
@@ -428,8 +427,8 @@ fn outside(what: &impl Spanned) -> Fault {
     )
 }
 
-/// Refuses what no expression of the subset contains, before the parser of
-/// Rust sees it: attributes, types, lifetimes, and depths that exhaust a stack.
+/// Rejects tokens outside the subset before the Rust parser sees them: attributes, types, lifetimes, and
+/// nesting that exhausts the stack.
 fn check_tokens(tokens: &TokenStream) -> Result<(), Fault> {
     let mut count = 0;
     let mut open = vec![tokens.clone().into_iter()];

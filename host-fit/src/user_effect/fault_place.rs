@@ -1,11 +1,11 @@
-//! Where in the text of an effect file a fault is: for editors.
+//! Position of an error in the text of an effect file, for editors.
 
 use super::DefinitionError;
 use toml::de::{DeTable, DeValue};
 
 impl DefinitionError {
-    /// Line and column of the fault in `text`, the text of the file, both from 1, columns in characters; none where the file
-    /// could not be read. A key that is missing is at the beginning.
+    /// Line and column of the error in `text`, both from 1, columns in characters; none if the file could not
+    /// be read. For a missing key, the start of the file.
     #[must_use]
     pub fn place_in(&self, text: &str) -> Option<(usize, usize)> {
         match self {
@@ -52,7 +52,7 @@ fn within(text: &str, start: usize, line: usize, column: usize) -> usize {
     let mut at = start + 1;
     if raw.starts_with("\"\"\"") || raw.starts_with("'''") {
         at = start + 3;
-        // A line end right after the quotes is none of the string's.
+        // A line break directly after the quotes is not part of the string.
         let rest = text.get(at..).unwrap_or("");
         let end = ["\r\n", "\n"].into_iter().find(|end| rest.starts_with(end));
         at += end.map_or(0, str::len);

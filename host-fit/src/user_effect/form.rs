@@ -1,4 +1,4 @@
-//! The catalogue in the language of users' effects: what is written in languages that `model-core` does not run in.
+//! The catalogue in the language of user effects, from which code in other languages is generated.
 
 use super::expression::{Compiler, Fault, Kind, Meaning, Typed};
 use super::program::{Carried, Op, Program, Signal};
@@ -8,12 +8,12 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
-/// An effect's states and value as they are written in `forms.toml`.
+/// States and value of an effect as written in `forms.toml`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
     expression: String,
-    /// Of a delay law that holds edges back: what becomes of the command.
+    /// The command after a delay law that delays edges separately.
     command: Option<String>,
     #[serde(default)]
     state: Vec<WrittenState>,
@@ -32,9 +32,9 @@ struct WrittenState {
 #[derive(Debug)]
 pub(crate) struct Form {
     pub(crate) name: &'static str,
-    /// Its value: a jet strength, a drive, a reading; of a delay law the delay in samples.
+    /// Its value: a jet strength, a drive or a reading; for a delay law the delay in samples.
     pub(crate) value: Program,
-    /// What becomes of the command under a delay law that holds edges back.
+    /// The command after a delay law that delays edges separately.
     pub(crate) command: Option<Program>,
 }
 
@@ -42,7 +42,7 @@ pub(crate) struct Form {
 pub(crate) fn form(name: &str) -> Option<&'static Form> {
     static FORMS: OnceLock<Vec<Form>> = OnceLock::new();
     let forms = FORMS.get_or_init(|| {
-        // A test compiles every one of them: what does not is a gap, and the caller says so.
+        // A test compiles all forms; one that does not compile counts as missing.
         let written: BTreeMap<String, Written> =
             toml::from_str(include_str!("forms.toml")).unwrap_or_default();
         let specs = SPECS.iter().chain(NUISANCES).chain(LAWS);
@@ -217,7 +217,7 @@ mod tests {
         let parameters = middle::<T>(spec);
         let own = AnyTransport::new(spec.name, &parameters, &setting()).expect("a law");
         let form = form(spec.name).unwrap_or_else(|| panic!("{} has no form", spec.name));
-        // As effects of the jets: their own signal is what goes in.
+        // As effects of the jets, whose own signal is the input.
         let delay = UserEffect::of(&form.value, Place::Jet, &parameters, &setting());
         let command = form.command.as_ref();
         let command = command.map(|c| UserEffect::of(c, Place::Jet, &parameters, &setting()));

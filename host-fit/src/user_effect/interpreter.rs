@@ -1,4 +1,4 @@
-//! A user's effect run on the host, in any number type.
+//! Interpreter of user effects on the host, in any number type.
 
 use super::Definition;
 use super::program::{Lines, Op, Program, Register, Signal, select};
@@ -10,7 +10,7 @@ use model_core::effect::{Effect, Flow, Instant, Place, Setting};
 use model_core::effects::LONGEST_BUFFER;
 use model_core::history::Memory;
 
-/// Longest delay of a signal, samples; the next older sample is kept too.
+/// Longest delay of a signal, samples; one older sample is kept for interpolation.
 pub(super) const LONGEST_DELAY: u32 = LONGEST_BUFFER as u32 - 2;
 
 /// A user's effect, prepared for a sample period.
@@ -19,29 +19,29 @@ pub struct UserEffect<T> {
     program: &'static Program,
     place: Place,
     setting: Setting<T>,
-    /// Results that are the same at every sample; 0 for the others.
+    /// Results that are constant; 0 for the others.
     results: Vec<T>,
     taps: Vec<Tap<T>>,
-    /// What is computed at every sample.
+    /// Operations of every sample.
     each: Vec<(Register, Step)>,
     tables: Vec<Table<T>>,
 }
 
-/// What is computed at once.
+/// Operations evaluated together.
 #[derive(Clone, Copy, Debug)]
 enum Step {
     Op(Op),
     Table(usize),
 }
 
-/// Straight lines between points, looked up. To the bit what its operations make one after the other.
+/// A piecewise linear table, evaluated by look-up; bit-identical to its single operations.
 #[derive(Clone, Debug)]
 struct Table<T> {
     x: Register,
-    /// Beyond which of them a line is passed.
+    /// Positions beyond which a line counts in full.
     ends: Vec<f64>,
     lines: Vec<TableLine<T>>,
-    /// The value beyond the last place.
+    /// The value after the last point.
     last: T,
 }
 
@@ -50,14 +50,14 @@ struct TableLine<T> {
     from: T,
     steepness: T,
     rise: T,
-    /// The value where it begins.
+    /// The value at its start.
     below: T,
 }
 
-/// Beyond the end of a line by this share of the places, single precision does not bring it back.
+/// Relative margin beyond the end of a line that single precision does not round back.
 const ROUNDING: f64 = 1e-5;
 
-/// Beyond this the line from `from` to `to` counts in full.
+/// Position beyond which the line from `from` to `to` counts in full.
 fn surely_passed(from: f64, to: f64) -> f64 {
     to + ROUNDING * (from.abs() + 2.0 * to.abs())
 }
@@ -103,7 +103,7 @@ impl<T: Real> Table<T> {
     }
 }
 
-/// What a user's effect remembers.
+/// State of a user effect.
 #[derive(Clone, Debug)]
 pub struct UserState<T> {
     results: Vec<T>,
@@ -115,7 +115,7 @@ pub struct UserState<T> {
 /// The signals of a sample.
 struct Readings<'a, T> {
     own: T,
-    /// What effects of the flow see besides.
+    /// Additional signals of flow effects.
     flow: Option<&'a Flow<T>>,
     at: &'a Instant<'a, T>,
 }
@@ -173,7 +173,7 @@ impl<T: Real> UserEffect<T> {
                     longest,
                     ..
                 } => {
-                    // What must be remembered where the delay changes.
+                    // Memory needed for a varying delay.
                     let seconds = results[longest.unwrap_or(delay)];
                     let most = T::from_count(LONGEST_DELAY);
                     let samples = (seconds / setting.period).at_most(most);
@@ -199,12 +199,12 @@ impl<T: Real> UserEffect<T> {
         }
     }
 
-    /// The result of an operation that is the same at every sample; of a delayed signal its longest delay, samples.
+    /// The result of a constant operation; for a delayed signal its longest delay, samples.
     pub(crate) fn constant(&self, register: Register) -> T {
         self.results.get(register).copied().unwrap_or(T::ZERO)
     }
 
-    /// Where memory `line` is read, if its delay does not change.
+    /// Read position of memory `line` for a constant delay.
     pub(crate) fn tap(&self, line: usize) -> Tap<T> {
         self.taps.get(line).copied().unwrap_or(Tap::on(0))
     }
@@ -268,7 +268,7 @@ impl<T: Real> UserEffect<T> {
                     Signal::Present => at.present,
                     Signal::Channel => {
                         let channel = at.channels.get(self.setting.channel);
-                        // A channel that is not connected counts as being at its reference.
+                        // An unconnected channel counts as at its reference.
                         channel.copied().unwrap_or(self.setting.reference)
                     }
                     Signal::Time => clock.time(self.setting.period),
@@ -347,7 +347,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// What the board computes: every line, one after the other.
+    /// The board's computation: every line, one after the other.
     fn one_after_the_other(table: &Table<f32>, x: f32) -> f32 {
         let first = table.lines[0].below;
         table.lines.iter().fold(first, |value, line| {

@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use thiserror::Error;
 
-/// Why a user's effect was refused.
+/// Why a user effect was rejected.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DefinitionError {
@@ -38,7 +38,7 @@ pub enum DefinitionError {
         /// Why.
         source: std::io::Error,
     },
-    /// It is no effect file.
+    /// The file is not an effect file.
     #[error(
         "{place}, line {line}, column {column}: {problem}. An effect file has `name`, `place`, `summary`, \
          `expression`, and tables `[[parameter]]` and `[[state]]`; docs/user-effects.md shows two."
@@ -53,7 +53,7 @@ pub enum DefinitionError {
         /// What is wrong.
         problem: String,
     },
-    /// A key has a value that makes no sense.
+    /// A key has an invalid value.
     #[error("{place}: key `{key}`: {problem}. Correct the key.")]
     Key {
         /// The file.
@@ -63,7 +63,7 @@ pub enum DefinitionError {
         /// What is wrong.
         problem: String,
     },
-    /// An expression was refused.
+    /// An invalid expression.
     #[error("{place}: key `{key}`, line {line}, column {column} of the expression: {problem}.")]
     Expression {
         /// The file.
@@ -91,7 +91,7 @@ pub struct Definition {
     program: Program,
 }
 
-/// What an effect file that was [checked](Definition::check) says of itself.
+/// Summary of an effect file that was [checked](Definition::check).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Checked {
     /// The effect's name.
@@ -127,7 +127,7 @@ impl Definition {
         Self::from_source(read(text, place)?, place, "")
     }
 
-    /// Whether a text is one of an effect file; it is not kept, so that a text may be checked at every keystroke.
+    /// Checks the text of an effect file without storing it, so that it can be called at every keystroke.
     ///
     /// # Errors
     /// As [`load`](Self::load).
@@ -162,13 +162,13 @@ impl Definition {
         Ok(definition)
     }
 
-    /// Its identity card, like one of the catalogue.
+    /// Its card, as for effects of the catalogue.
     #[must_use]
     pub fn spec(&'static self) -> &'static Spec {
         &self.spec
     }
 
-    /// What it does at a sample.
+    /// Its operations at a sample.
     pub(crate) fn program(&self) -> &Program {
         &self.program
     }
@@ -178,7 +178,7 @@ impl Definition {
     }
 }
 
-/// What stands in the text of an effect file.
+/// The contents of an effect file.
 fn read(text: &str, place: &str) -> Result<Source, DefinitionError> {
     toml::from_str(text).map_err(|error| {
         let start = error.span().map_or(0, |span| span.start);
@@ -342,7 +342,7 @@ starts = [0.1]
         }
     }
 
-    /// What an effect makes of an on/off command and a friction that follows it.
+    /// Response of an effect to an on/off command and a friction that follows it.
     fn response<T: Real, E: Effect<T>>(effect: &E) -> Vec<T> {
         let mut state = effect.start();
         let mut y = T::ZERO;
@@ -519,8 +519,8 @@ update = "reading"
         }
     }
 
-    /// A delay that grows by a tenth of the time: what left at t arrives at 1.1 t, up
-    /// to the longest that is remembered.
+    /// A delay that grows by a tenth of the time: a signal sent at t arrives at 1.1 t, up to the longest
+    /// delay.
     #[test]
     fn a_delay_that_changes_is_followed_up_to_its_longest() {
         let effect = UserEffect::new(definition(DRIFT), &[0.01, 0.1], &setting::<f64>());
@@ -660,8 +660,7 @@ update = "reading"
         }
     }
 
-    /// Whatever nests in Rust's grammar, at the greatest length let through, on
-    /// a test's small stack.
+    /// All nesting constructs of Rust's grammar at the largest allowed length, on a test's small stack.
     #[test]
     fn nothing_nests_deeper_than_the_stack() {
         for opening in [

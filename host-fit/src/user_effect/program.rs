@@ -1,16 +1,16 @@
-//! An expression as a list of operations: what the interpreter runs and what
-//! Rust is generated from, so that both do the same in the same order.
+//! An expression as a list of operations, used by the interpreter and by Rust generation, so that both
+//! compute the same in the same order.
 
 use model_core::Real;
 use std::cmp::Ordering;
 
-/// Index of the operation whose result is meant.
+/// Index of an operation's result.
 pub(crate) type Register = usize;
 
 /// A signal an expression can read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Signal {
-    /// What the effect is there to change: jet strength or sensor reading.
+    /// The signal that the effect changes: jet strength or sensor reading.
     Own,
     /// u.
     Command,
@@ -20,13 +20,13 @@ pub(crate) enum Signal {
     Arrived,
     /// 1 − Σa − Σc·j of the recursion.
     Relaxation,
-    /// The flow a sample ago; of the catalogue's effects only, as the next three.
+    /// The flow one sample before; like the next three, for effects of the catalogue only.
     Before,
     /// The flow at the next sample without this effect.
     Next,
     /// The separated flow's share of the motion.
     Released,
-    /// The jet strength at the flow at this very instant.
+    /// The jet strength at the flow at this instant.
     Present,
     /// The measured channel.
     Channel,
@@ -88,10 +88,10 @@ pub(crate) enum Op {
     Period,
     Reference,
     Signal(Signal),
-    /// A state as the last sample left it.
+    /// A state after the last sample.
     State(usize),
-    /// `signal` as it was `delay` seconds ago; `line` numbers the memories. A delay
-    /// that changes is never longer than `longest` seconds.
+    /// `signal` delayed by `delay` seconds; `line` numbers the memories. A varying delay is at most `longest`
+    /// seconds.
     Delayed {
         line: usize,
         signal: Register,
@@ -167,24 +167,24 @@ impl Op {
     }
 }
 
-/// Operations that together are straight lines between points, the places numbers and the values the same at every
-/// sample: of them only the lines around x count, and those before it as a sum that is known beforehand.
+/// Operations that form a piecewise linear table with constant points: only the lines around x are evaluated,
+/// and the sum before them is precomputed.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Lines {
     pub(crate) x: Register,
-    /// The value below the first place.
+    /// The value before the first point.
     pub(crate) first: Register,
     pub(crate) lines: Vec<Line>,
 }
 
-/// A line from one place to the next, `to`.
+/// A line from one point to the next, `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Line {
     pub(crate) from: Register,
     pub(crate) to: f64,
     pub(crate) steepness: Register,
     pub(crate) rise: Register,
-    /// The sum with it.
+    /// The sum including it.
     pub(crate) value: Register,
 }
 
@@ -210,7 +210,7 @@ impl Lines {
     }
 }
 
-/// A state that is carried from sample to sample.
+/// A state variable.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Carried {
     pub(crate) name: String,
@@ -219,21 +219,21 @@ pub(crate) struct Carried {
     pub(crate) update: Register,
 }
 
-/// What an effect does at a sample.
+/// Operations of an effect at a sample.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Program {
     pub(crate) ops: Vec<Op>,
-    /// Whether an operation's result is the same at every sample.
+    /// Whether each operation's result is constant.
     pub(crate) once: Vec<bool>,
     pub(crate) states: Vec<Carried>,
     /// Memories for delayed signals.
     pub(crate) lines: usize,
-    /// Which operations make tables.
+    /// Operations that form tables.
     pub(crate) tables: Vec<Lines>,
     pub(crate) value: Register,
 }
 
-/// Appends operations, each one once.
+/// Appends operations without duplicates.
 #[derive(Debug, Default)]
 pub(crate) struct Builder {
     ops: Vec<Op>,
@@ -282,7 +282,7 @@ impl Builder {
         once(&self.ops).get(register).copied().unwrap_or(false)
     }
 
-    /// Says that operations make a table.
+    /// Marks operations as a table.
     pub(crate) fn is_table(&mut self, table: Lines) {
         let steady = |r: Register| self.is_once(r);
         if steady(table.first) && table.lines.iter().all(|line| steady(line.rise)) {
@@ -290,7 +290,7 @@ impl Builder {
         }
     }
 
-    /// The number that a register holds, if it is one that was written down.
+    /// The number in a register, if it is a literal.
     pub(crate) fn number(&self, register: Register) -> Option<f64> {
         match self.ops.get(register)? {
             Op::Number(value) => Some(*value),
@@ -303,7 +303,7 @@ impl Builder {
         self.number(register).is_some()
     }
 
-    /// Leaves out what has no influence on `value`, and numbers the rest anew.
+    /// Removes operations without influence on `value`, and renumbers the rest.
     pub(crate) fn finish(self, value: Register, states: Vec<Carried>) -> Program {
         let mut alive = vec![false; self.ops.len()];
         let mut pending = vec![value];
@@ -399,7 +399,7 @@ fn once(ops: &[Op]) -> Vec<bool> {
 }
 
 impl Program {
-    /// What has to be computed at every sample if tables are looked up.
+    /// Operations needed at every sample if tables are looked up.
     pub(crate) fn needed(&self) -> Vec<bool> {
         let mut needed = vec![false; self.ops.len()];
         let updates = self.states.iter().map(|state| state.update);
@@ -426,8 +426,8 @@ impl Program {
         self.ops.contains(&op)
     }
 
-    /// Whether parameter `index` enters a comparison other than through a
-    /// state: then the output changes in steps with it.
+    /// Whether parameter `index` enters a comparison (not through a state): the output then changes in steps
+    /// with it.
     pub(crate) fn is_compared(&self, index: usize) -> bool {
         let mut depends = vec![false; self.ops.len()];
         for (register, op) in self.ops.iter().enumerate() {
@@ -444,7 +444,7 @@ impl Program {
     }
 }
 
-/// Truth as a number.
+/// A truth value as a number.
 fn truth<T: Real>(truth: bool) -> T {
     if truth { T::ONE } else { T::ZERO }
 }
@@ -472,7 +472,7 @@ impl Unary {
 impl Binary {
     #[inline]
     pub(crate) fn of<T: Real>(self, x: T, y: T) -> T {
-        // Derivatives have no part in comparisons, `==` of dual numbers does.
+        // Comparisons ignore derivatives, which `==` of dual numbers does not.
         let equal = || x.partial_cmp(&y) == Some(Ordering::Equal);
         match self {
             Self::Add => x + y,

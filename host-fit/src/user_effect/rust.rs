@@ -1,5 +1,5 @@
-//! Rust for the board from a user's effect: the interpreter's operations in
-//! the interpreter's order, one a line.
+//! Generation of Rust for the board from a user effect: the interpreter's operations in the same order, one
+//! per line.
 
 use super::interpreter::LONGEST_DELAY;
 use super::program::{Binary, Op, Register, Signal, Unary};
@@ -25,7 +25,7 @@ pub fn type_name(effect: &str) -> String {
     words.collect()
 }
 
-/// The `f32` nearest to `value`, written as short as it can be read back.
+/// The `f32` nearest to `value`, in its shortest form.
 pub(crate) fn number(value: f64, suffix: &str) -> TokenStream {
     let value = value as f32;
     let mut tokens = TokenStream::new();
@@ -33,7 +33,7 @@ pub(crate) fn number(value: f64, suffix: &str) -> TokenStream {
         tokens.append(Punct::new('-', Spacing::Alone));
     }
     let text = format!("{:?}{suffix}", value.abs());
-    // What is not finite has no literal; it is refused before.
+    // Non-finite numbers have no literal; they are rejected before.
     let literal = text.parse().unwrap_or_else(|_| Literal::f32_suffixed(0.0));
     tokens.append(literal);
     tokens
@@ -58,7 +58,7 @@ pub(crate) fn rust_module(
     writer.module()
 }
 
-/// Samples that each memory of a delayed signal holds.
+/// Memory length of each delayed signal, samples.
 pub(crate) fn line_lengths(
     definition: &'static Definition,
     parameters: &[f64],
@@ -77,7 +77,7 @@ struct Writer {
 struct Field {
     name: Ident,
     kind: TokenStream,
-    /// What it is made of; nothing where a result has its name.
+    /// Its initialiser; none if a result has its name.
     value: Option<TokenStream>,
 }
 
@@ -122,7 +122,7 @@ impl Writer {
         once.copied().unwrap_or(false)
     }
 
-    /// What an operation says at the place where it is used.
+    /// An operation's text at its place of use.
     fn operand(&self, register: Register, preparing: bool) -> TokenStream {
         let field = |name: Ident| {
             if preparing {
@@ -245,8 +245,7 @@ impl Writer {
         format_ident!("s_{}", state.map_or("", |state| state.name.as_str()))
     }
 
-    /// Whether the value is the very last thing computed: it is then returned
-    /// without a name.
+    /// Whether the value is computed last: it is then returned without a name.
     fn is_last(&self, register: Register) -> bool {
         let program = &self.definition.program;
         let last = self.ops().filter(|(_, _, once)| !once).last();
@@ -586,13 +585,13 @@ impl Writer {
     }
 }
 
-/// An argument's name; with `_` before it where `body` does not use it.
+/// An argument's name, prefixed by `_` if `body` does not use it.
 fn named_if_used(name: &str, body: &TokenStream) -> Ident {
     fn uses(body: &TokenStream, name: &str) -> bool {
         let mut before = None;
         body.clone().into_iter().any(|token| {
             let found = match &token {
-                // A field of that name is another thing.
+                // A field of that name is something else.
                 TokenTree::Ident(ident) => ident == name && before != Some('.'),
                 TokenTree::Group(group) => uses(&group.stream(), name),
                 _ => false,
@@ -615,7 +614,7 @@ fn named_if_used(name: &str, body: &TokenStream) -> Ident {
 mod tests {
     use super::*;
 
-    /// Numbers read back as the nearest f32, and small ones are not lost.
+    /// Numbers read back as the nearest f32, small ones included.
     #[test]
     fn numbers_survive_their_text() {
         for value in [0.1, -0.0049, 1e-7, 3.2e-38, 1.0 / 3.0, -0.0, 16_777_217.0] {

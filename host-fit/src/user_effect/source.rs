@@ -1,4 +1,4 @@
-//! What an effect file says, and its checks.
+//! Contents of an effect file, and its checks.
 
 use super::expression::{Compiler, Fault, Kind, Meaning, Typed};
 use super::program::{Carried, Op, Program, Signal};
@@ -6,7 +6,7 @@ use super::{module_name, type_name};
 use model_core::effect::{Parameter, Place, RustType, Spec, Unit};
 use serde::{Deserialize, Serialize};
 
-/// What an effect file holds, and what a model file keeps of it.
+/// Contents of an effect file, as stored in a model file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Source {
@@ -51,7 +51,7 @@ struct SourceParameter {
     starts: Vec<f64>,
 }
 
-/// Why a source was refused: the key, and what is wrong with its value or its expression.
+/// Why a source was rejected: the key, and the problem with its value or expression.
 pub(super) enum Refusal {
     Key(String, String),
     Expression(String, Fault),
@@ -93,14 +93,14 @@ impl Source {
         let key = |key: &str, problem: String| Err(Refusal::Key(key.to_owned(), problem));
         if !is_effect_name(&self.name) {
             let problem = format!(
-                "`{}` is no name for an effect: use at most 40 small letters and digits, words joined by `-`",
+                "`{}` is not a valid effect name: use at most 40 small letters and digits, words joined by `-`",
                 self.name
             );
             return key("name", problem);
         }
         if model_core::effects::spec(&self.name).is_some() {
             let problem = format!(
-                "`{}` is in the catalogue already; take another name",
+                "`{}` is already in the catalogue; choose another name",
                 self.name
             );
             return key("name", problem);
@@ -134,12 +134,12 @@ impl Source {
         let mut name = |label: String, name: &str, op: Op| {
             if !is_identifier(name) {
                 let problem = format!(
-                    "`{name}` is no name: use at most 40 small letters, digits and `_`, no word of Rust"
+                    "`{name}` is not a valid name: use at most 40 small letters, digits and `_`, no word of Rust"
                 );
                 return Err(Refusal::Key(label, problem));
             }
             if compiler.names.iter().any(|(known, _)| known == name) {
-                let problem = format!("`{name}` has a meaning already; take another name");
+                let problem = format!("`{name}` is already defined; choose another name");
                 return Err(Refusal::Key(label, problem));
             }
             compiler.names.push((name.to_owned(), Meaning::Read(op)));
@@ -167,7 +167,7 @@ impl Source {
             let update = compiler.number(&state.update).map_err(|fault| {
                 Refusal::Expression(format!("state.{}.update", state.name), fault)
             })?;
-            // From here on the name is the state's new value.
+            // From here on the name means the state's new value.
             let kind = Kind::Number;
             let value = Meaning::Value(Typed {
                 register: update,
@@ -238,7 +238,7 @@ impl Source {
         }
     }
 
-    /// States and value as they were written, on one line.
+    /// States and value on one line.
     fn equation(&self) -> String {
         let flat = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
         let mut parts: Vec<String> = self

@@ -1,15 +1,14 @@
-//! Looking ahead: the model run on from the present, without copying its past.
+//! Look-ahead: runs the model from the present without copying its history.
 
 use crate::history::{Memory, Past};
 use crate::model::{Clamps, Input, Output, Parts, State, StateOf, observe_delay};
 use crate::real::Real;
 use crate::recursion::{Bilinear, Known};
 
-/// Lags of at least this many samples read the past even this far ahead, and
-/// what they give is summed once instead of at every look.
+/// Lags of at least this length read only the past during a look-ahead; their terms are summed once.
 const NEAR: usize = 64;
 
-/// A signal's past with up to `A` samples that have not happened yet in front.
+/// A signal's past with up to `A` predicted samples in front.
 #[derive(Debug)]
 pub struct Ahead<'a, T, P, const A: usize> {
     past: &'a P,
@@ -19,7 +18,7 @@ pub struct Ahead<'a, T, P, const A: usize> {
 }
 
 impl<T: Real, P: Past<T>, const A: usize> Ahead<'_, T, P, A> {
-    /// Puts another sample in front; beyond the room for them it is dropped.
+    /// Appends a predicted sample; ignored when the room is used up.
     #[inline(always)]
     fn push(&mut self, value: T) {
         if let Some(slot) = self.ahead.get_mut(self.filled) {
@@ -33,7 +32,7 @@ impl<T: Real, P: Past<T>, const A: usize> Ahead<'_, T, P, A> {
 impl<T: Real, P: Past<T>, const A: usize> Past<T> for Ahead<'_, T, P, A> {
     #[inline(always)]
     fn back(&self, lag: usize) -> T {
-        // Where the lag is a constant all but one of these are gone.
+        // For a constant lag the compiler removes all but one of these branches.
         if lag == 0 {
             self.newest
         } else if lag >= A || lag >= self.filled {
@@ -45,18 +44,18 @@ impl<T: Real, P: Past<T>, const A: usize> Past<T> for Ahead<'_, T, P, A> {
     }
 }
 
-/// What is known of the samples ahead: for each of the next 64 the terms
-/// whose lags are at least as long. One of them is summed anew at each sample.
+/// Cache of the known part of the samples ahead: for each of the next 64 the sum of the terms with longer
+/// lags. One sum is recomputed per sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Foreknown<T> {
     terms: [Known<T>; NEAR],
-    /// Where the present sample's are.
+    /// Index of the present sample's sums.
     present: usize,
     complete: bool,
 }
 
 impl<T: Real> Foreknown<T> {
-    /// Nothing is known yet.
+    /// An empty cache.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -66,7 +65,7 @@ impl<T: Real> Foreknown<T> {
         }
     }
 
-    /// Takes in the past of the first sample; whether this was it.
+    /// Fills the cache at the first sample; returns whether this was it.
     pub(crate) fn begin(&mut self, recursion: &Bilinear<'_, T>, outputs: &impl Past<T>) -> bool {
         let begins = !self.complete;
         if begins {
@@ -75,7 +74,7 @@ impl<T: Real> Foreknown<T> {
         begins
     }
 
-    /// Moves on to a new present sample, whose past is `outputs`.
+    /// Advances to a new present sample, whose past is `outputs`.
     #[inline(always)]
     fn advance(&mut self, recursion: &Bilinear<'_, T>, outputs: &impl Past<T>) {
         self.present = (self.present + 1) % NEAR;
@@ -95,15 +94,13 @@ impl<T: Real> Default for Foreknown<T> {
     }
 }
 
-/// Runs `model` on from `state` under `input` until `enough` says so, and for at
-/// most as many samples as there is `room` for.
+/// Runs `model` from `state` under `input` until `enough` returns true, for at most as many samples as there
+/// is `room`.
 ///
-/// `enough` is shown each sample ahead: its number from 0 on, what the model says
-/// of the flow (no sensor is asked: its effects may cost more than all the rest),
-/// and whether an input issued from now on has arrived. `foreknown` belongs to `state`
-/// and is to be moved on by this function at every sample. What is foreseen is what
-/// [`step`](crate::step) would do, but for the last digits.
-/// Costs at most a model step for each sample ahead; of the past nothing but the jets is copied.
+/// `enough` receives each sample ahead: its number from 0, the predicted flow (without sensor effects, which
+/// may cost more than the rest), and whether an input issued now has arrived. `foreknown` belongs to `state`
+/// and must be advanced by this function at every sample. The prediction equals that of [`step`](crate::step)
+/// up to the last digits. Costs at most a model step per sample ahead; only the jets' past is copied.
 #[inline(always)]
 pub fn run<T, M, Y, J, const A: usize>(
     model: &M,
@@ -140,7 +137,7 @@ pub fn run<T, M, Y, J, const A: usize>(
             Some(known) if i < NEAR => *known,
             _ => recursion.known(&ahead.outputs, NEAR, 0),
         };
-        // i + 1 inputs have been issued ahead: a delay of up to i meets one.
+        // i + 1 inputs have been issued ahead: a delay of up to i reads one of them.
         let within = if arrived { 0 } else { i };
         let known = (&known, NEAR);
         let (output, delay) =
@@ -164,8 +161,8 @@ mod tests {
     use crate::model::{Averaging, Params, matrix, step, vector};
     use crate::recursion::{Grading, LagConvention};
 
-    /// With effects that remember, a delay that moves, lags on either side of
-    /// what is known, and looks farther ahead than that.
+    /// Covers effects with memory, a varying delay, lags on both sides of the cache, and look-aheads beyond
+    /// it.
     #[test]
     fn it_foresees_what_the_model_does() {
         let setting = Setting {

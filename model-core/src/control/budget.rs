@@ -1,20 +1,19 @@
-//! What a valve and a compressor can give: switches and air per time.
+//! Budgets of valve and compressor: switches and air per time.
 //!
-//! Both are stores that fill at a steady rate and are drawn from, in whole
-//! numbers, so that they neither drift nor round.
+//! Both are stores with a constant inflow, in whole numbers, so that they neither drift nor round.
 
 use crate::control::hold::{Hold, HoldTimes};
 
-/// A limit on how often the valve switches, averaged over a while.
+/// A limit on the mean switching rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Switches {
     /// Samples that one switch costs: the sample rate over the allowed switches per second.
     pub samples_per_switch: u32,
-    /// Switches that may be saved up for busy moments, at least 2 (one pulse).
+    /// Switches that can be accumulated, at least 2 (one pulse).
     pub saved: u32,
 }
 
-/// A limit on the air used, averaged over a while.
+/// A limit on the mean air consumption.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Air {
     /// Allowed long-run share of time with the valve open, in 1/1000; 1000 is no limit.
@@ -26,13 +25,13 @@ pub struct Air {
 /// Both budgets; `None` is no limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Budget {
-    /// The valve's.
+    /// Budget of the valve.
     pub switches: Option<Switches>,
-    /// The compressor's.
+    /// Budget of the compressor.
     pub air: Option<Air>,
 }
 
-/// What is left of the budgets.
+/// State of the budgets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Purse {
     /// In samples: a switch costs `samples_per_switch`.
@@ -42,7 +41,7 @@ pub struct Purse {
 }
 
 impl Budget {
-    /// Full stores.
+    /// Full stores of both.
     #[must_use]
     pub fn full(&self) -> Purse {
         Purse {
@@ -51,10 +50,10 @@ impl Budget {
         }
     }
 
-    /// What the budgets make of a wish, given where the valve is.
+    /// The permitted valve position for a requested one.
     ///
-    /// A pulse is only begun when there is air for its shortest length and a
-    /// switch to end it; blowing ends when the air does. Hold times come after.
+    /// A pulse starts only if there is air for its shortest length and a switch to end it; blowing ends when
+    /// the air is used up. Hold times are applied afterwards.
     #[must_use]
     pub fn allow(&self, purse: &Purse, hold: &Hold, times: &HoldTimes, wanted: bool) -> bool {
         if !hold.is_on() && wanted {
@@ -72,7 +71,7 @@ impl Budget {
         wanted
     }
 
-    /// Books what the valve did at this sample.
+    /// Records the valve's action at this sample.
     pub fn book(&self, purse: &mut Purse, was_on: bool, is_on: bool) {
         if let Some(s) = self.switches {
             let spent = if was_on == is_on {
@@ -103,7 +102,7 @@ impl Switches {
 }
 
 impl Air {
-    /// What a sample of blowing takes beyond what flows in.
+    /// Net consumption of air per sample of blowing.
     fn drain(&self) -> u32 {
         1000_u32.saturating_sub(self.per_mille)
     }
@@ -118,7 +117,7 @@ mod tests {
 
     const TIMES: HoldTimes = HoldTimes { on: 5, off: 5 };
 
-    /// Samples open and switches over 100 s of a wish.
+    /// Samples open, and switches, over 100 s of a requested command.
     fn run(budget: Budget, wish: impl Fn(u32) -> bool) -> (u32, u32) {
         let mut purse = budget.full();
         let mut hold = Hold::closed();

@@ -1,16 +1,16 @@
-//! The constants of the tracking law, and what makes them unusable.
+//! Parameters of the tracking law, and their validation.
 
 use crate::control::budget::Budget;
 use crate::control::hold::HoldTimes;
 use crate::control::reference::Reachable;
 use core::fmt;
 
-/// The constants of the law. All times in samples.
+/// Parameters of the law. All times in samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracking<T> {
     /// y*, the friction to hold, of the flow itself (before sensor effects).
     pub reference: T,
-    /// What can be held.
+    /// Reachable references.
     pub reachable: Reachable<T>,
     /// Fastest change of the reference, y per sample; 0 follows steps as steps.
     pub slope: T,
@@ -18,7 +18,7 @@ pub struct Tracking<T> {
     pub hold: HoldTimes,
     /// Limits on switching and air.
     pub budget: Budget,
-    /// How far ahead predictions are judged, at least 1 and at most the shortest delay.
+    /// Prediction horizon of the bias estimate, at least 1 and at most the shortest delay.
     pub lead: u16,
     /// From an opening command to half the jet strength (valve, edge delays).
     pub opening: u16,
@@ -31,20 +31,20 @@ pub struct Tracking<T> {
     pub bias_rate: T,
     /// Integral action, 1 per sample.
     pub integral_rate: T,
-    /// How far the averaged prediction error may be from what is believed of it, y: as far as noise alone carries it.
-    /// 0 believes every average.
+    /// Dead band of the bias, y: deviations of the averaged prediction error that noise alone explains. 0 for
+    /// none.
     pub play: T,
-    /// What is left of the integral's rate in the long run, above 0 and at most 1. It begins whole and falls as the
-    /// readings add up, as the gain of a Kalman filter does that knows a constant better and better, and begins
-    /// anew when the prediction error leaves its play or the reference changes; 1 keeps it.
+    /// Final rate of the integral relative to its first, above 0 and at most 1. The rate decreases as
+    /// readings accumulate, as a Kalman gain for a constant does, and is reset when the prediction error
+    /// leaves its dead band or the reference changes; 1 keeps it constant.
     pub settled: T,
-    /// Neither bias nor integral corrects more than this, y.
+    /// Limit of bias and integral, y.
     pub correction_limit: T,
-    /// A residual counts as no more than this, y: one bad reading does no harm.
+    /// Limit of a residual, y: a single outlier does no harm.
     pub residual_limit: T,
 }
 
-/// A constant of the law that makes no sense.
+/// An invalid parameter of the law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Unusable {
@@ -53,8 +53,7 @@ pub enum Unusable {
     /// The look-ahead memory has fewer samples than the delay, valve and half a
     /// hold time together.
     LookAhead,
-    /// Tracking needs the full model; an averaged model (eq. 15) does not see
-    /// single switches.
+    /// Tracking needs the full model; an averaged model (eq. 15) does not resolve single switches.
     AveragedModel,
 }
 

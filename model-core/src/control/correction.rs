@@ -1,8 +1,7 @@
-//! What makes a tracking law hold on a flow that is not its model: the error of
-//! predictions made a delay ago, low-pass filtered, is added to those made now
-//! (Smith's correction), and a slow integral removes what remains. Both stand still
-//! where what they see may be the sensor's noise: the bias follows its average only as
-//! far as the noise does not explain, and the integral slows down as long as it stays.
+//! Corrections of a tracking law for model errors. The low-pass-filtered error of predictions made a delay
+//! ago is added to the present ones (Smith predictor), and a slow integral removes the remaining offset. Both
+//! respond to noise as little as possible: the bias has a dead band, and the integral slows down while the
+//! bias is constant.
 
 use crate::control::constants::Tracking;
 use crate::history::{DelayLine, Memory, Past};
@@ -11,25 +10,25 @@ use crate::real::Real;
 /// Bias and integral of a law that predicts fewer than `A` samples ahead.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Correction<T, const A: usize> {
-    /// What of the filtered error of past predictions is believed.
+    /// Bias in use.
     pub(crate) bias: T,
     /// Filtered error of past predictions.
     missed: T,
     pub(crate) integral: T,
     /// Consecutive samples without a reading, saturating.
     pub(crate) lost: u32,
-    /// Predictions `lead` ahead, the newest made last.
+    /// Predictions `lead` samples ahead; the newest is the last one made.
     predictions: DelayLine<T, A>,
     /// Samples since the start, saturating.
     age: u32,
-    /// What is left of the integral's rate.
+    /// Rate of the integral relative to its first.
     share: T,
-    /// The reference that it has been learning for.
+    /// Reference for which the integral was learned.
     reference: T,
 }
 
 impl<T: Real, const A: usize> Correction<T, A> {
-    /// Nothing is known against the model yet.
+    /// No corrections yet.
     pub(crate) fn none() -> Self {
         Self {
             bias: T::ZERO,
@@ -43,9 +42,8 @@ impl<T: Real, const A: usize> Correction<T, A> {
         }
     }
 
-    /// Takes in the reading of a sample, as the residual of the `estimate`, and
-    /// what is predicted `lead` samples ahead. The valve has stood at `on` for
-    /// `since` samples.
+    /// Updates the corrections with the residual of the `estimate` and the prediction `lead` samples ahead.
+    /// The valve has been at `on` for `since` samples.
     pub(crate) fn update(
         &mut self,
         law: &Tracking<T>,
@@ -62,14 +60,14 @@ impl<T: Real, const A: usize> Correction<T, A> {
             return;
         };
         self.lost = 0;
-        // Predictions begin to come due `lead` samples after the start.
+        // The first prediction can be compared `lead` samples after the start.
         if self.age <= u32::from(law.lead) {
             return;
         }
         let flow = estimate + residual;
         let missed = flow - self.predictions.back(usize::from(law.lead));
         if reference != self.reference {
-            // A model is wrong by something else at another level.
+            // The model error differs at another level.
             self.reference = reference;
             self.share = T::ONE;
         }
@@ -81,12 +79,11 @@ impl<T: Real, const A: usize> Correction<T, A> {
             .at_least(self.missed - law.play)
             .at_most(self.missed + law.play);
         if bias != self.bias {
-            // The model errs by something else than it did: the integral has to learn again, too.
+            // The model error has changed: the integral rate is reset too.
             self.bias = bias;
             self.share = T::ONE;
         }
-        // A valve that stands still and is already where the integral pushes it
-        // can give no more: the integral waits.
+        // Anti-windup: the integral stops while the valve stays where the integral drives it.
         let error = reference - flow;
         let pushes_on = error > T::ZERO;
         let still = since >= 4 * u32::from(law.lead);
@@ -136,7 +133,7 @@ mod tests {
         residual_limit: 1.0,
     };
 
-    /// Predictions that are always 0.1 too low, of a flow at 0.6 that has to be at 0.5.
+    /// Predictions that are 0.1 too low, for a flow at 0.6 with the reference 0.5.
     fn after(samples: u32, since: u32, on: bool) -> Correction<f64, 8> {
         let mut correction = Correction::none();
         for _ in 0..samples {
@@ -156,12 +153,12 @@ mod tests {
     fn the_integral_grows_to_its_limit_and_waits_for_a_valve_that_can_give_no_more() {
         assert!((after(13, 0, false).integral + 0.01).abs() < 1e-12);
         assert_eq!(after(1000, 0, false).integral, -0.3);
-        // Too much flow, and the valve has long been closed; not so where it is open.
+        // Too much flow with the valve closed for long: the integral stops; with the valve open it does not.
         assert_eq!(after(1000, 12, false).integral, 0.0);
         assert_eq!(after(1000, 12, true).integral, -0.3);
     }
 
-    /// The share after so many samples of predictions that are wrong by `missed`, give or take a wobble of 0.01.
+    /// The relative integral rate after so many samples of a prediction error `missed` with a ripple of 0.01.
     fn learnt(law: &Tracking<f64>, samples: u32, missed: f64) -> Correction<f64, 8> {
         let mut correction = Correction::none();
         for k in 0..samples {
@@ -181,20 +178,20 @@ mod tests {
         };
         let quiet = learnt(&law, 3000, 0.0);
         assert_eq!(quiet.bias, 0.0);
-        // Riccati: towards the share that stays, and not below it.
+        // Riccati: decreases to the final rate and not below.
         assert!((quiet.share - 0.2).abs() < 0.005, "{}", quiet.share);
-        // A model that has become wrong is believed, but for the play, and the integral starts again.
+        // A changed model error moves the bias beyond its dead band, and resets the integral rate.
         let mut wrong = quiet;
         for _ in 0..20 {
             wrong.update(&law, law.reference, 0.6, Some(0.0), 0.5, (true, 0));
         }
         assert!((wrong.bias - 0.08).abs() < 1e-3, "{}", wrong.bias);
         assert!(wrong.share > 0.8, "{}", wrong.share);
-        // Another reference does so too.
+        // Another reference resets it as well.
         let mut other = quiet;
         other.update(&law, 0.6, 0.6, Some(0.0), 0.6, (true, 0));
         assert!(other.share > 0.98, "{}", other.share);
-        // Without play every average is believed.
+        // Without a dead band the bias follows every average.
         assert!(learnt(&LAW, 3000, 0.0).bias != 0.0);
     }
 

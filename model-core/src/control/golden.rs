@@ -1,4 +1,4 @@
-//! Golden runs of the laws: whether a board decides what the host decided.
+//! Golden runs of the laws: bit-exact comparison of board and host.
 
 use crate::control::constants::Tracking;
 use crate::control::pulses::{Played, Pulses};
@@ -8,22 +8,20 @@ use crate::history::Memory;
 use crate::model::{Parts, StateOf};
 use crate::self_test::{Crc32, command};
 
-/// What a law must decide in the golden run, bit for bit.
+/// Expected decisions of a law in the golden run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GoldenLaw {
     /// Length of the run, samples.
     pub samples: u32,
-    /// CRC-32 over every decision, with a tracking law's estimate, foreseen
-    /// friction and bias.
+    /// CRC-32 over every decision; for a tracking law also over estimate, prediction and bias.
     pub expected: u32,
 }
 
-/// Runs `law` from `state` and returns the CRC-32 of what it did, or `None`
-/// where a number of it was not finite.
+/// Runs `law` from `state` and returns the CRC-32 of its decisions, or `None` if one of its numbers was not
+/// finite.
 ///
-/// The law reads its own estimate, disturbed: up and down by an eighth of the
-/// residual limit as the command of the golden run says, beyond the limit now
-/// and then, and nothing at all for a sixteenth of the time.
+/// The law reads its own estimate with disturbances: ±1/8 of the residual limit following the golden command,
+/// occasional outliers beyond the limit, and no reading for a sixteenth of the time.
 pub fn run<M, Y, J, const A: usize>(
     law: &Tracking<f32>,
     model: &M,
@@ -59,7 +57,7 @@ where
     Some(crc.value())
 }
 
-/// Plays `pulses` for as many samples and returns the CRC-32 of what the valve did.
+/// Plays `pulses` for so many samples and returns the CRC-32 of the valve positions.
 pub fn play<P: AsRef<[(u32, u32)]>>(pulses: &Pulses<P>, samples: u32) -> u32 {
     let mut played = Played::new();
     let valve = (0..samples).map(|_| pulses.step(&mut played));
@@ -69,14 +67,14 @@ pub fn play<P: AsRef<[(u32, u32)]>>(pulses: &Pulses<P>, samples: u32) -> u32 {
 }
 
 impl GoldenLaw {
-    /// Whether `pulses` come as expected.
+    /// Whether `pulses` match their expected CRC.
     #[must_use]
     pub fn holds_for_pulses<P: AsRef<[(u32, u32)]>>(&self, pulses: &Pulses<P>) -> bool {
         play(pulses, self.samples) == self.expected
     }
 
-    /// Whether `law` on `model` decides what is expected, from `state` at rest
-    /// with `channels` at their references.
+    /// Whether `law` on `model` matches its expected CRC, from `state` at rest with `channels` at their
+    /// references.
     #[must_use]
     pub fn holds<M, Y, J, const A: usize>(
         &self,

@@ -1,4 +1,4 @@
-//! Minimum on and off times: the last word before the valve.
+//! Minimum on and off times, applied last before the valve.
 
 /// The shortest times a valve may stay open and closed.
 ///
@@ -27,7 +27,7 @@ impl HoldTimes {
     }
 }
 
-/// What the valve is doing and since when.
+/// Valve position and time in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hold {
     on: bool,
@@ -36,7 +36,7 @@ pub struct Hold {
 }
 
 impl Hold {
-    /// A valve that has been closed for long: it may open at once.
+    /// A valve that has been closed for long and may open at once.
     #[must_use]
     pub const fn closed() -> Self {
         Self {
@@ -66,7 +66,7 @@ impl Hold {
         self.since >= times.of(self.on)
     }
 
-    /// A sample at which the valve is shut whatever its hold times say.
+    /// Closes the valve regardless of hold times.
     #[inline]
     pub fn shut(&mut self) {
         self.since = if self.on {
@@ -77,7 +77,7 @@ impl Hold {
         self.on = false;
     }
 
-    /// Takes what is wanted for this sample and returns what the valve does.
+    /// The valve position for a requested one.
     #[inline]
     pub fn pass(&mut self, times: &HoldTimes, wanted: bool) -> bool {
         if wanted != self.on && self.may_switch(times) {

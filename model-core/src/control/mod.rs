@@ -1,9 +1,8 @@
-//! On/off control of the flow with the identified model: what is issued now
-//! arrives a transport delay later, so the laws decide on the flow as it will
-//! be then.
+//! On/off control with the identified model. A command arrives a transport delay later, so the laws decide on
+//! the predicted flow.
 //!
-//! Parameters, state and step are apart as in the rest of the crate. Whatever a
-//! law asks for goes through [`hold`], which keeps the valve's on and off times.
+//! Parameters, state and step are separate, as in the rest of the crate. Every request passes through
+//! [`hold`], which enforces the valve's on and off times.
 
 pub mod ahead;
 pub mod budget;

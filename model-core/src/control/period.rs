@@ -1,7 +1,7 @@
-//! Loop periods, and times in samples of them.
+//! Loop periods and times in samples.
 //!
-//! Whatever is a time to a user (a valve's shortest times, a failsafe's patience) is stated in seconds and becomes
-//! samples here, on the host and on the board alike.
+//! Times are stated in seconds (shortest times of a valve, timeouts) and converted to samples here, on host
+//! and board alike.
 
 /// Shortest loop period that laws and boards are made for, µs.
 pub const SHORTEST_US: u32 = 200;
@@ -20,7 +20,7 @@ pub const LONGEST_US: u32 = 100_000;
 /// ```
 #[must_use]
 pub const fn loop_period_us(period_s: f64) -> Option<u32> {
-    // Saturates, and no number is 0.
+    // The conversion saturates; NaN becomes 0.
     let us = (period_s * 1e6 + 0.5) as u32;
     if us >= SHORTEST_US && us <= LONGEST_US {
         Some(us)
@@ -42,7 +42,7 @@ pub const fn loop_period_us(period_s: f64) -> Option<u32> {
 #[must_use]
 pub const fn samples_at_least(time_s: f64, period_s: f64) -> u32 {
     let samples = time_s / period_s - 1e-3;
-    // Saturates, and no number is 0.
+    // The conversion saturates; NaN becomes 0.
     let whole = samples as u32;
     let up = if (whole as f64) < samples {
         whole.saturating_add(1)

@@ -33,7 +33,7 @@ impl<P: AsRef<[(u32, u32)]>> PulseTrain<P> {
         })
     }
 
-    /// The command at sample `at`, which moves on.
+    /// The command at sample `at`; advances `at`.
     pub fn next(&self, at: &mut u32) -> bool {
         let on = self.is_on(*at);
         *at = if *at + 1 < self.period { *at + 1 } else { 0 };
@@ -51,16 +51,16 @@ impl<P: AsRef<[(u32, u32)]>> PulseTrain<P> {
     }
 }
 
-/// A pulse train behind a valve: what a board plays.
+/// A pulse train with hold times, as a board plays it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pulses<P> {
-    /// What is wanted.
+    /// The requested train.
     pub train: PulseTrain<P>,
-    /// What the valve can do.
+    /// Hold times of the valve.
     pub hold: HoldTimes,
 }
 
-/// Where in its period a [`Pulses`] is, and what the valve does.
+/// Position of a [`Pulses`] in its period, and state of the valve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Played {
     at: u32,
@@ -68,7 +68,7 @@ pub struct Played {
 }
 
 impl Played {
-    /// At the period's beginning, the valve closed for long.
+    /// The start of the period, with the valve closed for long.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -77,7 +77,7 @@ impl Played {
         }
     }
 
-    /// A sample at which the valve is shut; the period begins anew.
+    /// Closes the valve for this sample and restarts the period.
     #[inline]
     pub fn shut(&mut self) {
         self.at = 0;

@@ -1,11 +1,11 @@
-//! References: which can be reached, and how they are approached.
+//! References: reachable interval and ramp.
 
 use crate::real::Real;
 use crate::recursion::Bilinear;
 use core::fmt;
 
-/// The friction a flow can be held at: above what it has without jets, below
-/// what steady blowing gives. In y, of the flow itself (before sensor effects).
+/// The friction that on/off blowing can hold: above the level without jets, below that of steady blowing. In
+/// y, of the flow itself (before sensor effects).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reachable<T> {
     /// Friction without jets; 0 in the paper.
@@ -14,12 +14,12 @@ pub struct Reachable<T> {
     pub high: T,
 }
 
-/// A reference that no on/off command holds.
+/// A reference outside the reachable interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unreachable {
-    /// What was asked for.
+    /// The requested reference.
     pub reference: f64,
-    /// What can be asked for.
+    /// The reachable interval.
     pub reachable: Reachable<f64>,
 }
 
@@ -36,11 +36,10 @@ impl fmt::Display for Unreachable {
 impl core::error::Error for Unreachable {}
 
 impl<T: Real> Reachable<T> {
-    /// From the coefficients, theory 2.2: y_ss(u = 1) = (d + Σb)/(1 − Σa − Σc) and
-    /// d/(1 − Σa) without jets. `None` where a steady value does not exist (an
-    /// integrating or growing model).
+    /// From the coefficients, theory 2.2: y_ss(u = 1) = (d + Σb)/(1 − Σa − Σc) and d/(1 − Σa) without jets.
+    /// `None` where no steady state exists (an integrating or unstable model).
     ///
-    /// Holds for models without jet and flow effects; otherwise let the model run.
+    /// Valid for models without jet and flow effects; otherwise simulate the model.
     #[must_use]
     pub fn of(recursion: &Bilinear<'_, T>) -> Option<Self> {
         let without = recursion.relaxation(|_| T::ZERO);

@@ -1,17 +1,14 @@
 //! The tracking law: holds the friction at a reference with an on/off valve.
 //!
-//! What is issued at sample k arrives at κ(k) = min{m ≥ k : m − h(ỹ_m) ≥ k}.
-//! The law runs the model on from its estimate of the present through everything
-//! already issued until that sample, the delay evaluated at each arrival, and
-//! then half a hold time further under the *other* position of the valve. It
-//! switches when the flow would by then be on the other side of the reference:
-//! the swing that a hold time enforces is centred on the reference instead of
-//! starting from it. At a hold time of one sample this is the one-step-optimal
-//! choice u = 1 ⇔ y* − F > G/2.
+//! A command issued at sample k arrives at κ(k) = min{m ≥ k : m − h(ỹ_m) ≥ k}. The law predicts the flow with
+//! the model from its present estimate through everything already issued up to that sample, with the delay
+//! evaluated at each sample, and then half a hold time further with the *other* valve position. It switches
+//! if the flow would then be on the other side of the reference: the ripple that a hold time causes is
+//! centred on the reference. At a hold time of one sample this is the one-step-optimal choice u = 1 ⇔ y* − F
+//! > G/2.
 //!
-//! Three corrections make it hold on a flow that is not the model: an observer
-//! moves the estimate by a share of each residual, and bias and integral move
-//! what is asked for.
+//! Three corrections handle model errors: an observer corrects the estimate by a share of each residual, and
+//! bias and integral correct the reference.
 
 use crate::checks::look_ahead;
 use crate::control::ahead::{self, Foreknown};
@@ -25,16 +22,15 @@ use crate::history::Memory;
 use crate::model::{Input, Parts, StateOf, observe};
 use crate::real::Real;
 
-/// A reading of the sensor; `None` (or a number that is not finite) where there
-/// is none.
+/// A sensor reading; `None` (or a non-finite number) if there is none.
 pub type Measurement<T> = Option<T>;
 
-/// What the law remembers: the model's state `S` and look-ahead memory for `A` samples.
+/// State of the law: the model's state `S` and look-ahead memory for `A` samples.
 #[derive(Clone, Copy, Debug)]
 pub struct TrackingState<T, S, const A: usize> {
-    /// The model at the estimate of the present; to be read, not to be changed.
+    /// The model state at the present estimate; read only.
     pub model: S,
-    /// Room to look ahead.
+    /// Memory of the look-ahead.
     ahead: [T; A],
     foreknown: Foreknown<T>,
     correction: Correction<T, A>,
@@ -44,28 +40,27 @@ pub struct TrackingState<T, S, const A: usize> {
 }
 
 impl<T: Copy, S, const A: usize> TrackingState<T, S, A> {
-    /// The reference in force at the last sample (ramped).
+    /// The reference of the last sample (ramped).
     #[inline]
     pub fn reference(&self) -> T {
         self.reference
     }
 }
 
-/// What the law decided at a sample, and why.
+/// The decision at a sample with its intermediate results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decision<T> {
     /// The valve's position from now to the next sample.
     pub on: bool,
-    /// The reference in force (ramped).
+    /// The reference at this sample (ramped).
     pub reference: T,
-    /// The friction foreseen where the decision was taken, corrections included.
+    /// Predicted friction at the decision, corrections included.
     pub foreseen: T,
-    /// From now to the arrival of this decision, samples.
+    /// Samples from now to the arrival of this decision.
     pub delay: u16,
     /// The estimate of the present friction.
     pub estimate: T,
-    /// Reading minus what the model says the sensor shows, within the residual
-    /// limit; 0 without a reading.
+    /// Reading minus predicted reading, limited; 0 without a reading.
     pub residual: T,
     /// Filtered error of past predictions.
     pub bias: T,
@@ -142,9 +137,9 @@ impl<T: Real> Tracking<T> {
         Ok(())
     }
 
-    /// One sample: decides the valve's position with all that is known (at the first one nothing is: the valve stays shut), then
-    /// takes in the reading. The reading of a sample therefore acts one sample
-    /// later, and the decision does not wait for the converter.
+    /// One sample: decides the valve's position from everything known before it (nothing at the first sample,
+    /// so the valve stays closed), then takes the reading. A reading therefore acts one sample later, and the
+    /// decision does not wait for the converter.
     ///
     /// Costs at most `A` + 1 model steps, of N1 + N3·(N2 + 1) multiply–adds each.
     pub fn step<M, Y, J, const A: usize>(
@@ -164,11 +159,11 @@ impl<T: Real> Tracking<T> {
         let was_on = state.hold.is_on();
         let target = state.reference + state.correction.integral - state.correction.bias;
         let may_switch = state.hold.may_switch(&self.hold);
-        // At the first sample the past is summed up instead, as long a piece of work as looking ahead: nothing is decided.
+        // At the first sample the cache is filled, which costs as much as a look-ahead; no decision is made.
         let looks = !state
             .foreknown
             .begin(&model.recursion(), &state.model.outputs);
-        // The position to judge: the other one, where the valve is free to take it.
+        // The position to evaluate: the other one, if the valve may switch.
         let look = if looks {
             self.look_ahead(model, state, was_on != may_switch, channels)
         } else {
@@ -219,7 +214,7 @@ impl<T: Real> Tracking<T> {
         }
     }
 
-    /// Runs the model on with the valve at `on` from now.
+    /// Predicts the flow with the valve at `on` from now.
     fn look_ahead<M, Y, J, const A: usize>(
         &self,
         model: &M,
@@ -234,8 +229,7 @@ impl<T: Real> Tracking<T> {
     {
         let hold = self.hold.of(on);
         let valve = u32::from(if on { self.opening } else { self.closing });
-        // Half a hold time beyond the arrival; for an odd one, the mean of the
-        // two samples around it.
+        // Half a hold time after the arrival; for an odd one, the mean of the two neighbouring samples.
         let (near, far) = (valve + hold / 2, valve + hold.div_ceil(2));
         let input = Input {
             command: if on { T::ONE } else { T::ZERO },
@@ -277,18 +271,18 @@ impl<T: Real> Tracking<T> {
     }
 }
 
-/// What looking ahead found.
+/// Result of a look-ahead.
 struct Look<T> {
-    /// The friction half a hold time after the arrival.
+    /// Friction half a hold time after the arrival.
     foreseen: T,
-    /// The friction `lead` samples from now.
+    /// Friction `lead` samples from now.
     at_lead: T,
     /// Samples from now to the arrival.
     delay: u16,
 }
 
 impl<T: Copy> Look<T> {
-    /// No farther than the present `flow`.
+    /// Without a look-ahead: the present `flow`.
     fn none(flow: T) -> Self {
         Self {
             foreseen: flow,
@@ -335,8 +329,8 @@ mod tests {
         }
     }
 
-    /// The law on its own model. `each` is told sample, friction, law and decision, and
-    /// says what is read next where that is not the friction.
+    /// The law on its own model. `each` receives sample, friction, law and decision, and may replace the next
+    /// reading.
     fn on_its_model<T: Real>(
         convention: LagConvention,
         mut law: Tracking<T>,
@@ -368,7 +362,7 @@ mod tests {
         duty: f64,
     }
 
-    /// The law on its own model, judged from 5 s to 20 s.
+    /// The law on its own model, scored from 5 s to 20 s.
     fn run<T: Real>(convention: LagConvention, reference: f64, dwell: u32) -> Run {
         let law = law::<T>(reference, dwell);
         let (mut sum, mut squares, mut low, mut high) = (0.0, 0.0, f64::MAX, f64::MIN);
@@ -472,7 +466,7 @@ mod tests {
         assert!((single.switches_per_s - double.switches_per_s).abs() < 3.0);
     }
 
-    /// A level that the flow goes down to and comes back from without readings.
+    /// The level decays and recovers without readings.
     #[test]
     fn without_readings_the_model_keeps_the_flow_where_it_is() {
         let mut worst = 0.0_f64;
@@ -497,7 +491,7 @@ mod tests {
         let mut law = law::<f64>(0.9, 10);
         assert!(law.set_reference(1.2).is_err());
         assert_eq!(law.reference, 0.9);
-        // Above what blowing gives: steadily on, nothing winds up.
+        // Above the reachable interval the valve stays open and nothing winds up.
         law.reference = 1.5;
         let (mut back_at, mut last) = (None, 0.0);
         on_its_model(LagConvention::OneStep, law, 9000, |k, y, law, decision| {

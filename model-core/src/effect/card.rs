@@ -1,5 +1,5 @@
-//! The identity card of an effect: all that fit, diagnosis, reports and code
-//! generation know of it. What an effect is stands in its own file only.
+//! The card of an effect: all data that fit, diagnosis, reports and code generation use. An effect is defined
+//! in its own file only.
 
 use super::Unit;
 
@@ -12,21 +12,21 @@ pub enum Place {
     Delay,
     /// In the recursion of the flow.
     Flow,
-    /// In what is measured; outside the recursion.
+    /// In the sensor's reading, outside the recursion.
     Sensor,
 }
 
-/// How a parameter enters, for whoever searches it.
+/// How the output depends on a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Influence {
-    /// The output has a derivative in it.
+    /// The output is differentiable with respect to it.
     Smooth,
     /// The output changes in steps (a threshold, a rounded delay).
     Stepwise,
 }
 
-/// Which sign of a parameter is physics. The range that is searched may hold
-/// the other one, so that a fit can show that the physics is another.
+/// Physically possible sign of a parameter. The search range may include the other sign, so that a fit can
+/// reject the physics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sign {
     /// Both.
@@ -42,22 +42,21 @@ pub struct Parameter {
     pub name: &'static str,
     /// Unit.
     pub unit: Unit,
-    /// Lowest value that makes sense, for signals of order 1.
+    /// Lowest plausible value, for signals of order 1.
     pub low: f64,
-    /// Highest value that makes sense.
+    /// Highest plausible value.
     pub high: f64,
-    /// Values from which a search should set out, for signals of order 1; those
-    /// in y per sample are relative to the usual change of y over a sample.
+    /// Starting values of a search, for signals of order 1; those in y per sample are relative to the usual
+    /// change of y per sample.
     pub starts: &'static [f64],
     /// How it enters.
     pub influence: Influence,
-    /// Which sign of it is physics.
+    /// Its physically possible sign.
     pub sign: Sign,
 }
 
 impl Parameter {
-    /// A parameter between the values of `range`, in which the output has a
-    /// derivative; one that cannot be negative keeps its sign.
+    /// A parameter in `range` in which the output is differentiable; a non-negative one keeps its sign.
     #[must_use]
     pub const fn new(
         name: &'static str,
@@ -90,7 +89,7 @@ impl Parameter {
         }
     }
 
-    /// The same, but negative values are no physics, even if they are searched.
+    /// The same, but negative values are not physical even if they are searched.
     #[must_use]
     pub const fn positive(self) -> Self {
         Self {
@@ -99,13 +98,13 @@ impl Parameter {
         }
     }
 
-    /// Whether it spans orders of magnitude and is best searched in its logarithm.
+    /// Whether it spans orders of magnitude and is searched in its logarithm.
     #[must_use]
     pub fn is_logarithmic(&self) -> bool {
         self.low > 0.0 && self.high > 20.0 * self.low
     }
 
-    /// Lowest and highest value for signals of the size that `facts` say.
+    /// Lowest and highest value for signals of the size in `facts`.
     #[must_use]
     pub fn range(&self, facts: &Facts<'_>) -> [f64; 2] {
         let scale = self.unit.scale(facts.y, facts.time, facts.u);
@@ -113,15 +112,14 @@ impl Parameter {
     }
 }
 
-/// What the records and the model so far say, for ranges and starting values.
+/// Facts about records and model, for ranges and starting values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facts<'a> {
     /// Size of y; 1 for signals of order 1, which cards are written for.
     pub y: f64,
     /// Size of u; 1 for on/off commands.
     pub u: f64,
-    /// Size of times; 1 for flows that take from some 10 ms to some s, which
-    /// cards are written for.
+    /// Size of times; 1 for flows with time scales of 10 ms to seconds, for which cards are written.
     pub time: f64,
     /// Root mean square change of y over a sample.
     pub y_per_sample: f64,
@@ -133,13 +131,12 @@ pub struct Facts<'a> {
     pub period: f64,
     /// Length of the longest record, s.
     pub record: f64,
-    /// How long the flow takes without jets to forget all but 1/e, s.
+    /// Time constant of the flow without jets, s.
     pub time_constant: f64,
 }
 
 impl Facts<'_> {
-    /// The value of y below which the share `q` (0–1) of all samples lies; 0
-    /// without samples.
+    /// Quantile of y at the fraction `q` (0–1) of all samples; 0 without samples.
     #[must_use]
     pub fn quantile(&self, q: f64) -> f64 {
         let index = (q * self.sorted_y.len() as f64) as usize;
@@ -147,18 +144,18 @@ impl Facts<'_> {
     }
 }
 
-/// A value from which a search sets out.
+/// A starting value of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StartValue {
     /// A number, for signals of order 1.
     Number(f64),
-    /// The value of y below which this share of all samples lies.
+    /// The quantile of y at this fraction.
     Quantile(f64),
-    /// So many samples longer than the present delay.
+    /// The present delay plus so many samples.
     Delay(f64),
-    /// So many times the flow's time constant.
+    /// This multiple of the flow's time constant.
     TimeConstants(f64),
-    /// So many times the length of a record.
+    /// This multiple of the record length.
     Records(f64),
 }
 
@@ -174,7 +171,7 @@ impl StartValue {
             _ => samples,
         };
         match self {
-            // The usual change of y is nearer to what is sought than its size.
+            // A typical change of y is a better scale for it than the size of y.
             Self::Number(value) if parameter.unit == Unit::YPerSample => value * facts.y_per_sample,
             Self::Number(value) => value * parameter.unit.scale(facts.y, facts.time, facts.u),
             Self::Quantile(q) => facts.quantile(q),
@@ -185,17 +182,16 @@ impl StartValue {
     }
 }
 
-/// Where a search of all parameters of an effect sets out.
+/// Starting points of a search over all parameters of an effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Starts {
-    /// From every combination of the parameters' own starting values.
+    /// All combinations of the parameters' starting values.
     Grid,
-    /// From these, each with one value for every parameter: they depend on each
-    /// other, or on the data.
+    /// These rows, with one value per parameter: for parameters that depend on each other or on the data.
     Rows(&'static [&'static [StartValue]]),
 }
 
-/// What an effect needs to show at all, besides its channel.
+/// Requirements of an effect besides its channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Needs {
     /// Nothing.
@@ -205,7 +201,7 @@ pub enum Needs {
 }
 
 impl Needs {
-    /// Why the effect cannot show where the input is on/off or is not; none if it can.
+    /// Why the effect is not identifiable with this kind of input; none if it is.
     #[must_use]
     pub fn unmet(self, on_off: bool) -> Option<&'static str> {
         match self {
@@ -217,28 +213,26 @@ impl Needs {
     }
 }
 
-/// From all parameters of an effect to a number and its unit, as a person would
-/// say them.
+/// Conversion of all parameters of an effect to one number with its unit, for reports.
 pub type Said = fn(&[f64]) -> (f64, &'static str);
 
-/// The parameter with which an effect vanishes as it goes to 0, and how it is said.
+/// The parameter at whose zero an effect vanishes, with its wording.
 #[derive(Clone, Copy, Debug)]
 pub struct Amplitude {
     /// The parameter's name.
     pub parameter: &'static str,
-    /// The effect in a sentence: "a lag of the valve" (above 3 ms would have been seen).
+    /// The effect in a phrase: "a lag of the valve" (above 3 ms would have been detected).
     pub words: &'static str,
-    /// Whether what the effect adds grows in proportion to it, all else as it is.
+    /// Whether the effect's contribution is proportional to it, other parameters constant.
     pub linear: bool,
     /// Whether all other parameters vanish with it.
     pub together: bool,
-    /// What people imagine more easily than the parameter; none: the parameter
-    /// [as it is spoken](Unit::spoken).
+    /// A more intuitive number than the parameter; none: the parameter [as spoken](Unit::spoken).
     pub said: Option<Said>,
 }
 
 impl Amplitude {
-    /// An amplitude to which the effect is not proportional, said in its unit.
+    /// An amplitude to which the effect is not proportional, in its own unit.
     #[must_use]
     pub const fn new(parameter: &'static str, words: &'static str) -> Self {
         Self {
@@ -268,7 +262,7 @@ impl Amplitude {
         }
     }
 
-    /// The same, said otherwise.
+    /// The same with another number for reports.
     #[must_use]
     pub const fn said(self, said: Said) -> Self {
         Self {
@@ -278,34 +272,32 @@ impl Amplitude {
     }
 }
 
-/// How the effect's Rust type is written in generated code; `T` is the type of
-/// its numbers.
+/// The effect's Rust type in generated code; `T` is the number type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RustType {
-    /// `Name`: it has no numbers.
+    /// `Name`, without numbers.
     Plain,
     /// `Name<T>`.
     Numbers,
-    /// `Name<T, N>`, with N samples of memory: 3 more than the parameter with
-    /// this index is long, in s.
+    /// `Name<T, N>` with N samples of memory: 3 more than the length in s of the parameter with this index.
     Buffer(usize),
 }
 
-/// What the card of a delay law says besides.
+/// Additional card of a delay law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LawCard {
     /// The law in words, with `{}` for each parameter: "{} + {}·exp(−{}·ỹ) samples".
     pub words: &'static str,
-    /// Whether it holds edges of the command back, so that jets are not on/off
-    /// any more. Its delays are then not meant to be rounded.
+    /// Whether it delays edges of the command separately, so that jets are no longer on/off. Its delays are
+    /// then not rounded.
     pub shapes_command: bool,
-    /// The public fields of its type, if they are the parameters as they are, in
-    /// their order: generated code can then have it as a constant.
+    /// The public fields of its type, if they are the parameters in order: generated code can then have it as
+    /// a constant.
     pub fields: Option<&'static [&'static str]>,
 }
 
 impl LawCard {
-    /// A law that leaves the command alone, its words yet to be said.
+    /// A law that does not shape the command; without its words.
     pub const PLAIN: Self = Self {
         words: "",
         shapes_command: false,
@@ -320,7 +312,7 @@ pub struct Spec {
     pub name: &'static str,
     /// Rust path of the effect below `model_core::effects`, for generated code.
     pub rust: &'static str,
-    /// How its type is written there.
+    /// Its Rust type there.
     pub rust_type: RustType,
     /// Where it acts.
     pub place: Place,
@@ -330,30 +322,29 @@ pub struct Spec {
     pub equation: &'static str,
     /// Its parameters, in the order of [`Physics::new`](super::Physics::new).
     pub parameters: &'static [Parameter],
-    /// Where a search of the parameters sets out.
+    /// Starting points of a search over the parameters.
     pub starts: Starts,
-    /// How large it is, if that is one number.
+    /// Its amplitude parameter, if it has one.
     pub amplitude: Option<Amplitude>,
     /// The measured channel it needs besides u and y.
     pub channel: Option<&'static str>,
-    /// Whether the reference of its setting is the reading at which the sensor was calibrated, y > 0; 1 where nobody says.
+    /// Whether the reference of its setting is the calibration reading of the sensor, y > 0; 1 by default.
     pub calibrated: bool,
-    /// What else it needs to show.
+    /// Further requirements.
     pub needs: Needs,
-    /// Whether it belongs to base models, so that it is never what one lacks: a
-    /// constant delay, the sensor's zero.
+    /// Whether it is a base term, which is never reported as missing: a constant delay, the sensor's offset.
     pub base: bool,
-    /// Whether it acts against a motion: it comes after all that drives the flow, or sets its rate.
+    /// Whether it opposes or scales a motion: it is applied after all driving effects.
     pub resists: bool,
-    /// Delay laws: what else is known of them.
+    /// Additional card of a delay law.
     pub law: Option<LawCard>,
-    /// Where to read more.
+    /// Literature source.
     pub source: &'static str,
 }
 
 impl Spec {
-    /// What most cards have in common; an effect's own card says what it is and what differs: its parameters are
-    /// numbers, set out from every combination of their starting values, and need nothing.
+    /// Defaults of a card: number parameters, starts on a grid, no requirements. An effect's card overrides
+    /// what differs.
     pub const PLAIN: Self = Self {
         name: "",
         rust: "",
@@ -407,7 +398,7 @@ mod tests {
         assert_eq!(value(StartValue::Quantile(0.5), Unit::Y), 10.0);
         assert_eq!(value(StartValue::Delay(-6.0), Unit::Samples), 34.0);
         assert_eq!(value(StartValue::Delay(-6.0), Unit::Second), 0.068);
-        // Not below a sample, not above the range.
+        // Limited to one sample from below, and to the range from above.
         assert_eq!(value(StartValue::Delay(-60.0), Unit::Second), 0.002);
         assert_eq!(value(StartValue::Delay(1e6), Unit::Second), 1.0);
         assert!((value(StartValue::TimeConstants(2.0), Unit::Samples) - 100.0).abs() < 1e-9);

@@ -1,9 +1,8 @@
-//! What a physical effect is.
+//! Interface of a physical effect.
 //!
-//! The signals run in the order of the physics: command → jets → transport
-//! delay → flow → sensor. An effect acts at one place and leaves the recursion
-//! alone: it shapes the jet strength before the delay, adds to what drives the
-//! flow, or changes what the sensor shows of the flow.
+//! Signals flow in physical order: command → jets → transport delay → flow → sensor. An effect acts at one
+//! place and leaves the recursion unchanged: it shapes the jet strength before the delay, adds to the drive
+//! of the flow, or changes the sensor's reading.
 
 mod card;
 mod unit;
@@ -16,19 +15,19 @@ pub use unit::Unit;
 
 use crate::real::Real;
 
-/// What an effect is told about the rig.
+/// Setting of an effect on a rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting<T> {
     /// Sample period, s.
     pub period: T,
-    /// Which of the [`Instant::channels`] belongs to the effect.
+    /// Index of the effect's channel in [`Instant::channels`].
     pub channel: usize,
-    /// The reference of that channel, usually its mean, in its own unit; or the reading at which a sensor was
-    /// [calibrated](Spec::calibrated).
+    /// The reference of that channel, usually its mean, in its own unit; or the
+    /// [calibration](Spec::calibrated) reading of a sensor.
     pub reference: T,
 }
 
-/// What an effect sees at a sample, besides its own place.
+/// Signals at a sample that every effect can read.
 #[derive(Clone, Copy, Debug)]
 pub struct Instant<'a, T> {
     /// The command u_k.
@@ -38,34 +37,34 @@ pub struct Instant<'a, T> {
     /// The jet strength that drives the flow from this sample to the next; 0
     /// while the jets are being shaped.
     pub arrived: T,
-    /// The jet strength at the flow at this very instant, j(t_k − h). Differs
-    /// from [`arrived`](Self::arrived) where an edge arrives between two samples.
+    /// The jet strength at the flow at this instant, j(t_k − h). Differs from [`arrived`](Self::arrived) if
+    /// an edge arrives between two samples.
     pub present: T,
     /// Measured channels, in the order of the model's settings.
     pub channels: &'a [T],
 }
 
-/// What a flow effect sees at a sample.
+/// Signals at a sample that a flow effect can read.
 #[derive(Clone, Copy, Debug)]
 pub struct Flow<T> {
-    /// s_k, the friction now.
+    /// s_k, the present friction.
     pub now: T,
     /// s_{k−1}.
     pub before: T,
-    /// s_{k+1} as it would be with the flow effects that come before this one and no
-    /// others: what changes the rate of a motion, or resists it, must know the motion.
+    /// s_{k+1} including the flow effects before this one: effects that scale or oppose a motion depend on
+    /// it.
     pub next: T,
-    /// 1 − Σa − Σc·j of the lags below [`SHORTEST_MEMORY`](crate::recursion::SHORTEST_MEMORY), per sample: the rate
-    /// at which the flow goes to the level of the moment, which turns a level into a drive.
+    /// 1 − Σa − Σc·j of the lags below [`SHORTEST_MEMORY`](crate::recursion::SHORTEST_MEMORY), per sample:
+    /// the relaxation rate, which converts a level into a drive.
     pub relaxation: T,
-    /// The separated flow's share of `relaxation`: 1 without jets, 0 under full ones.
+    /// The separated flow's share of `relaxation`: 1 without jets, 0 under full jets.
     pub separated: T,
-    /// The separated flow's share of the motion, s_{k+1} − s_k.
+    /// The separated flow's part of the motion s_{k+1} − s_k.
     pub released: T,
 }
 
 impl<T: Real> Flow<T> {
-    /// The same with `drive` added to what comes next.
+    /// The same with `drive` added to `next`.
     #[inline]
     #[must_use]
     pub fn driven_by(&self, drive: T) -> Self {
@@ -77,36 +76,36 @@ impl<T: Real> Flow<T> {
     }
 }
 
-/// A physical effect, prepared for a sample period.
+/// A physical effect prepared for a sample period.
 ///
-/// Parameters and state are apart: the effect itself is constant, `State` is
-/// plain data. Every hook passes its signal through unless the effect acts there.
+/// Parameters and state are separate: the effect is constant, `State` is plain data. Every hook returns its
+/// signal unchanged unless the effect acts there.
 pub trait Effect<T: Real> {
-    /// What the effect remembers.
+    /// State of the effect.
     type State: Clone;
 
-    /// The state at the record's start: at rest.
+    /// The state at rest, at the start of a record.
     fn start(&self) -> Self::State;
 
-    /// Shapes the jet strength; called once a sample, before the delay.
+    /// Shapes the jet strength; called once per sample, before the delay.
     #[inline]
     fn jet(&self, _state: &mut Self::State, jet: T, _at: &Instant<'_, T>) -> T {
         jet
     }
 
-    /// Whether [`drive`](Self::drive) does anything.
+    /// Whether [`drive`](Self::drive) can be non-zero.
     #[inline]
     fn drives(&self) -> bool {
         false
     }
 
-    /// What is added to s_{k+1}; called once a sample.
+    /// Contribution to s_{k+1}; called once per sample.
     #[inline]
     fn drive(&self, _state: &mut Self::State, _flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
         T::ZERO
     }
 
-    /// What the sensor shows of `signal`; called once a sample.
+    /// Reading for `signal`; called once per sample.
     #[inline]
     fn sense(&self, _state: &mut Self::State, signal: T, _at: &Instant<'_, T>) -> T {
         signal

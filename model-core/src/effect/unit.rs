@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-/// The unit of a parameter. y is the measured friction, u the command, whatever
-/// they are measured in; a sample is one of the record's.
+/// The unit of a parameter. y is the measured friction and u the command, in any unit; a sample is one
+/// sampling period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
     /// A ratio.
@@ -24,17 +24,17 @@ pub enum Unit {
     PerYSquared,
     /// A change of y over a sample.
     YPerSample,
-    /// What turns a squared change of y over a sample into a change over a sample.
+    /// Converts a squared change of y per sample into a change per sample.
     SamplesPerY,
     /// 1/u.
     PerU,
     /// 1/u².
     PerUSquared,
-    /// Of a user's own effect, in words; nothing is known of it.
+    /// A user effect's own unit, in words.
     Other(&'static str),
 }
 
-/// What is printed for each unit.
+/// Printed symbols.
 const SYMBOLS: [(Unit, &str); 12] = [
     (Unit::None, "-"),
     (Unit::Second, "s"),
@@ -68,8 +68,8 @@ impl Unit {
         known.map_or(Self::Other(symbol), |(unit, _)| *unit)
     }
 
-    /// By what a value in this unit is multiplied to mean the same when all y
-    /// are multiplied by `y`, all times by `time` (the samples stay) and all u by `u`.
+    /// Conversion factor of a value in this unit when y is multiplied by `y`, times by `time` (samples stay)
+    /// and u by `u`.
     #[must_use]
     pub fn scale(self, y: f64, time: f64, u: f64) -> f64 {
         match self {
@@ -84,7 +84,7 @@ impl Unit {
         }
     }
 
-    /// `value` as a person would say it, with what is said after the number.
+    /// `value` with its unit as spoken in a report.
     #[must_use]
     pub fn spoken(self, value: f64) -> (f64, &'static str) {
         match self {
@@ -116,7 +116,7 @@ mod tests {
         assert_eq!(Unit::Other("kg").symbol(), "kg");
     }
 
-    /// A squared change times the drag's coefficient is a change, in any unit of y.
+    /// A squared change times the drag coefficient is a change, in any unit of y.
     #[test]
     fn scales_follow_the_dimensions() {
         let (y, time, u) = (50.0, 20.0, 3.0);

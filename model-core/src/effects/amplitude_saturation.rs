@@ -1,4 +1,4 @@
-//! The flow resists large amplitudes: a cubic term, hardening or softening.
+//! Resistance of the flow to large amplitudes: a cubic term, hardening or softening.
 
 use crate::effect::{
     Amplitude, Effect, Flow, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,

@@ -1,12 +1,12 @@
-//! Once attached the flow stays attached at a friction at which it would not have attached.
+//! Hysteresis of attachment: an attached flow stays attached at a friction at which it would not attach.
 
 use crate::effect::{
     Amplitude, Effect, Flow, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
-/// A relay r with memory, 0→1 when s > θ_hi and 1→0 when s < θ_lo, adds g·r to
-/// the drive: in equilibrium it moves the friction by g.
+/// A relay r with hysteresis, 0→1 when s > θ_hi and 1→0 when s < θ_lo, adds g·r to the drive; in equilibrium
+/// it raises the friction by g.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AttachmentHysteresis<T> {
     upper: T,
@@ -70,7 +70,7 @@ mod tests {
     #[test]
     fn between_the_thresholds_the_flow_stays_what_it_was() {
         let relay: AttachmentHysteresis<f64> = prepared(&[0.6, 0.3, 0.2]);
-        // To 0.45 from below, then over the upper threshold, then to 0.45 again.
+        // To 0.45 from below, then above the upper threshold, then back to 0.45.
         let s = flow(
             &relay,
             |k| if (600..1200).contains(&k) { 0.7 } else { 0.45 },
@@ -79,7 +79,7 @@ mod tests {
         assert!((s[1199] - 0.9).abs() < 1e-4, "{}", s[1199]);
         assert!((s[1999] - 0.65).abs() < 1e-4, "{}", s[1999]);
         let s = flow(&relay, |k| if k < 800 { 0.7 } else { 0.0 });
-        // Attached at 0 the flow would stay at the gain: it lets go below the lower threshold.
+        // Attached at a target of 0 the equilibrium is the gain: the flow detaches below the lower threshold.
         assert!(s[1999].abs() < 1e-4, "{}", s[1999]);
     }
 }

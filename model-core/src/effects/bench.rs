@@ -1,4 +1,4 @@
-//! What the tests of all effects share, and what every effect of the catalogue must do.
+//! Shared test functions, and properties that every effect of the catalogue must have.
 
 use super::{AnyEffect, SPECS};
 use crate::delay::FixedDelay;
@@ -32,14 +32,14 @@ fn instant(jet: f64, channels: &[f64]) -> Instant<'_, f64> {
     }
 }
 
-/// What becomes of a jet, one second of it.
+/// The jet strength after the effect over one second.
 pub(super) fn jets<E: Effect<f64>>(effect: &E, jet: impl Fn(usize) -> f64) -> Vec<f64> {
     let mut state = effect.start();
     let shaped = |k| effect.jet(&mut state, jet(k), &instant(jet(k), &[]));
     (0..1000).map(shaped).collect()
 }
 
-/// What the sensor shows of a signal while `jet` arrives, one second of it.
+/// The reading of a signal over one second while `jet` arrives.
 pub(super) fn readings<E: Effect<f64>>(
     effect: &E,
     signal: impl Fn(usize) -> f64,
@@ -50,8 +50,7 @@ pub(super) fn readings<E: Effect<f64>>(
     (0..1000).map(shown).collect()
 }
 
-/// A first-order flow of 50 samples that goes to `level` from rest, with what the
-/// effect adds, two seconds of it.
+/// A first-order flow of 50 samples that rises to `level` from rest, with the effect, over two seconds.
 pub(super) fn flow<E: Effect<f64>>(effect: &E, level: impl Fn(usize) -> f64) -> Vec<f64> {
     const RELAXATION: f64 = 0.02;
     let mut state = effect.start();
@@ -73,8 +72,8 @@ pub(super) fn flow<E: Effect<f64>>(effect: &E, level: impl Fn(usize) -> f64) -> 
     (0..2000).map(step).collect()
 }
 
-/// A flow with the effect under pulses of several strengths, in y of size `y` and
-/// with samples of `period` s.
+/// A flow with the effect under pulses of several strengths, for y of size `y` and a sample period of
+/// `period` s.
 fn run<T: Real>(spec: &Spec, parameters: &[f64], y: f64, period: f64) -> Vec<f64> {
     let number = T::from_f64;
     let parameters: Vec<T> = parameters.iter().map(|p| number(*p)).collect();
@@ -107,7 +106,7 @@ fn run<T: Real>(spec: &Spec, parameters: &[f64], y: f64, period: f64) -> Vec<f64
     each.collect()
 }
 
-/// The middle of the starting values: a value that the effect shows with.
+/// The middle of the starting values.
 fn middle(spec: &Spec) -> Vec<f64> {
     let each = spec.parameters.iter();
     each.map(|p| p.starts[p.starts.len() / 2]).collect()
@@ -124,7 +123,7 @@ fn single_precision_follows_double() {
             run::<f32>(spec, &middle(spec), 1.0, 0.001),
             run::<f64>(spec, &middle(spec), 1.0, 0.001),
         );
-        // A threshold may be crossed a sample earlier.
+        // A threshold may be crossed one sample earlier.
         let stepwise = |p: &crate::effect::Parameter| p.influence == Influence::Stepwise;
         let near = if spec.parameters.iter().any(stepwise) {
             1e-2
@@ -138,7 +137,7 @@ fn single_precision_follows_double() {
     }
 }
 
-/// The same flow on another clock: with times as their units say, the same samples.
+/// Scaling all times according to their units gives the same samples.
 #[test]
 fn clocks_do_not_matter() {
     for spec in effects() {
@@ -157,8 +156,8 @@ fn clocks_do_not_matter() {
     }
 }
 
-/// The same flow in another unit of y: with parameters as their units say, the
-/// same in that unit. King's law is written for a friction of 0 to 1.
+/// Scaling y and the parameters according to their units gives the same run. King's law assumes a friction of
+/// 0 to 1.
 #[test]
 fn units_of_y_do_not_matter() {
     for spec in effects().filter(|spec| spec.name != super::HotFilmNonlinearity::<f64>::SPEC.name) {
@@ -178,7 +177,7 @@ fn units_of_y_do_not_matter() {
     }
 }
 
-/// What is linear in its amplitude doubles with it, and all vanish without it.
+/// A linear effect doubles with its amplitude, and every effect vanishes at amplitude 0.
 #[test]
 fn amplitudes_are_what_their_cards_say() {
     for spec in effects() {
@@ -207,7 +206,7 @@ fn amplitudes_are_what_their_cards_say() {
     }
 }
 
-/// What the effect adds to jet, drive and reading when all it sees is given.
+/// Contribution of the effect to jet, drive and reading for given signals.
 fn added(spec: &Spec, parameters: &[f64]) -> Vec<f64> {
     let effect = AnyEffect::new(spec.name, parameters, &setting::<f64>(0.001)).expect("known");
     let mut state = effect.start();

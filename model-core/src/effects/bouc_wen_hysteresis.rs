@@ -5,9 +5,8 @@ use crate::effect::{
 };
 use crate::real::Real;
 
-/// ż = A·ṡ − β·|ṡ|·z − γ·ṡ·|z|; adds −α·z to the drive. Rate-independent,
-/// so ṡ enters through the change over a sample. Only α·A can be told from data:
-/// A is 1.
+/// ż = A·ṡ − β·|ṡ|·z − γ·ṡ·|z|; adds −α·z to the drive. Rate-independent: ṡ enters through the change per
+/// sample. Only α·A is identifiable, so A is 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoucWenHysteresis<T> {
     stiffness: T,
@@ -37,7 +36,7 @@ impl<T: Real> Effect<T> for BoucWenHysteresis<T> {
     }
 }
 
-/// α stands for itself: the share of what it multiplies depends on the loop.
+/// α is reported alone, because the share of its factor depends on the loop.
 fn alpha(parameters: &[f64]) -> (f64, &'static str) {
     let [_, _, _, alpha] = take(parameters);
     (alpha, "(alpha)")

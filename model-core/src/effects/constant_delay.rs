@@ -6,8 +6,7 @@ use crate::effect::{
 };
 use crate::real::Real;
 
-/// h, samples, whatever the flow does: eq. (3) without the rounding of its delays.
-/// Base models have it, so it is never what a model lacks.
+/// h, samples, independent of the flow: eq. (3) without rounding. A base term, never reported as missing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConstantDelay<T> {
     /// h, samples.

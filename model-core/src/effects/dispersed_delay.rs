@@ -6,15 +6,15 @@
 use crate::effect::{Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take};
 use crate::real::Real;
 
-/// Three lags in series, σ/√3 each: the delay of a jet is spread with standard deviation σ about its mean, which is
-/// √3·σ longer. Exact for a jet that holds over the sample, stage by stage.
+/// Three lags in series, σ/√3 each: the delay has the standard deviation σ and is √3·σ longer in the mean.
+/// Exact, stage by stage, for a jet that is constant over the sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DispersedDelay<T> {
     share: T,
 }
 
 impl<T: Real> Effect<T> for DispersedDelay<T> {
-    /// The jet behind each of the lags.
+    /// The jet after each of the lags.
     type State = [T; 3];
     fn start(&self) -> [T; 3] {
         [T::ZERO; 3]
@@ -55,7 +55,7 @@ impl<T: Real> Physics<T> for DispersedDelay<T> {
     }
 }
 
-/// Standard deviation of three equal lags in series, in times of one.
+/// Standard deviation of three equal lags in series, relative to one.
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Part of the jet arrives a second time, later.
+//! A delayed second arrival of part of the jet.
 
 use crate::delay::Tap;
 use crate::effect::{
@@ -68,7 +68,7 @@ mod tests {
         let j = jets(&echo, |k| if k < 10 { 0.0 } else { 1.0 });
         assert_eq!(j[10], 1.0);
         assert_eq!(j[39], 1.0);
-        // Half of the way between two samples.
+        // Half way between two samples.
         assert!((j[40] - 0.875).abs() < 1e-9, "{}", j[40]);
         assert!((j[41] - 0.75).abs() < 1e-9 && (j[999] - 0.75).abs() < 1e-9);
     }

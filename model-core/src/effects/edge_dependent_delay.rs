@@ -1,5 +1,5 @@
-//! Rising and falling edges of the command take different times to arrive:
-//! attachment has to work its way through the separated flow, release does not.
+//! Different delays of rising and falling edges: attachment propagates through the separated flow, release
+//! does not.
 
 use crate::delay::Transport;
 use crate::effect::{
@@ -7,38 +7,32 @@ use crate::effect::{
 };
 use crate::real::Real;
 
-/// Rising edges arrive after one delay, falling edges after another.
-///
-/// The edge that travels longer is held back by the difference before the jets,
-/// and everything then travels for the shorter time; a pulse (or gap) shorter
-/// than the difference never arrives, nor does a level of a graded command that
-/// changes again within it. Delays need not be whole samples: an edge
-/// between samples is a sample of part strength.
+/// Rising and falling edges have different delays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeDependentDelay<T> {
     /// The shorter delay, samples.
     shorter: T,
-    /// How long rising edges are held back, samples.
+    /// Additional delay of rising edges, samples.
     hold_rise: T,
-    /// How long falling edges are held back, samples.
+    /// Additional delay of falling edges, samples.
     hold_fall: T,
 }
 
-/// How long the command has been what it is.
+/// The duration of the present command level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Run<T> {
     /// Its level.
     level: T,
-    /// What had got through when it changed to that level.
+    /// The passed level when it changed to that level.
     before: T,
-    /// What has got through.
+    /// The passed level.
     through: T,
     samples: u32,
 }
 
 impl<T: Real> Transport<T> for EdgeDependentDelay<T> {
     type State = Run<T>;
-    /// Off for ever.
+    /// Off since ever.
     fn start(&self) -> Run<T> {
         Run {
             level: T::ZERO,
@@ -60,7 +54,7 @@ impl<T: Real> Transport<T> for EdgeDependentDelay<T> {
                 samples: 1,
             };
         }
-        // Beyond 2²⁰ samples no edge is under way; the count stays exact in f32.
+        // Beyond 2²⁰ samples no edge is pending; the count stays exact in f32.
         let since = T::from_count(run.samples.min(1 << 20));
         let hold = if run.level > run.before {
             self.hold_rise

@@ -1,4 +1,4 @@
-//! The valve's current is seen by the sensor's cable, at once.
+//! Direct coupling of the valve's current into the sensor's cable.
 
 use crate::effect::{
     Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,

@@ -1,4 +1,4 @@
-//! The free stream changes, and with it the strength of the jets relative to it.
+//! Variation of the free stream, which changes the relative strength of the jets.
 
 use crate::effect::{
     Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
@@ -18,7 +18,7 @@ impl<T: Real> Effect<T> for FreeStreamVariation<T> {
     fn start(&self) {}
     #[inline]
     fn jet(&self, _state: &mut (), jet: T, at: &Instant<'_, T>) -> T {
-        // A channel that is not connected counts as being at its reference.
+        // An unconnected channel counts as at its reference.
         let speed = at
             .channels
             .get(self.channel)

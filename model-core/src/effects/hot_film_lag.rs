@@ -1,11 +1,11 @@
-//! The hot-film and its substrate take time to follow the friction.
+//! Lag of the hot film and its substrate.
 
 use crate::effect::{
     Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
-/// τ·ẏ = s − y, exact for a friction that runs straight between samples.
+/// τ·ẏ = s − y, exact for a friction that is linear between samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HotFilmLag<T> {
     kept: T,
@@ -13,7 +13,7 @@ pub struct HotFilmLag<T> {
     from_now: T,
 }
 
-/// What the film shows and what it was shown.
+/// Output and last input of the film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Film<T> {
     shown: T,

@@ -1,4 +1,4 @@
-//! The hot-film's voltage is not linear in the wall shear stress (King's law).
+//! Nonlinearity of the hot-film's voltage in the wall shear stress (King's law).
 
 use crate::effect::{Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take};
 use crate::real::Real;
@@ -87,11 +87,11 @@ mod tests {
         assert!(y[250].abs() < 1e-12 && (y[750] - 1.0).abs() < 1e-12);
         assert!(y[500] > 0.6, "concave: {}", y[500]);
         assert!(y.windows(2).all(|pair| pair[1] >= pair[0]));
-        // It cannot tell a reversed flow.
+        // The sign is lost.
         assert_eq!(y[0], y[200]);
     }
 
-    /// In volts it is the same film, if it is calibrated at as many.
+    /// In volts it is the same film, if the calibration is scaled too.
     #[test]
     fn its_calibration_goes_with_the_unit() {
         let (plain, volts) = (film(3.0, 0.05, 1.0), film(3.0, 0.25, 5.0));
@@ -106,7 +106,7 @@ mod tests {
         );
     }
 
-    /// For a weak overheat E is linear in (s + s0)^(1/3).
+    /// For a small overheat E is linear in (s + s0)^(1/3).
     #[test]
     fn a_small_ratio_leaves_the_cube_root() {
         let film = film(1e-6, 0.1, 1.0);

@@ -1,4 +1,4 @@
-//! The jet's effect is not proportional to the command (more than two levels).
+//! A jet that is not proportional to the command (more than two levels).
 
 use crate::effect::{Effect, Instant, Needs, Parameter, Physics, Place, Setting, Spec, Unit, take};
 use crate::real::Real;

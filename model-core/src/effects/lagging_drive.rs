@@ -13,9 +13,9 @@ use crate::real::Real;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaggingDrive<T> {
     reversal: T,
-    /// What w keeps of itself over a sample.
+    /// Decay factor of w per sample.
     kept: T,
-    /// The mean of that over the sample.
+    /// Mean of the decay over the sample.
     mean: T,
 }
 
@@ -27,7 +27,7 @@ impl<T: Real> Effect<T> for LaggingDrive<T> {
     }
     #[inline]
     fn jet(&self, lagging: &mut T, jet: T, _at: &Instant<'_, T>) -> T {
-        // What a flow that integrates its drive receives: the mean over the sample.
+        // The mean over the sample, as an integrating flow receives it.
         let left = (jet - *lagging) * self.mean;
         *lagging = jet + (*lagging - jet) * self.kept;
         jet - (T::ONE + self.reversal) * left
@@ -76,7 +76,7 @@ mod tests {
         let j = jets(&wrong, |k| if k < 500 { 1.0 } else { 0.0 });
         assert!((j[0] + 0.5).abs() < 0.03, "{}", j[0]);
         assert!((j[499] - 1.0).abs() < 1e-6);
-        // The other way round at the falling edge.
+        // Opposite sign at the falling edge.
         assert!((j[500] - 1.5).abs() < 0.03, "{}", j[500]);
         assert!(j[999].abs() < 1e-6);
         // ∫(j − 1) dt = −(1 + g)·τ.

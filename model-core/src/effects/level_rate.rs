@@ -75,7 +75,7 @@ mod tests {
         for s in [&slow, &plain, &fast] {
             assert!((s[1999] - 0.8).abs() < 1e-6);
         }
-        // The first step starts from 0, where the rate is what it was.
+        // The first step starts from 0, where the rate is unchanged.
         assert_eq!(slow[0], plain[0]);
         assert!(slow[40] < plain[40] && plain[40] < fast[40]);
     }
@@ -87,8 +87,7 @@ mod tests {
         assert_eq!(crate::effects::spec(name).map(|spec| spec.name), Some(name));
     }
 
-    /// A latch that is always on raises the level that the flow tends to, and that way is gone at
-    /// the same rate.
+    /// A latch that is always on raises the level of the flow, which is approached at the same rate.
     #[test]
     fn it_is_the_rate_of_what_other_effects_drive_too() {
         let latch: AttachmentHysteresis<f64> = prepared(&[-0.5, -0.6, 0.3]);

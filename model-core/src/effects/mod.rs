@@ -40,7 +40,7 @@ use crate::delay::Transport;
 use crate::effect::{Effect, Flow, Instant, Physics, Place, Setting, Spec};
 use crate::real::Real;
 
-/// Samples that an effect of [`AnyEffect`] remembers at most.
+/// Longest memory of an effect of [`AnyEffect`], samples.
 pub const LONGEST_BUFFER: usize = 2048;
 
 macro_rules! delay_laws {
@@ -59,7 +59,7 @@ macro_rules! delay_laws {
             $(#[doc = concat!("of `", stringify!($file), "`")] $law(<$law<T> as Transport<T>>::State),)+
         }
 
-        /// All delay laws, those of base models among them.
+        /// All delay laws, base terms included.
         pub const LAWS: &[Spec] = &[$(<$law<f64> as Physics<f64>>::SPEC),+];
 
         impl<T: Real> AnyTransport<T> {
@@ -125,14 +125,13 @@ macro_rules! catalogue {
             $(#[doc = concat!("of `", stringify!($file), "`")] $effect(<$type as Effect<T>>::State),)+
         }
 
-        /// The cards of the effects that are no delay laws.
+        /// The cards of the effects other than delay laws.
         const EFFECTS: &[Spec] = &[
             $({ #[allow(dead_code, reason = "not every effect has numbers")] type T = f64; <$type as Physics<f64>>::SPEC },)+
         ];
 
         impl<T: Real> AnyEffect<T> {
-            /// The effect called `name`, prepared; `None` for an unknown name or
-            /// a delay law.
+            /// The effect called `name`, prepared; `None` for an unknown name or a delay law.
             #[must_use]
             pub fn new(name: &str, parameters: &[T], setting: &Setting<T>) -> Option<Self> {
                 $(if name == <$type as Physics<T>>::SPEC.name {
@@ -183,7 +182,7 @@ delay_laws! {
     edge_dependent_delay::EdgeDependentDelay,
 }
 
-// Within a place, in the order in which the physics runs.
+// Within a place, in physical order.
 catalogue! {
     valve_lag::ValveLag: ValveLag<T>,
     plenum_droop::PlenumDroop: PlenumDroop<T>,
@@ -211,31 +210,29 @@ catalogue! {
     zero_offset::ZeroOffset: ZeroOffset<T>,
 }
 
-/// The effects that a model can lack, in the order of the physics: jet, delay,
-/// flow, sensor.
+/// The effects that can be missing, in physical order: jet, delay, flow, sensor.
 pub const SPECS: &[Spec] = &in_order::<{ lacking(LAWS) + lacking(EFFECTS) }>();
 
-/// The card of the sensor's zero: a nuisance that belongs to a base model, never a
-/// missing effect.
+/// The card of the sensor's offset, a base term.
 pub const ZERO_OFFSET: &Spec = &<ZeroOffset<f64> as Physics<f64>>::SPEC;
 
-/// The card of a rate that depends on the level: another one.
+/// The card of a rate that depends on the level, a base term.
 pub const LEVEL_RATE: &Spec = &<LevelRate<f64> as Physics<f64>>::SPEC;
 
-/// The card of a slow wake: a third one.
+/// The card of a slow wake, a base term.
 pub const SLOW_WAKE: &Spec = &<SlowWake<f64> as Physics<f64>>::SPEC;
 
-/// The card of a delay that turbulence spreads.
+/// The card of a delay dispersed by turbulence, a base term.
 pub const DISPERSED_DELAY: &Spec = &<DispersedDelay<f64> as Physics<f64>>::SPEC;
 
-/// The card of a drive that lags the jets, at first in the wrong direction.
+/// The card of a drive that lags the jets, possibly with inverse response; a base term.
 pub const LAGGING_DRIVE: &Spec = &<LaggingDrive<f64> as Physics<f64>>::SPEC;
 
-/// Base terms in the path of the jets: a search tries each from all starting values of its card.
+/// Base terms in the jet path: a search tries each from all starting values of its card.
 pub const PATH_TERMS: [&Spec; 2] = [DISPERSED_DELAY, LAGGING_DRIVE];
 
-/// The nuisances that a base model may have, after all effects but those that resist a motion: a rate is that of
-/// all that drives the flow.
+/// The base terms with a card, in their order: after all effects except those that oppose a motion, because a
+/// rate acts on everything that drives the flow.
 pub const NUISANCES: [&Spec; 5] = [
     DISPERSED_DELAY,
     LAGGING_DRIVE,
@@ -244,7 +241,7 @@ pub const NUISANCES: [&Spec; 5] = [
     ZERO_OFFSET,
 ];
 
-/// How many of `specs` a model can lack.
+/// Number of `specs` that can be missing.
 const fn lacking(specs: &[Spec]) -> usize {
     let (mut count, mut i) = (0, 0);
     while i < specs.len() {
@@ -276,13 +273,13 @@ const fn in_order<const N: usize>() -> [Spec; N] {
     ordered
 }
 
-/// The card of the effect `name`: an entry of the catalogue, or a nuisance.
+/// The card of the effect `name`: of the catalogue, or a base term.
 #[must_use]
 pub fn spec(name: &str) -> Option<&'static Spec> {
     SPECS.iter().chain(NUISANCES).find(|spec| spec.name == name)
 }
 
-/// The card of the delay law `name`, of base models or an effect.
+/// The card of the delay law `name`: a base term or an effect.
 #[must_use]
 pub fn law(name: &str) -> Option<&'static Spec> {
     LAWS.iter().find(|spec| spec.name == name)

@@ -1,4 +1,4 @@
-//! The plenum empties while the valve is open and fills again afterwards.
+//! Depletion of the plenum while the valve is open, and recovery afterwards.
 
 use crate::effect::{
     Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
@@ -9,14 +9,14 @@ use crate::real::Real;
 /// keeps P positive for every period below 2/(1/τ_r + κ).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlenumDroop<T> {
-    /// Refilling, per sample.
+    /// Refill rate per sample.
     refill: T,
-    /// Depletion at full opening, per sample.
+    /// Depletion rate at full opening, per sample.
     depletion: T,
 }
 
 impl<T: Real> Effect<T> for PlenumDroop<T> {
-    /// P, the pressure over the supply's.
+    /// P, the pressure relative to the supply.
     type State = T;
     fn start(&self) -> T {
         T::ONE
@@ -30,8 +30,7 @@ impl<T: Real> Effect<T> for PlenumDroop<T> {
     }
 }
 
-/// What the plenum loses under steady blowing, which is easier to imagine than
-/// a rate.
+/// Pressure loss under steady blowing, a more intuitive number than the rate.
 fn loss(parameters: &[f64]) -> (f64, &'static str) {
     let [recovery, depletion] = take(parameters);
     let loss = depletion * recovery;

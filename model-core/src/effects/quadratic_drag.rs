@@ -1,4 +1,4 @@
-//! Drag that grows with the square of the speed of change.
+//! Resistance proportional to the square of the rate of change.
 
 use crate::effect::{
     Amplitude, Effect, Flow, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,

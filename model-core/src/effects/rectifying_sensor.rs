@@ -1,4 +1,4 @@
-//! The sensor cannot tell the sign.
+//! A sensor that loses the sign.
 
 use crate::effect::{Effect, Instant, Physics, Place, RustType, Setting, Spec};
 use crate::real::Real;

@@ -1,7 +1,4 @@
-//! The delay shortens until the flow has attached so far, and stays there.
-//!
-//! Another form of eq. (2) for base models: an exponential has its steepest slope at
-//! rest, and never ends.
+//! A delay that decreases with attachment down to a minimum.
 
 use crate::delay::Transport;
 use crate::effect::{
@@ -16,7 +13,7 @@ pub struct SaturatingDelay<T> {
     pub floor: T,
     /// p1, samples: how much longer the delay of the separated flow is.
     pub rise: T,
-    /// y₁, y: from here on it is that of the attached flow.
+    /// y₁, y: above it the delay is that of the attached flow.
     pub level: T,
     /// b, −1 to 1: above 0 most of it is lost near y₁, below 0 near rest.
     pub bend: T,
@@ -28,11 +25,11 @@ impl<T: Real> Transport<T> for SaturatingDelay<T> {
     #[inline]
     fn delay(&self, output: T) -> T {
         let x = (output / self.level).at_most(T::ONE);
-        // Rounding must not carry it beyond its bounds.
+        // Rounding must not exceed the bounds.
         let share = ((T::ONE - x) * (T::ONE + self.bend * x)).at_most(T::ONE);
         self.floor + self.rise * share
     }
-    /// A bend within ±1 leaves the law monotone.
+    /// A bend within ±1 keeps the law monotone.
     #[inline]
     fn bounds(&self) -> Option<[T; 2]> {
         let monotone = self.bend.at_least(-T::ONE).at_most(T::ONE) == self.bend;

@@ -1,4 +1,4 @@
-//! The sensor or its amplifier has a limited range.
+//! Limited range of the sensor or its amplifier.
 
 use crate::effect::{
     Effect, Instant, Parameter, Physics, Place, Setting, Spec, StartValue, Starts, Unit, take,

@@ -1,4 +1,4 @@
-//! The jet's front rolls up into a vortex that helps for a while.
+//! A vortex of the jet's front that temporarily adds to it.
 
 use crate::effect::{
     Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,

@@ -1,4 +1,4 @@
-//! The transport delay depends on how far the flow is attached, eq. (2).
+//! A transport delay that depends on the attachment of the flow, eq. (2).
 
 use crate::delay::Transport;
 use crate::effect::{
@@ -14,9 +14,9 @@ use crate::real::Real;
 pub struct StateDependentDelay<T> {
     /// p0, samples: the delay of the attached flow.
     pub floor: T,
-    /// p1, samples: how much longer the delay of the separated flow is.
+    /// p1, samples: additional delay of the separated flow.
     pub rise: T,
-    /// p2, 1/y: how quickly the delay shortens as the flow attaches.
+    /// p2, 1/y: rate at which the delay decreases with attachment.
     pub rate: T,
 }
 

@@ -1,9 +1,9 @@
-//! What a cell of a table can hold: a number in any notation, on or off, a date or time, nothing.
+//! Contents of a table cell: a number in any notation, on or off, a date or time, or nothing.
 
 use super::stamp::Stamp;
 use crate::rows::printed_unit;
 
-/// What stands in one cell.
+/// The contents of one cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Cell<'a> {
     Empty,
@@ -23,33 +23,33 @@ pub(super) struct Number<'a> {
     pub(super) value: f64,
     /// One unit in the last printed place.
     pub(super) unit_in_last_place: f64,
-    /// The unit that stands behind it.
+    /// The unit after the number.
     pub(super) unit: Option<&'a str>,
-    /// Whether its thousands are marked.
+    /// Whether it has thousands separators.
     pub(super) is_grouped: bool,
 }
 
-/// Which mark parts the decimals; the other one marks thousands.
+/// The decimal separator; the other mark separates thousands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Decimals {
     Point,
     Comma,
-    /// The cells do not agree, or say nothing: a mark that stands alone parts the decimals.
+    /// Undecided or mixed: a single mark is the decimal separator.
     Each,
 }
 
-/// What the cells of a file tell of their decimal mark.
+/// Evidence for the decimal separator of a file.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Marks {
     points: usize,
     commas: usize,
-    /// `1,021`: thousands or thousandths.
+    /// Ambiguous `1,021`: thousands or decimals.
     unclear_commas: usize,
     unclear_points: usize,
 }
 
 impl Decimals {
-    /// As the mark of a file with these cells.
+    /// The decimal separator in words, for a file with these cells.
     pub(super) fn words(self, marks: Marks) -> &'static str {
         match self {
             Self::Comma => "commas",
@@ -85,8 +85,8 @@ impl Marks {
         }
     }
 
-    /// The decimal mark of the file. Of two readings of `1,021`, that of the separator's country is taken: columns that are
-    /// parted by commas have decimal points.
+    /// The decimal separator of the file. Ambiguous numbers like `1,021` are decided by the column separator:
+    /// comma-separated columns have decimal points.
     pub(super) fn decimals(self, parted_by_commas: bool) -> Decimals {
         match (self.points > 0, self.commas > 0) {
             (true, false) => Decimals::Point,
@@ -97,7 +97,7 @@ impl Marks {
         }
     }
 
-    /// Whether every number with a comma can be read in two ways.
+    /// Whether every number with a comma is ambiguous.
     pub(super) fn is_unclear(self) -> bool {
         self.unclear_commas > 0 && self.points == 0 && self.commas == 0
     }
@@ -128,7 +128,7 @@ impl<'a> Cell<'a> {
         }
     }
 
-    /// Whether it is a value that a table may hold.
+    /// Whether it is a valid value of a table.
     pub(super) fn is_value(&self) -> bool {
         !matches!(self, Self::Empty | Self::Text)
     }
@@ -136,7 +136,7 @@ impl<'a> Cell<'a> {
 
 /// A number as most programs print it.
 fn plain<'a>(text: &str, decimals: Decimals) -> Option<Number<'a>> {
-    // `parse` would take `inf` and `nan` for numbers, and a header may well read so.
+    // `parse` would accept `inf` and `nan`, which may be header names.
     let is_plain = |b: u8| b.is_ascii_digit() || matches!(b, b'.' | b'-' | b'+' | b'e' | b'E');
     let starts = text.bytes().any(|b| b.is_ascii_digit());
     if !starts || !text.bytes().all(is_plain) {
@@ -221,7 +221,7 @@ fn ungrouped(mantissa: &str, decimals: Decimals) -> Option<(String, bool)> {
         Decimals::Each => match (points, commas) {
             (1, 0) => '.',
             (0, 1) => ',',
-            // Several of one mark are no decimal marks.
+            // Repeated marks separate thousands.
             (_, 0) => ',',
             (0, _) => '.',
             _ if mantissa.rfind('.') > mantissa.rfind(',') => '.',
@@ -265,7 +265,7 @@ fn exponent(rest: &str) -> (&str, &str) {
     }
 }
 
-/// Units that may stand behind a number.
+/// Units that may follow a number.
 pub(super) fn is_unit(text: &str) -> bool {
     const KNOWN: [&str; 43] = [
         "%", "s", "ms", "us", "µs", "μs", "ns", "min", "h", "V", "mV", "A", "mA", "W", "kW", "Pa",
@@ -275,7 +275,7 @@ pub(super) fn is_unit(text: &str) -> bool {
     KNOWN.contains(&text)
 }
 
-/// On and off, in the words of programs and people.
+/// Words for on and off.
 pub(super) fn switch(text: &str) -> Option<bool> {
     const WORDS: [(&str, bool); 20] = [
         ("on", true),

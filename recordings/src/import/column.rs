@@ -5,7 +5,7 @@ use super::source::{Exactness, Unread, Variable};
 use super::stamp::{Stamp, resolve};
 use crate::error::printable;
 
-/// What the cells of a column are; the first that is not empty says it.
+/// The kind of a column's cells; the first non-empty cell decides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Numbers,
@@ -21,7 +21,7 @@ pub(super) struct Column {
     stamps: Vec<Stamp>,
     /// Rows in which the cell is empty.
     blanks: Vec<usize>,
-    /// Unit behind the numbers.
+    /// The unit after the numbers.
     unit: Option<String>,
     /// The words for on and for off, as written.
     words: [Option<String>; 2],
@@ -81,12 +81,12 @@ impl Column {
         self.unread.get_or_insert((line, printable(text)));
     }
 
-    /// Whether no cell holds anything.
+    /// Whether all cells are empty.
     pub(super) fn is_empty(&self) -> bool {
         self.blanks.len() == self.values.len()
     }
 
-    /// The column as a variable; `lines` are those of the rows. Otherwise its first cell that cannot be read.
+    /// The column as a variable; `lines` are those of the rows. Otherwise the first unreadable cell.
     pub(super) fn variable(
         mut self,
         name: String,
@@ -112,7 +112,7 @@ impl Column {
             notes: Vec::new(),
         };
         if self.kind == Some(Kind::Stamps) {
-            // A stamp that is missing leaves a gap that only the row itself can explain.
+            // Only the row itself can explain a missing stamp.
             let at = |row: usize| (lines.get(row).copied().unwrap_or(0), printable(&text(row)));
             if let Some(row) = self.gap {
                 return Err(unread(at(row)));

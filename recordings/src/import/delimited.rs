@@ -1,14 +1,14 @@
-//! Rows of cells in lines of text: what separates the cells, which line is the first row, and what the columns are called.
+//! Splitting of text lines into cells: separator, first row, and column names.
 
 use std::borrow::Cow;
 
 use super::cell::{Cell, Decimals, is_unit};
 use super::stamp::Stamp;
 
-/// Lines among which the first row has to be.
+/// Number of lines in which the first row is searched.
 const HEAD: usize = 400;
 
-/// What stands between the cells of a row.
+/// Separator of the cells of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Separator {
     Tab,
@@ -29,7 +29,7 @@ impl Separator {
         }
     }
 
-    /// The cells of a line, trimmed and without quotes. A separator within quotes is none.
+    /// The cells of a line, trimmed and without quotes. Separators within quotes are ignored.
     pub(super) fn split<'a>(self, line: &'a str, cells: &mut Vec<&'a str>) {
         cells.clear();
         let mut is_quoted = false;
@@ -91,9 +91,9 @@ fn bare(cell: &str) -> &str {
     inner.map_or(cell, str::trim)
 }
 
-/// Joins what blanks part in a cell: a date and its clock time, that and AM or PM, a number and its unit.
+/// Joins cells that blanks have split: a date and its clock time, that and AM or PM, a number and its unit.
 fn merge<'a>(line: &'a str, cells: &mut Vec<&'a str>) {
-    // Cells up to `kept` are done.
+    // Cells up to `kept` are finished.
     let mut kept = 0;
     for at in 1..cells.len() {
         let (before, cell) = (cells[kept], cells[at]);
@@ -117,7 +117,7 @@ fn merge<'a>(line: &'a str, cells: &mut Vec<&'a str>) {
     cells.truncate(kept + 1);
 }
 
-/// How the rows of a text stand in its lines.
+/// Layout of the rows of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Rows {
     pub(super) separator: Separator,
@@ -127,7 +127,7 @@ pub(super) struct Rows {
     pub(super) width: usize,
 }
 
-/// How much of a line is a row of a table.
+/// How much a line resembles a table row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Likeness {
     None,
@@ -138,8 +138,8 @@ enum Likeness {
 }
 
 impl Rows {
-    /// The first row is the first line that is followed by another like it. Lines of values only are preferred to lines
-    /// with some text.
+    /// The first row is the first line that is followed by a similar one. Lines of values only are preferred
+    /// to lines with text.
     pub(super) fn find(lines: &[&str]) -> Option<Self> {
         let found = Self::first_of(lines, Likeness::Whole);
         let mut rows = found.or_else(|| Self::first_of(lines, Likeness::Partial))?;
@@ -193,7 +193,8 @@ impl Rows {
         found
     }
 
-    /// The line that is most like a row though none is followed by another: its index and its first cell that is no value.
+    /// The line that is most like a row although none follows: its index and its first cell that is not a
+    /// value.
     pub(super) fn nearest<'a>(lines: &[&'a str]) -> Option<(usize, Cow<'a, str>)> {
         let mut best: Option<(usize, usize, &str)> = None;
         let mut cells = Vec::new();
@@ -238,7 +239,7 @@ impl Rows {
                     *first = format!("{first} {second}");
                 }
             }
-            // Programs number the rows without a name for that.
+            // Programs number the rows without a column name.
             if cells.len() + 1 == width && cells.iter().all(|c| is_name(c)) {
                 cells.insert(0, String::new());
             }
@@ -275,7 +276,7 @@ impl Rows {
         split.unzip()
     }
 
-    /// The column whose cells are a date and a clock time that blanks part.
+    /// The column whose date and clock time are separated by a blank.
     fn joined_stamp(self, lines: &[&str]) -> Option<usize> {
         let mut cells = Vec::new();
         self.separator.split(lines.get(self.first)?, &mut cells);
@@ -287,7 +288,7 @@ impl Rows {
     }
 }
 
-/// Whether a line is a remark of the program that wrote it.
+/// Whether a line is a comment.
 pub(super) fn is_comment(line: &str) -> bool {
     line.trim_start().starts_with(['#', '%'])
 }
@@ -305,7 +306,7 @@ fn likeness(separator: Separator, cells: &[&str]) -> Likeness {
     let (mut values, mut measured, mut texts) = (0, 0, 0);
     for text in cells {
         match Cell::of(text, Decimals::Each) {
-            // `0,5 100,2` is two numbers that a blank parts.
+            // `0,5 100,2` are two numbers separated by a blank.
             Cell::Number(n)
                 if n.is_grouped && separator == Separator::Comma && text.contains(' ') =>
             {
@@ -320,7 +321,7 @@ fn likeness(separator: Separator, cells: &[&str]) -> Likeness {
             Cell::Text => texts += 1,
         }
     }
-    // A row of two columns may have one value: the other is written on change only.
+    // A row of two columns may have one value, if the other is written on change only.
     let fewest = if cells.len() == 2 && texts == 0 { 1 } else { 2 };
     if cells.len() < 2 || values < fewest || measured == 0 || texts > values {
         Likeness::None

@@ -4,7 +4,7 @@
 use super::cell::{Cell, Decimals};
 use super::stamp::Stamp;
 
-/// Lines from which the labels are taken.
+/// Number of lines from which the labels are taken.
 const HEAD: usize = 400;
 
 /// The labels of a row's values, in order.
@@ -34,8 +34,8 @@ impl Labels {
         (labelled >= 2 && 2 * labelled > all).then(|| Self(names()))
     }
 
-    /// Puts the values of a line into `cells`, one for each label, empty where the line does not have it. False for a
-    /// line that is no row.
+    /// Writes the values of a line into `cells`, one per label, empty if missing. Returns false if the line
+    /// is not a row.
     pub(super) fn split<'a>(&self, line: &'a str, cells: &mut Vec<&'a str>) -> bool {
         cells.clear();
         cells.resize(self.0.len(), "");
@@ -61,7 +61,7 @@ fn are_distinct(pairs: &[(&str, &str)]) -> bool {
     pairs.iter().enumerate().all(is_new)
 }
 
-/// A value without what is printed behind it.
+/// A value without the text after it.
 fn value(text: &str) -> &str {
     let first = text.split_whitespace().next().unwrap_or_default();
     match !is_value(text) && is_value(first) {
@@ -142,7 +142,7 @@ pub(super) fn leading<'a>(lines: &[&'a str]) -> Option<Vec<(&'a str, &'a str)>> 
     before_lines(lines, split)
 }
 
-/// Each line split, where most lines can be.
+/// Each line split in two, if most lines can be.
 fn before_lines<'a>(
     lines: &[&'a str],
     split: impl Fn(&&'a str) -> Option<(&'a str, &'a str)>,
@@ -206,7 +206,7 @@ mod tests {
             &["t", "u", "y"],
             &["0.2", "false", "3"],
         );
-        // What is written only when it changes is empty elsewhere.
+        // Values written only on change are empty elsewhere.
         expect(
             &["t:0.1,u:1,y:21.3", "t:0.2,y:21.4", "t:0.3,y:21.4"],
             &["t", "u", "y"],

@@ -1,4 +1,4 @@
-//! Which variable of a file is the command, the output and the time, and what has to be done to its numbers.
+//! Mapping of a file's variables to command, output and time, with their scaling.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -34,10 +34,10 @@ pub struct Mapping {
     /// The command; none: found by its name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub u: Option<String>,
-    /// u is this times the variable …
+    /// Factor of u: u = u_scale · variable + u_offset.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub u_scale: Option<f64>,
-    /// … plus this.
+    /// Offset of u.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub u_offset: Option<f64>,
     /// u is 1 above this value of the scaled command and 0 elsewhere: makes a voltage an on/off command.
@@ -46,10 +46,10 @@ pub struct Mapping {
     /// The output; none: found by its name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y: Option<String>,
-    /// y is this times the variable …
+    /// Factor of y: y = y_scale · variable + y_offset.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y_scale: Option<f64>,
-    /// … plus this. Standard errors and envelopes are scaled along.
+    /// Offset of y. Standard errors and envelopes are scaled accordingly.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y_offset: Option<f64>,
     /// Further variables to keep; none: all that are as long as u.
@@ -57,11 +57,11 @@ pub struct Mapping {
     pub channels: Option<Vec<String>>,
 }
 
-/// A record and how it came about.
+/// A record with its mapping.
 pub(super) struct Mapped {
     pub(super) record: Record,
     pub(super) origin: Origin,
-    /// With the names that were found.
+    /// The mapping with the names that were found.
     pub(super) mapping: Mapping,
     pub(super) remarks: Vec<String>,
     /// Units by column, where the header stated them.
@@ -88,7 +88,7 @@ impl Mapping {
             Some(name) => find(source, name, file).map(Some),
             None => known_as(source, known, file),
         };
-        // A variable that is known as something else is no candidate.
+        // A variable with another known role is no candidate.
         let time = match &self.t {
             Some(name) => source.get(name),
             None => known_as(source, &TIMES, &FilePlace::default())
@@ -156,7 +156,9 @@ impl Mapping {
         }
         let largest = values.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
         if largest <= 1.0 {
-            remarks.push("u is said to be in % and stays below 1: it is kept as it is".to_owned());
+            remarks.push(
+                "the header gives u in %, but all values are below 1: u is not scaled".to_owned(),
+            );
             return None;
         }
         remarks.push("u is in %: 100 % is u = 1 (--u-scale 1 keeps the percentages)".to_owned());
@@ -283,7 +285,7 @@ impl Mapping {
             same_length(variable, n, &place)?;
             if variable.stamped.is_some() {
                 remarks.push(format!(
-                    "`{}` is left out: a time beside the time",
+                    "`{}` is left out: a second time column",
                     variable.name
                 ));
                 continue;
@@ -307,7 +309,7 @@ impl Mapping {
                 "y_sd" => record.y_sd = Some(values.map(|v| v * scale.abs()).collect()),
                 bound @ ("y_min" | "y_max") => {
                     let values = values.map(line(self.y_scale, self.y_offset)).collect();
-                    // A scale below 0 turns the envelope over.
+                    // A negative scale exchanges the limits of the envelope.
                     match (bound == "y_min") == (scale > 0.0) {
                         true => record.y_min = Some(values),
                         false => record.y_max = Some(values),
@@ -381,7 +383,7 @@ pub(super) fn finite(
     }
 }
 
-/// A command that is written when it changes: an empty cell keeps the value before it.
+/// A command written on change: an empty cell keeps the value before it.
 fn held(
     u: &Variable,
     place: &dyn Fn(&Variable, usize) -> FilePlace,
@@ -426,7 +428,7 @@ fn two_levels(u: &[f64]) -> Option<(f64, f64)> {
     (u.iter().filter(near).count() as f64 >= 0.98 * u.len() as f64).then_some((low, high))
 }
 
-/// The value with so many digits after its first.
+/// The value rounded to so many digits after its first.
 fn brief(value: f64, digits: usize) -> f64 {
     format!("{value:.digits$e}").parse().unwrap_or(value)
 }

@@ -13,13 +13,13 @@ use super::source::{Budget, Notation, Source, damaged, fault};
 use crate::error::DataError;
 
 const HEADER: usize = 128;
-/// Structures within structures.
+/// Largest nesting of structures.
 const DEEPEST: usize = 8;
 
 const COMPRESSED: u32 = 15;
 const MATRIX: u32 = 14;
 
-/// Whether the bytes begin as a MATLAB file of version 5 or 7 does.
+/// Whether the bytes start like a MATLAB file of version 5 or 7.
 pub(super) fn is_one(bytes: &[u8]) -> bool {
     order(bytes).is_some()
 }
@@ -68,7 +68,7 @@ pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, Dat
     Ok(source)
 }
 
-/// A packed variable, unpacked. Its tag, which comes first, says how long it is.
+/// A compressed variable, decompressed. Its tag, which comes first, gives its length.
 fn unpacked(packed: &[u8], order: Order, budget: &mut Budget) -> Result<Vec<u8>, DataError> {
     const TAG: usize = 8;
     let broken = |_| damaged("a packed variable cannot be unpacked");
@@ -82,7 +82,7 @@ fn unpacked(packed: &[u8], order: Order, budget: &mut Budget) -> Result<Vec<u8>,
         word(&inner, 4, order).ok_or_else(|| damaged("a packed variable cannot be unpacked"))?;
     let length = u64::from(stated).div_ceil(8) * 8;
     budget.take(TAG as u64 + length, || "a packed variable".to_owned())?;
-    // What is there is less where the file lies.
+    // A truncated file gives fewer bytes.
     decoder
         .take(length)
         .read_to_end(&mut inner)
@@ -145,7 +145,7 @@ fn word(bytes: &[u8], at: usize, order: Order) -> Option<u32> {
     })
 }
 
-/// One array; `named` where the name is that of a field.
+/// One array; `named` gives the name of a field.
 fn matrix(
     source: &mut Source,
     budget: &mut Budget,
@@ -155,7 +155,7 @@ fn matrix(
     depth: usize,
 ) -> Result<(), DataError> {
     let mut parts = Elements { bytes: data, order };
-    // An empty field is an array of no bytes.
+    // An empty field is an array without bytes.
     let Some(flags) = parts.next()? else {
         return Ok(());
     };
@@ -233,7 +233,7 @@ fn matrix(
 }
 
 fn skip(source: &mut Source, name: &str, why: &str) {
-    // MATLAB keeps what belongs to objects in a variable without a name.
+    // MATLAB stores data of objects in a variable without a name.
     if !name.is_empty() {
         source.skipped.push((name.to_owned(), why.to_owned()));
     }

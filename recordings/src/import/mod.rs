@@ -34,12 +34,12 @@ use crate::record::{Origin, Record, Use};
 use crate::set::MANIFEST;
 use crate::set::{DataSet, unite_periods};
 
-/// Where a record came from, as `dataset.toml` keeps it.
+/// Origin of a record, as stored in `dataset.toml`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct From {
     /// The file's name, without its folder.
     pub file: String,
-    /// What was done with its variables.
+    /// The mapping of its variables.
     #[serde(flatten)]
     pub mapping: Mapping,
     /// Units by column, as the file states them.
@@ -47,17 +47,17 @@ pub struct From {
     pub units: BTreeMap<String, String>,
 }
 
-/// What to make of files.
+/// Options of an import.
 #[derive(Debug, Clone, Default)]
 pub struct Import {
-    /// Which variable is what, in every file.
+    /// Mapping of the variables, for every file.
     pub mapping: Mapping,
     /// Title of the data set.
     pub title: Option<String>,
-    /// Names of records (files without their ending) to hold out.
+    /// Names of validation records (files without their ending).
     pub validate: Vec<String>,
-    /// From this time of each record on, s, its samples are held out: they become a validation record, which the samples
-    /// before them lead up to.
+    /// Splits each record at this time, s: the whole becomes a validation record in which the earlier samples
+    /// are the lead.
     pub hold_out_from_s: Option<f64>,
     /// Command before the first sample of every record; none: its first value.
     pub u_before: Option<f64>,
@@ -65,31 +65,31 @@ pub struct Import {
     pub graded: bool,
 }
 
-/// What became of one file.
+/// Summary of one file.
 #[derive(Debug, Clone, Serialize)]
 pub struct ImportedFile {
     /// Name of its record.
     pub name: String,
-    /// How the file was understood.
+    /// Description of the file's format.
     pub dialect: String,
     /// Samples.
     pub samples: usize,
-    /// Sampling period as the file says it, s.
+    /// Sampling period of the file, s.
     pub sample_period_s: f64,
-    /// The variables that were taken, and what was done with them.
+    /// The variables used, with their scaling.
     pub mapping: Mapping,
-    /// What should be known: variables left out, a command that looks like a voltage.
+    /// Remarks: variables left out, a command that looks like a voltage.
     pub remarks: Vec<String>,
 }
 
-/// A data set made of other files.
+/// A data set made from other files.
 #[derive(Debug, Clone)]
 pub struct Imported {
     /// The data set.
     pub set: DataSet,
-    /// What became of each file.
+    /// Summary of each file.
     pub files: Vec<ImportedFile>,
-    /// What should be known of the data set as a whole.
+    /// Remarks on the data set as a whole.
     pub remarks: Vec<String>,
     from: Vec<From>,
     sources: Vec<PathBuf>,
@@ -104,10 +104,11 @@ impl Imported {
         self.set.save_from(folder, &self.from)
     }
 
-    /// Refuses to replace a data set or a file in `folder`. With `force` only the files that were imported are safe.
+    /// Refuses to replace a data set or a file in `folder`. With `force` only the imported files themselves
+    /// are protected.
     ///
     /// # Errors
-    /// [`DataError`] naming what would be replaced.
+    /// [`DataError`] naming the file or data set.
     pub fn refuse_to_replace(&self, folder: &Path, force: bool) -> Result<(), DataError> {
         let manifest = folder.join(MANIFEST);
         let files = self.set.file_names();
@@ -136,9 +137,9 @@ impl Imported {
     }
 }
 
-/// Endings of files that are tables or arrays …
+/// Endings of tables and arrays.
 const TABLES: [&str; 5] = ["csv", "tsv", "mat", "npy", "npz"];
-/// … and of files that may be, taken from a folder that has none of the others.
+/// Endings of text files, which are imported from a folder only if it has none of `TABLES`.
 const TEXTS: [&str; 3] = ["txt", "dat", "log"];
 
 /// The files to import: those named, and for a folder those in it that can be tables, by name.
@@ -262,7 +263,7 @@ pub fn import(files: &[&Path], request: &Import) -> Result<Imported, DataError> 
     })
 }
 
-/// What to do where no record is for validation.
+/// The remark if no record is for validation.
 fn nothing_held_out(records: &[Record]) -> Option<String> {
     if records.iter().any(|r| r.role == Use::Validate) {
         return None;
@@ -277,12 +278,12 @@ fn nothing_held_out(records: &[Record]) -> Option<String> {
         [] => return None,
     };
     Some(format!(
-        "Nothing is held out: models will be judged on the data they are fitted to. Hold out {how}."
+        "There is no validation record: models would be validated on the data they are fitted to. Hold out {how}."
     ))
 }
 
-/// A record in two: one of the samples before `time` to fit, and the whole as a validation record in which they lead up to
-/// those that are judged.
+/// Splits a record at `time`: an estimation record of the samples before it, and the whole as a validation
+/// record with those samples as its lead.
 fn parts(
     record: Record,
     origin: Origin,

@@ -1,4 +1,5 @@
-//! Which variable of a file is meant: by the name that an option gives, by a name that is usual, or because no other fits.
+//! Assignment of a file's variables: by the name in an option, by a usual name, or because only one variable
+//! is suitable.
 
 use super::problem::ImportProblem;
 use super::source::{Source, Variable};
@@ -76,7 +77,7 @@ pub(super) const COMMANDS: [&str; 20] = [
     "control",
 ];
 
-/// Names that are the command where the file has a process value, and the output of the rig elsewhere.
+/// Names that mean the command if the file has a process value, and the output of the rig otherwise.
 pub(super) const CONTROLLER_OUTPUTS: [&str; 4] = ["out", "output", "op", "mv"];
 
 /// Names of the output that a controller measures.
@@ -101,7 +102,7 @@ pub(super) const OUTPUTS: [&str; 15] = [
     "measured",
 ];
 
-/// The name without what is before its last point, as the lists have it.
+/// The name after its last point, in the form of the lists.
 fn usual(name: &str) -> String {
     let last = name.rsplit('.').next().unwrap_or_default().trim();
     // `T` is a temperature, `Time` a time.
@@ -111,7 +112,7 @@ fn usual(name: &str) -> String {
     }
 }
 
-/// A name without the unit or kind that stands behind it: `heater_pct`, `temp_c`, `valve_state`.
+/// A name without a trailing unit or kind: `heater_pct`, `temp_c`, `valve_state`.
 fn stem(name: &str) -> String {
     const ENDS: [&str; 16] = [
         "pct", "percent", "c", "degc", "celsius", "f", "k", "v", "volt", "pa", "bar", "state",
@@ -130,10 +131,11 @@ pub(super) fn is_in_percent(name: &str) -> bool {
     name.ends_with("_pct") || name.ends_with("_percent")
 }
 
-/// The one variable that goes by a usual name, alone or as the field of a structure; an earlier name wins.
+/// The variable with a usual name, alone or as the field of a structure; an earlier name in the list has
+/// priority.
 ///
 /// # Errors
-/// The cell of a column of that name that cannot be read, in `file`.
+/// An unreadable cell in the column of that name, in `file`.
 pub(super) fn known_as<'a>(
     source: &'a Source,
     known: &[&str],
@@ -159,10 +161,10 @@ pub(super) fn known_as<'a>(
     Ok(None)
 }
 
-/// The variable that an option names.
+/// The variable named by an option.
 ///
 /// # Errors
-/// That there is none, or why it cannot be used, in `file`.
+/// It does not exist, or cannot be used, in `file`.
 pub(super) fn find<'a>(
     source: &'a Source,
     name: &str,
@@ -184,7 +186,7 @@ pub(super) fn find<'a>(
     Err(file.clone().error(problem.into()))
 }
 
-/// The command where no name says it: the one variable that is on or off throughout, beside those in `taken`.
+/// The command without a usual name: the only on/off variable not in `taken`.
 pub(super) fn only_switch<'a>(source: &'a Source, taken: &[&Variable]) -> Option<&'a Variable> {
     let is_switch = |v: &&Variable| {
         let values = || v.values.iter().filter(|value| !value.is_nan());
@@ -194,7 +196,7 @@ pub(super) fn only_switch<'a>(source: &'a Source, taken: &[&Variable]) -> Option
     only(source, taken, is_switch)
 }
 
-/// The output where no name says it: the one series of numbers beside those in `taken`.
+/// The output without a usual name: the only numeric variable not in `taken`.
 pub(super) fn only_other<'a>(source: &'a Source, taken: &[&Variable]) -> Option<&'a Variable> {
     only(source, taken, |_| true)
 }
@@ -211,7 +213,7 @@ fn only<'a>(
     found.next().filter(|_| found.next().is_none())
 }
 
-/// Seconds in the unit that the name of a time ends with; none where it has no such end.
+/// The unit at the end of a time's name, in seconds; none without one.
 pub(super) fn seconds_by_name(name: &str) -> Option<f64> {
     let name = usual(name);
     match name.rsplit('_').next().unwrap_or_default() {

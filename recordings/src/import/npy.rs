@@ -35,7 +35,7 @@ pub(super) fn archive(bytes: &[u8], budget: &mut Budget) -> Result<Source, DataE
         let what = || format!("`{}`", printable(&name));
         budget.take(size, what)?;
         let mut content = Vec::with_capacity(usize::try_from(size).unwrap_or(0));
-        // No more than is stated.
+        // At most the stated size.
         file.take(size)
             .read_to_end(&mut content)
             .map_err(|_| broken())?;
@@ -108,7 +108,7 @@ fn array(
         let index = match shape.as_slice() {
             [rows, _] if fortran.starts_with("True") => column * rows + row,
             [_, columns] => row * columns + column,
-            // A vector, along whichever of its sides.
+            // A vector in either orientation.
             _ => row + column,
         };
         let bytes = data.get(index * size..(index + 1) * size);
@@ -122,7 +122,7 @@ fn array(
     Ok(())
 }
 
-/// What stands behind `'key':` in the header.
+/// The text after `'key':` in the header.
 fn value<'a>(header: &'a str, key: &str) -> Option<&'a str> {
     let at = header
         .find(&format!("'{key}'"))

@@ -1,4 +1,4 @@
-//! Which reader a file's first bytes call for.
+//! Selection of the reader by a file's first bytes.
 
 use std::fs::File;
 use std::io::Read;
@@ -20,7 +20,7 @@ impl Source {
         Self::open_beside(path, 0)
     }
 
-    /// The same where so many bytes of memory are taken already.
+    /// The same with so many bytes of memory already in use.
     pub(super) fn open_beside(path: &Path, taken: u64) -> Result<Self, DataError> {
         Self::read_beside(path, &read(path, taken)?, taken)
     }

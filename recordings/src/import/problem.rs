@@ -1,4 +1,4 @@
-//! What can be wrong with a file that is to be imported, and what to do about it.
+//! Problems of a file to import, each with its remedy.
 
 use crate::memory::TooMuch;
 
@@ -6,7 +6,7 @@ use crate::memory::TooMuch;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportProblem {
-    /// A MATLAB file that is an HDF5 file inside.
+    /// A MATLAB file in HDF5 format.
     #[error(
         "is a MATLAB 7.3 file (HDF5), which is not read here; open it in MATLAB and save it as version 7: load('{name}'); save('{name}', '-v7')",
         name = .0
@@ -22,71 +22,71 @@ pub enum ImportProblem {
         "is an archive without .npy files (a spreadsheet's workbook is one); save the sheet as CSV"
     )]
     NoArrays,
-    /// MATLAB 4, or nothing of MATLAB's.
+    /// MATLAB 4, or not a MATLAB file.
     #[error(
         "is no MATLAB file of version 5 or 7; open it in MATLAB or Octave and save it again: save('run.mat', 't', 'u', 'y', '-v7')"
     )]
     NoMatlab,
-    /// Damaged or cut short.
+    /// A damaged or truncated file.
     #[error("is damaged or cut short ({0}); copy or save it again")]
     Damaged(&'static str),
-    /// Beyond the memory that may be used.
+    /// The file needs more memory than allowed.
     #[error(transparent)]
     Memory(#[from] TooMuch),
-    /// More columns than any table has.
+    /// More columns than a table may have.
     #[error(
         "the rows have {0} cells, and 16384 are the most (a spreadsheet's); a table has a row for each sample and a column for \
-         each signal: turn it over, or save fewer columns"
+         each signal: transpose it, or save fewer columns"
     )]
     TooWide(usize),
-    /// Nothing that could be a table of numbers.
+    /// No table of numbers was found.
     #[error(
         "no rows of numbers were found; a table needs a header line and rows of at least two numbers, separated by commas, semicolons, tabs or blanks"
     )]
     NoTable,
-    /// A line that is nearly a row of a table.
+    /// A line that is almost a row of a table.
     #[error(
         "no rows of numbers were found; this line comes closest, but its cell `{0}` is no number, date, time or on/off word; correct it, or write a header line and rows of at least two numbers, separated by commas, semicolons, tabs or blanks"
     )]
     NearlyRow(String),
-    /// A cell of a column that is needed.
+    /// An unreadable cell of a required column.
     #[error("{}", unread(.0))]
     Unread(String),
-    /// A command that is written on change only and has no first value.
+    /// A command written on change without a first value.
     #[error(
-        "the first value of u is missing, and what is written on change only needs one; write it into this cell"
+        "the first value of u is missing, which a command that is written on change only needs; write it into this cell"
     )]
     NoFirstCommand,
-    /// A variable that was asked for is not there.
+    /// A requested variable does not exist.
     #[error("no variable `{wanted}`; the file has {found}", wanted = .wanted, found = .found)]
     NoVariable {
-        /// What was asked for.
+        /// The requested name.
         wanted: String,
-        /// What is there.
+        /// The names found.
         found: String,
     },
-    /// A variable that was asked for cannot be used.
+    /// A requested variable cannot be used.
     #[error("{0}")]
     Unusable(String),
-    /// None of the names says which variable is u or y.
+    /// No usual name identifies u or y.
     #[error("which variable is {what}? Say it with --{option} NAME; the file has {found}", what = .what, option = .option, found = .found)]
     Which {
         /// `the command u`, `the output y`.
         what: &'static str,
-        /// The option that says it.
+        /// The option that names it.
         option: &'static str,
-        /// What is there.
+        /// The names found.
         found: String,
     },
-    /// Neither a time nor a sampling period.
+    /// Neither a time column nor a sampling period.
     #[error(
         "has no variable that is the time; name it with --t NAME, or give the sampling period with --period SECONDS; the file has {0}"
     )]
     NoTime(String),
-    /// A scale that makes everything equal, or no number.
+    /// A scale that is 0 or not finite.
     #[error("{0} has to be a finite number other than 0")]
     BadScale(&'static str),
-    /// A threshold or an offset that is no number.
+    /// A threshold or an offset that is not finite.
     #[error("{0} has to be a finite number")]
     BadNumber(&'static str),
     /// A threshold that the command never crosses.
@@ -99,7 +99,7 @@ pub enum ImportProblem {
         /// The threshold.
         threshold: f64,
     },
-    /// A slip in an on/off command.
+    /// A single wrong value in an on/off command.
     #[error(
         "u = {0} in a command that is otherwise 0 or 1; give --u-threshold to make it on/off, or --graded if the input has levels in between"
     )]
@@ -107,12 +107,12 @@ pub enum ImportProblem {
     /// A channel with a name that a record cannot have.
     #[error("a channel cannot be named {0} here; leave it out, or rename it in the file")]
     ChannelName(String),
-    /// A hold-out time outside the record.
+    /// A split time outside the record.
     #[error(
         "--hold-out-from {time} s lies outside the record, which goes from {from} to {to} s; give a time within it"
     )]
     SplitOutside {
-        /// The time asked for, s.
+        /// The requested time, s.
         time: f64,
         /// Time of the first sample, s.
         from: f64,
@@ -129,10 +129,10 @@ pub enum ImportProblem {
         "the folder holds no .csv, .tsv, .txt, .dat, .log, .mat, .npy or .npz file; name the files to import"
     )]
     NothingInFolder,
-    /// The output is a data set already.
+    /// The output folder contains a data set.
     #[error("holds a data set already; name another folder with -o, or replace it with --force")]
     ReplacesSet,
-    /// A file of the output is there already.
+    /// A file of the output exists already.
     #[error("is there already; name another folder with -o, or replace the file with --force")]
     ReplacesFile,
     /// A file of the output is one of the files that are read.
@@ -143,7 +143,7 @@ pub enum ImportProblem {
     NoMapping,
 }
 
-/// What a cell holds that cannot be read, and what to do.
+/// Contents of an unreadable cell, with the remedy.
 fn unread(text: &str) -> String {
     if text.is_empty() {
         return "the cell is empty; fill it in, or split the record there".to_owned();

@@ -10,23 +10,23 @@ use crate::memory;
 /// Bytes of memory that a column takes for each of its values, with its own copy in a record.
 pub(super) const VALUE: u64 = 16;
 
-/// The memory that reading takes so far.
+/// Memory used by reading so far.
 #[derive(Debug)]
 pub(super) struct Budget {
     taken: u64,
 }
 
 impl Budget {
-    /// So much is taken before.
+    /// A budget with so many bytes already used.
     pub(super) fn with(taken: u64) -> Self {
         Self { taken }
     }
 
-    /// Takes more, before it is allocated.
+    /// Reserves memory before it is allocated.
     pub(super) fn take(&mut self, bytes: u64, what: impl Fn() -> String) -> Result<(), DataError> {
         const REMEDY: &str = "save fewer variables, or phase-average with `host-fit average`";
         let taken = self.taken.saturating_add(bytes);
-        // Said only where it is needed.
+        // The message is built only if needed.
         if taken > memory::limit() {
             memory::allow(taken, &what(), REMEDY).map_err(|error| fault(error.into()))?;
         }
@@ -34,19 +34,19 @@ impl Budget {
         Ok(())
     }
 
-    /// Takes what an array with so many values takes.
+    /// Reserves the memory of an array with so many values.
     pub(super) fn take_array(&mut self, name: &str, count: usize) -> Result<(), DataError> {
         let bytes = (count as u64).saturating_mul(VALUE);
         self.take(bytes, || format!("the array `{}`", printable(name)))
     }
 
-    /// Gives back.
+    /// Releases memory.
     pub(super) fn give(&mut self, bytes: u64) {
         self.taken = self.taken.saturating_sub(bytes);
     }
 }
 
-/// How exactly the values of a variable stand in the file: what a time may be wrong by.
+/// Precision of the values in the file, which limits that of times.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Exactness {
     /// One unit in the last printed place of each value.
@@ -58,18 +58,18 @@ pub(super) enum Exactness {
 /// One column of numbers.
 #[derive(Debug, Clone)]
 pub struct Variable {
-    /// As the file or its program would write it: `u`, `run.u`, `data(:,2)`, `data[:,1]`.
+    /// Name in the notation of its program: `u`, `run.u`, `data(:,2)`, `data[:,1]`.
     pub name: String,
-    /// As the header states it; none where it does not.
+    /// Unit in the header, if any.
     pub unit: Option<String>,
     /// Its values.
     pub values: Vec<f64>,
     pub(super) exactness: Exactness,
     /// Rows in which its cell is empty; their values are NaN.
     pub(super) blanks: Vec<usize>,
-    /// What its cells are where they are dates or clock times.
+    /// The dates or clock times of its cells, if they are stamps.
     pub(super) stamped: Option<Stamped>,
-    /// How its cells were understood, for the user.
+    /// Remarks on the interpretation of its cells.
     pub(super) notes: Vec<String>,
 }
 
@@ -77,14 +77,14 @@ pub struct Variable {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Unread {
     pub(super) name: String,
-    /// Where the first such cell stands.
+    /// Line of the first such cell.
     pub(super) line: u64,
-    /// What it holds.
+    /// Its contents.
     pub(super) text: String,
 }
 
 impl Unread {
-    /// In words, for a column that is not needed.
+    /// The remark for an optional column.
     pub(super) fn words(&self) -> String {
         match self.text.is_empty() {
             true => format!("its cell in line {} is empty", self.line),
@@ -92,7 +92,7 @@ impl Unread {
         }
     }
 
-    /// The fault of a column of `file` that is needed.
+    /// The error for a required column of `file`.
     pub(super) fn error(&self, file: &FilePlace) -> DataError {
         let here = file.clone().at_line(self.line).in_column(&self.name);
         here.error(ImportProblem::Unread(self.text.clone()).into())
@@ -105,13 +105,13 @@ pub struct Source {
     pub(super) path: PathBuf,
     /// What was read, in the order of the file.
     pub variables: Vec<Variable>,
-    /// Variables that hold no column of numbers: name and why.
+    /// Variables without a column of numbers: name and reason.
     pub skipped: Vec<(String, String)>,
     /// Columns of a text table that cannot be read.
     pub(super) unread: Vec<Unread>,
-    /// How the file was understood, in words.
+    /// Description of the file's format.
     pub dialect: String,
-    /// Lines that were passed over, and notations that can be read in two ways.
+    /// Remarks: skipped lines and ambiguous notations.
     pub(super) remarks: Vec<String>,
     /// The line of each sample; none for binary files.
     pub(super) lines: Vec<u64>,
@@ -164,8 +164,8 @@ impl Source {
         }
     }
 
-    /// An array as columns: a vector as itself, a matrix column by column, or row by row where it lies on its side. `at` gives
-    /// the element in a row and column.
+    /// An array as columns: a vector as one column, a matrix column by column, or row by row if it has more
+    /// columns than rows. `at` gives the element in a row and column.
     pub(super) fn add(
         &mut self,
         name: &str,
@@ -217,7 +217,7 @@ impl Source {
     }
 }
 
-/// How a program writes a part of an array.
+/// Notation for a part of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Notation {
     Matlab,
@@ -240,7 +240,7 @@ impl Notation {
     }
 }
 
-/// A fault of a file whose path the reader does not know: [`Source::open`] adds it.
+/// An error without the file's path, which [`Source::open`] adds.
 pub(super) fn fault(problem: ImportProblem) -> DataError {
     FilePlace::default().error(problem.into())
 }

@@ -7,12 +7,12 @@
 /// Seconds of a day.
 const DAY: f64 = 86_400.0;
 
-/// A date as it stands in a cell.
+/// The date in a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Date {
     /// Days since 1970-01-01.
     Days(i64),
-    /// Two numbers that may be day and month or month and day, and the year.
+    /// Two ambiguous numbers of day and month, and the year.
     Either(u8, u8, i32),
 }
 
@@ -26,7 +26,7 @@ pub(super) struct Stamp {
     unit: f64,
 }
 
-/// What the stamps of a column tell.
+/// The kind of a column's stamps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Days only.
@@ -62,14 +62,14 @@ impl Stamp {
         }
     }
 
-    /// The stamp in a cell; none where it is something else.
+    /// The stamp in a cell; none if it is something else.
     pub(super) fn of(cell: &str) -> Option<Self> {
         let cell = cell.trim().trim_matches(['[', ']']);
         let is_short = (5..=48).contains(&cell.len());
         if !is_short || !cell.is_ascii() || !cell.bytes().any(|b| b.is_ascii_digit()) {
             return None;
         }
-        // A number is none of these, and is the usual thing to stand in a cell.
+        // Plain numbers, the usual contents, are excluded quickly.
         if !cell.contains([':', '-', '/']) && cell.matches('.').count() < 2 && !cell.contains(' ') {
             return None;
         }
@@ -102,7 +102,7 @@ impl Stamp {
         })
     }
 
-    /// Whether a cell holds a date and no time of day, which may stand in the next cell.
+    /// Whether a cell contains a date without a time of day, which may be in the next cell.
     pub(super) fn is_date(cell: &str) -> bool {
         Self::of(cell).is_some_and(|stamp| stamp.kind() == Kind::Date)
     }
@@ -115,13 +115,13 @@ impl Stamp {
             .any(|word| cell.eq_ignore_ascii_case(word))
     }
 
-    /// Whether a cell holds a time of day and no date.
+    /// Whether a cell contains a time of day without a date.
     pub(super) fn is_clock(cell: &str) -> bool {
         Self::of(cell).is_some_and(|stamp| stamp.kind() == Kind::Clock)
     }
 }
 
-/// A cell without the name of a day before its date.
+/// A cell without a leading weekday.
 fn without_weekday(cell: &str) -> &str {
     const DAYS: [&str; 7] = ["mon", "tue", "wed", "thu", "fri", "sat", "sun"];
     match cell.split_once([' ', ',']) {
@@ -137,7 +137,7 @@ fn without_weekday(cell: &str) -> &str {
     }
 }
 
-/// A cell in its date and its time of day.
+/// A cell split into date and time of day.
 fn parted(cell: &str) -> (Option<&str>, Option<&str>) {
     let Some(colon) = cell.find(':') else {
         return (Some(cell), None);
@@ -185,7 +185,7 @@ fn date_of(text: &str) -> Option<Date> {
         return days(year(a)?, number(b, 2)?, number(c, 2)?);
     }
     let (first, second, year) = (number(a, 2)?, number(b, 2)?, year(c)?);
-    // With points it is the day that comes first.
+    // With points the day is first.
     if text.contains('.') {
         return days(year, second, first);
     }
@@ -224,7 +224,7 @@ fn days_from_civil(year: i32, month: u32, day: u32) -> Option<i64> {
     Some(era * 146_097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719_468)
 }
 
-/// What stands behind the times of each half of a day, and its hours.
+/// Suffixes of the two halves of a day, with their hours.
 const HALVES: [([&str; 2], u8); 2] = [(["AM", "a.m."], 0), (["PM", "p.m."], 12)];
 
 /// Seconds since midnight of `23:55:01.250`, `11:55 PM`, `23:55:01+02:00`, and one unit in their last printed place.
@@ -243,7 +243,7 @@ fn clock(text: &str) -> Option<(f64, f64)> {
         None => (text, None),
     };
     let mut parts: Vec<&str> = text.split(':').collect();
-    // Some write the milliseconds after another colon.
+    // Some programs write milliseconds after a third colon.
     let milliseconds = match parts.as_slice() {
         [_, _, _, ms] if ms.len() == 3 => parts.pop(),
         _ => None,
@@ -314,7 +314,7 @@ fn without_offset(text: &str) -> (&str, f64) {
     (time.trim_end(), seconds)
 }
 
-/// A column of stamps in seconds, or the first row whose stamp is of another kind than the first.
+/// A column of stamps in seconds, or the first row whose stamp is of another kind than the first row's.
 pub(super) fn resolve(stamps: &[Stamp]) -> Result<Stamped, usize> {
     let kind = stamps.first().map_or(Kind::Clock, Stamp::kind);
     if let Some(row) = stamps.iter().position(|s| s.kind() != kind) {
@@ -353,7 +353,7 @@ pub(super) fn resolve(stamps: &[Stamp]) -> Result<Stamped, usize> {
     })
 }
 
-/// Days of the dates. Where day and month may be either, the order is the one in which the record is shorter.
+/// Days of the dates. The ambiguous order of day and month is the one that gives the shorter record.
 fn days(stamps: &[Stamp]) -> Result<Vec<i64>, usize> {
     let by = |day_first: bool| -> Result<Vec<i64>, usize> {
         let each = stamps.iter().enumerate().map(|(row, stamp)| {

@@ -13,23 +13,24 @@ use crate::error::{DataError, DataProblem, FilePlace, printable};
 
 /// Most cells of a row: as many columns as a spreadsheet has.
 const WIDEST: usize = 16_384;
-/// Bytes of memory that a line takes beside its text, and a cell: its value and its last place, and its copy in a record.
+/// Bytes of memory per line beside its text, and per cell: its value, its last place, and its copy in a
+/// record.
 const LINE: u64 = 32;
 const CELL: u64 = 24;
 
-/// Name of the column that a serial monitor's clock makes.
+/// Column name of a serial monitor's clock.
 const MONITOR: &str = "received";
 
-/// How lines become rows.
+/// Layout of the rows.
 enum Layout {
     Table(Rows),
     Labelled(Labels),
 }
 
-/// One line as a row.
+/// A line as a row.
 enum Line {
     Row,
-    /// Nothing of a row; it may stand between rows.
+    /// Not a row; may occur between rows.
     Other,
     /// A row with too few or too many cells.
     Length(usize),
@@ -76,7 +77,7 @@ impl Layout {
             Self::Table(_) if is_comment(line) => Line::Other,
             Self::Table(rows) => {
                 rows.separator.split(line, cells);
-                // Programs that end a row with separators make no empty columns of them.
+                // Trailing separators do not make empty columns.
                 while cells.len() > rows.width && cells.last().is_some_and(|c| c.is_empty()) {
                     cells.pop();
                 }
@@ -102,7 +103,7 @@ impl Layout {
 
 /// The columns of a table.
 pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, DataError> {
-    // The text beside its bytes, and where its lines are.
+    // Memory of the text and of its line index.
     let lines = bytes.iter().filter(|b| **b == b'\n').count() as u64 + 1;
     budget.take(2 * bytes.len() as u64 + lines * LINE, || {
         "its text".to_owned()
@@ -171,9 +172,9 @@ pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, Dat
             true => "commas are taken for thousands marks",
             false => "commas are taken for decimal commas",
         };
-        source.remarks.push(format!(
-            "{as_what}; no number of the file says which they are"
-        ));
+        source
+            .remarks
+            .push(format!("{as_what}; the file does not show which"));
     }
     let mut described: Vec<_> = names.into_iter().zip(units).zip(columns).collect();
     if stamps.is_some() && described.iter().all(|((name, _), _)| name != MONITOR) {
@@ -208,7 +209,7 @@ pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, Dat
     Ok(source)
 }
 
-/// The column that says AM or PM of the clock time in the column before it.
+/// The column with AM or PM for the clock time in the column before it.
 fn halves(layout: &Layout, lines: &[&str], rows: &[usize]) -> Option<usize> {
     let mut cells = Vec::new();
     let mut is_half = |at: usize, column: usize| {
@@ -226,7 +227,7 @@ fn halves(layout: &Layout, lines: &[&str], rows: &[usize]) -> Option<usize> {
     all.then_some(column)
 }
 
-/// Indices of the lines that are rows; what is passed over is remarked.
+/// Indices of the lines that are rows; skipped lines are remarked.
 fn rows(
     layout: &Layout,
     lines: &[&str],
@@ -243,7 +244,7 @@ fn rows(
         let found = layout.split(line, &mut cells);
         let is_last = at + 1 == lines.len() && is_cut;
         match found {
-            // A program that was stopped leaves half a line.
+            // A stopped program leaves half a line.
             Line::Length(_) if is_last => others.push(at),
             Line::Row
                 if is_last && matches!(layout, Layout::Labelled(_)) && cells.contains(&"") =>

@@ -1,4 +1,4 @@
-//! When the samples of a file were taken: from a time in any unit, from dates and clock times, or from a stated period.
+//! Sampling times of a file: from a time column, from dates and clock times, or from a stated period.
 
 use super::mapping::Mapping;
 use super::names::{TIMES, find, known_as, seconds, seconds_by_name};
@@ -8,12 +8,12 @@ use super::stamp::Kind;
 use crate::error::{DataError, FilePlace};
 use crate::sampling::{Clock, PrintedTimes, Rounded, Stated, tidy};
 
-/// A time of this size, s, is counted from 1970 and not from the start of the record.
+/// A time above this, s, is counted from 1970.
 const SINCE_1970: f64 = 1e9;
 
 /// The samples' times.
 pub(super) struct Timing<'a> {
-    /// The variables that say it; they are no channels.
+    /// The variables used for it; they are no channels.
     pub(super) variables: Vec<&'a Variable>,
     /// Time of the first sample, s.
     pub(super) t0: f64,
@@ -21,18 +21,18 @@ pub(super) struct Timing<'a> {
     pub(super) period_s: f64,
 }
 
-/// How the numbers of a time become seconds.
+/// Conversion of a time's numbers to seconds.
 struct Scale {
     seconds: f64,
-    /// Set where the size of the numbers says that they are counted from 1970: their unit.
+    /// The unit, if the size of the numbers shows a Unix time.
     epoch: Option<&'static str>,
 }
 
 impl Mapping {
-    /// The times of the `n` samples of a file. What was found goes to `found`, what should be known to `remarks`.
+    /// The times of the `n` samples of a file. The interpretation is added to `found`, remarks to `remarks`.
     ///
     /// # Errors
-    /// [`DataError`] naming the cell, or what the file lacks.
+    /// [`DataError`] naming the cell, or the missing column.
     pub(super) fn timing<'a>(
         &self,
         source: &'a Source,
@@ -129,7 +129,7 @@ impl Mapping {
         })
     }
 
-    /// The variable that is the time; none where the file has none, or it is to be ignored.
+    /// The time variable; none if the file has none or it is ignored.
     fn time<'a>(
         &self,
         source: &'a Source,
@@ -201,7 +201,7 @@ fn counted_from(first: &str) -> String {
     format!("time is counted from the first row ({first})")
 }
 
-/// A clock with the days of the file, or a day with its clock: the clock, and the dates.
+/// A clock with the dates of the file, or dates with the clock.
 fn with_date<'a>(
     source: &'a Source,
     time: &'a Variable,
@@ -240,7 +240,7 @@ fn stated_period(source: &Source) -> Option<f64> {
 
 /// Times in seconds, counted from `start`, which is in the file's unit.
 fn scaled(t: &Variable, start: f64, scale: f64) -> PrintedTimes {
-    // Milliseconds divide exactly where a multiplication by 0.001 would not.
+    // Division by 1000 is exact where multiplication by 0.001 is not.
     let whole = (1.0 / scale).round();
     let by = |v: f64| match (whole * scale - 1.0).abs() < 1e-12 && whole > 1.0 {
         true => v / whole,
@@ -253,7 +253,7 @@ fn scaled(t: &Variable, start: f64, scale: f64) -> PrintedTimes {
             let units = units.iter().zip(&t.values);
             units.map(|(unit, v)| unit.max(bits(v)) * scale).collect()
         }
-        // A clock that was added up is off by more than the last bit of one value.
+        // An accumulated clock has larger errors than the last bit.
         Exactness::Relative(share) => {
             let values = t.values.iter();
             values.map(|v| 8.0 * share * (v * scale).abs()).collect()
@@ -262,7 +262,7 @@ fn scaled(t: &Variable, start: f64, scale: f64) -> PrintedTimes {
     PrintedTimes { time, unit }
 }
 
-/// What is to be known of a clock whose rounded times explain its uneven steps.
+/// The remark on a clock whose uneven steps are explained by rounding.
 fn explained(clock: &Clock, rounded: &Rounded, times: &PrintedTimes, source: &Source) -> String {
     let (span, steps) = times.span();
     let mut text = format!(

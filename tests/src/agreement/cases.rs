@@ -1,4 +1,4 @@
-//! The models that are compared.
+//! The models to compare.
 
 use host_fit::model::{CommandRange, Delay, Model, TransportLaw};
 use host_fit::user_effect::Definition;
@@ -7,10 +7,10 @@ use model_core::effects::{LAWS, NUISANCES, SPECS};
 use model_core::recursion::Grading;
 use std::path::{Path, PathBuf};
 
-/// A model with the name under which it is reported.
+/// A model with its display name.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// What it is.
+    /// Its name.
     pub name: String,
     /// The model.
     pub model: Model,
@@ -33,7 +33,7 @@ fn middle(spec: &Spec) -> Vec<f64> {
     each.map(|p| p.starts[p.starts.len() / 2]).collect()
 }
 
-/// A flow of first order with a memory, which any effect can be added to.
+/// A first-order flow with a memory, to which any effect can be added.
 fn base() -> Model {
     Model {
         state_lags: vec![1, 30],
@@ -57,7 +57,7 @@ pub fn cases() -> Vec<Case> {
     for folder in ["data/paper", "firmware/identified/models"] {
         for path in files(folder) {
             let name = path.file_stem().unwrap_or_default().to_string_lossy();
-            // The rig's file is no model.
+            // The rig file is not a model.
             if name != "rig" {
                 add(name.into_owned(), Model::load(&path).expect("a model"));
             }
@@ -111,7 +111,7 @@ pub fn cases() -> Vec<Case> {
     model.define(all).expect("no other");
     model.add(all.spec(), &[0.3, 0.0213], None);
     add("own: every function".to_owned(), model);
-    // Effects that see one another.
+    // Effects that interact.
     let mut model = base();
     for name in [
         "slow-wake",

@@ -1,4 +1,4 @@
-//! Runs the generated files by the tools of their languages.
+//! Runs the exported files with the tools of their languages.
 
 use super::{Case, Row, TOLERANCE, Vectors};
 use anyhow::{Context, Result, bail, ensure};
@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// What runs a language.
+/// A language's tool.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tool {
     /// GCC.
@@ -49,7 +49,7 @@ impl Tool {
     }
 }
 
-/// The Python that has NumPy: the first on the path, or the system's.
+/// The first Python on the path with NumPy, or the system's.
 fn python() -> &'static str {
     let has = |program: &str| {
         let mut command = Command::new(program);
@@ -66,7 +66,7 @@ fn python() -> &'static str {
     }
 }
 
-/// Readings at rest, readings after another beginning, estimates of the law, its decisions.
+/// Readings from rest, readings from another initial state, estimates of the law, its decisions.
 type Said = [Vec<f64>; 4];
 
 fn expected<T: model_core::Real>(case: &Case, vectors: &Vectors) -> Said {
@@ -153,7 +153,7 @@ pub fn run(tool: Tool, cases: &[Case], folder: &Path) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// Commands with channels, and readings, as text: `NaN` is read by all.
+/// Commands with channels, and readings, as text; `NaN` is understood by all.
 fn write_inputs(folder: &Path, i: usize, vectors: &Vectors) -> Result<()> {
     let mut text = String::new();
     for (u, row) in vectors.u.iter().zip(&vectors.channels) {

@@ -1,5 +1,5 @@
-//! Whether a model says the same in every language that `codegen` writes: each bundled model, each effect and delay
-//! law of the catalogue, own effects, a command range, the laws.
+//! Agreement of the exported models between all languages of `codegen`: each bundled model, each effect and
+//! delay law of the catalogue, user effects, a command range, the control laws.
 
 mod cases;
 mod languages;
@@ -9,7 +9,7 @@ pub use cases::{Case, cases};
 pub use languages::{Tool, run};
 pub use vectors::Vectors;
 
-/// What Python and Octave may differ by, of the largest |y|.
+/// Tolerance for Python and Octave, relative to the largest |y|.
 pub const TOLERANCE: f64 = 1e-12;
 
 /// A case in a language.
@@ -19,8 +19,8 @@ pub struct Row {
     pub case: String,
     /// The language and its numbers.
     pub language: &'static str,
-    /// The largest difference, of the largest |y|; 0 where every bit agrees.
+    /// The largest difference relative to the largest |y|; 0 for bit equality.
     pub difference: f64,
-    /// Whether that is what is promised.
+    /// Whether it is within the promised tolerance.
     pub agrees: bool,
 }

@@ -1,4 +1,4 @@
-//! One set of test vectors: commands, channels and readings, and what the host says to them.
+//! Test vectors: commands, channels and readings, with the host's results.
 
 use closed_loop::AHEAD;
 use host_fit::model::{Law, Model, Rounding, Start};
@@ -9,21 +9,21 @@ use model_core::control::pulses::Played;
 use model_core::self_test::command;
 use std::ops::ControlFlow;
 
-/// Samples of a free run.
+/// Length of a free run, samples.
 const SAMPLES: usize = 2400;
-/// Samples of the law.
+/// Length of a run of the law, samples.
 const LAW_SAMPLES: usize = 320;
 
-/// Inputs, all of them numbers of single precision.
+/// Inputs, all representable in single precision.
 #[derive(Clone, Debug)]
 pub struct Vectors {
     /// Commands in the unit of the model's records: on and off, then of part strength.
     pub u: Vec<f64>,
     /// A row for each sample.
     pub channels: Vec<Vec<f64>>,
-    /// Command and reading before the run that does not begin at rest.
+    /// Command and reading before the run that does not start at rest.
     pub before: [f64; 2],
-    /// Readings for the law; NaN for none.
+    /// Readings for the law; NaN for a missing one.
     pub readings: Vec<f64>,
 }
 
@@ -88,8 +88,8 @@ impl Vectors {
         y
     }
 
-    /// What the law decides, its estimates, and the readings that it was given: its own estimate, disturbed, or those
-    /// that there are.
+    /// The law's decisions, estimates and readings: its own estimate with disturbances, or the given
+    /// readings.
     #[must_use]
     pub fn law<T: Real>(&self, model: &Model) -> (Vec<bool>, Vec<f64>, Vec<f64>) {
         match &model.law {

@@ -1,15 +1,16 @@
-//! Whether every model says the same in every language: `cargo xtask agreement`.
+//! Agreement of the exported models between languages: `cargo xtask agreement`.
 
 use anyhow::{Result, bail};
 use clap::Parser;
 use scenarios::agreement::{Tool, cases, run};
 use std::process::ExitCode;
 
-/// Runs every bundled model, effect, delay law and law in C, Python and Octave beside the host.
+/// Runs every bundled model, effect, delay law and control law in C, Python and Octave and compares with the
+/// host.
 #[derive(Debug, Parser)]
 #[command(name = "agreement")]
 struct Arguments {
-    /// A language whose tool is not installed is a failure.
+    /// Fail if a language's tool is not installed.
     #[arg(long)]
     all: bool,
     /// Only cases whose names contain this.

@@ -1,5 +1,5 @@
-//! The designed law against what people use, on plants that are not its model:
-//! `cargo xtask bench-law`.
+//! The designed law compared with standard controllers, on plants that differ from its model: `cargo xtask
+//! bench-law`.
 
 use closed_loop::{
     Controller, Figures, FirstOrder, Gains, OpenLoop, PulseWidth, Relay, TrackingController, run,
@@ -17,27 +17,26 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 const PLANTS: u64 = 8;
-/// Nothing was chosen on these.
+/// Seeds from here on were not used for tuning.
 const FIRST_SEED: u64 = 900;
 const SAMPLES: usize = 12_000;
 const JUDGED: usize = 3000;
 const TIMES: HoldTimes = HoldTimes { on: 10, off: 10 };
 
-/// Runs a contender for a target on a bench.
+/// A run of a controller for a target on a bench.
 type Run = fn(&Bench, f64) -> Option<Figures>;
 
-/// A flow with noise, and the model somebody identified of it: gain 5 % high,
-/// delays 5 % long, time constants 10 % short.
+/// A plant with noise, and a model with errors: gain +5 %, delays +5 %, time constants −10 %.
 struct Bench {
     base: BasePlant,
     model: Model,
-    /// Of the sensor, as a calibration measures it.
+    /// Low-frequency sensor noise, as a calibration measures it.
     slow_noise: f64,
     seed: u64,
 }
 
 impl Bench {
-    /// A drawn plant with its time constants `slower` times as long.
+    /// A random plant with its time constants multiplied by `slower`.
     fn draw(seed: u64, slower: f64) -> Self {
         let drawn = BasePlant::draw(&mut ChaCha8Rng::seed_from_u64(seed));
         let base = BasePlant {
@@ -77,7 +76,7 @@ impl Bench {
         }
     }
 
-    /// The figures of a run towards `reference`, judged against `goal`.
+    /// The figures of a run towards `reference`, evaluated against `goal`.
     fn run(&self, mut controller: impl Controller, reference: f64, goal: f64) -> Figures {
         let rig =
             Rig::new(&PlantSpec::new(self.base, &[]), None).expect("a drawn plant is possible");
@@ -100,7 +99,7 @@ impl Bench {
         Figures::of(&trace, JUDGED)
     }
 
-    /// A run whose mean friction is `goal`: the reference is moved until it is.
+    /// A run whose mean friction is `goal`, found by adjusting the reference.
     fn at_mean<C: Controller>(&self, goal: f64, controller: impl Fn() -> C) -> Figures {
         let mut reference = goal;
         let mut best = self.run(controller(), reference, goal);
@@ -128,7 +127,7 @@ impl Bench {
         track(&self.model, &request).ok().map(|design| design.law)
     }
 
-    /// The law, with the reference it was designed for and no help from outside.
+    /// The law for its own reference, without adjustment.
     fn law(&self, goal: f64, switches_per_s: Option<f64>, least_air: bool) -> Option<Figures> {
         let design = self.designed(goal, switches_per_s, least_air)?;
         let prepared = self.model.prepare::<f32>();
@@ -177,7 +176,7 @@ impl Bench {
         first.unwrap_or_else(|| at(0.25 * switches_per_s))
     }
 
-    /// The gains of a grid that hold the goal most closely on this very plant.
+    /// The PI gains of a grid with the smallest error on this plant.
     fn tuned(&self, goal: f64, smith: bool) -> Figures {
         let mut best: Option<Figures> = None;
         for proportional in [0.0, 0.2, 0.5, 1.0, 2.0] {
@@ -215,10 +214,10 @@ impl Bench {
     }
 }
 
-/// What two seconds of a sensor at rest say of its noise in averages over 64 samples, as `record --calibrate` does.
+/// Noise of a sensor at rest over two seconds, averaged over 64 samples, as in `record --calibrate`.
 fn slow_noise(seed: u64) -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    // Another noise than that of the runs.
+    // Independent of the noise of the runs.
     rng.set_stream(9);
     let mut noise = NoiseSignal::new(Noise::HOT_FILM, rng);
     let means: Vec<f64> = (0..31)
@@ -228,7 +227,7 @@ fn slow_noise(seed: u64) -> f64 {
     (means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / 30.0).sqrt()
 }
 
-/// Means over plants.
+/// Means over the plants.
 #[derive(Default)]
 struct Row {
     rms: f64,
@@ -270,7 +269,7 @@ fn heading(text: &str) {
     );
 }
 
-/// Every contender on every plant, held at a share of steady blowing.
+/// Every controller on every plant, holding a share of steady blowing.
 fn hold_closely(benches: &[Bench], level: f64) {
     let rows: [(&str, Run); 11] = [
         ("steady blowing", |b, g| {
@@ -312,7 +311,7 @@ fn hold_closely(benches: &[Bench], level: f64) {
     }
 }
 
-/// The law at the mean friction that each contender happens to give.
+/// The law at the mean friction that each controller reaches.
 fn air_at_equal_mean(benches: &[Bench]) {
     let contenders: [(&str, Run); 6] = [
         ("open loop 4 Hz 50 %", |b, _| {

@@ -1,4 +1,4 @@
-//! Mutated input for everything that reads what others wrote; `cargo xtask fuzz` runs it.
+//! Fuzzing of every reader of untrusted input; run by `cargo xtask fuzz`.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -7,10 +7,10 @@ use clap::Parser;
 use host_fit::data::memory;
 use scenarios::fuzz::{TARGETS, Target, corpus, fuzz};
 
-/// Tries mutated input on each target for a while. An input that breaks something is kept with the tests.
+/// Tries mutated input on each target for some time. An input that causes a failure is stored with the tests.
 #[derive(Parser)]
 struct Args {
-    /// Minutes in all, shared by the targets.
+    /// Total duration in minutes, shared by the targets.
     #[arg(long, default_value_t = 1.0)]
     minutes: f64,
     /// Seed of the mutations.
@@ -31,7 +31,7 @@ fn main() -> ExitCode {
         eprintln!("the targets are {}", names.join(", "));
         return ExitCode::from(2);
     }
-    // What a small input may ask for.
+    // Memory limit for small inputs.
     memory::set_limit(200_000_000);
     std::panic::set_hook(Box::new(|_| {}));
     let time = Duration::from_secs_f64((60.0 * args.minutes / targets.len() as f64).max(0.1));

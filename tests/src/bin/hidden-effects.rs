@@ -20,28 +20,28 @@ struct Arguments {
     /// Rigs for each effect in another law than the catalogue's.
     #[arg(long, default_value_t = 1)]
     altered: u64,
-    /// Rigs that hide nothing, over all families, noises and nuisances.
+    /// Rigs without an effect, over all families, noises and nuisances.
     #[arg(long, default_value_t = 24)]
     nulls: u64,
-    /// Rigs that hide two effects.
+    /// Rigs with two effects.
     #[arg(long, default_value_t = 8)]
     pairs: u64,
-    /// Rigs for each fault that the catalogue does not have.
+    /// Rigs for each fault outside the catalogue.
     #[arg(long, default_value_t = 1)]
     outside: u64,
-    /// Rigs that are written down in five units each.
+    /// Rigs that are recorded in five units each.
     #[arg(long, default_value_t = 2)]
     units: u64,
-    /// Rigs for each effect of the size at which the diagnosis says that it would be seen.
+    /// Rigs for each effect at its detectable size.
     #[arg(long, default_value_t = 0)]
     power: u64,
-    /// Puts in so many times the size at which the diagnosis says that it would be seen.
+    /// Multiple of the detectable size.
     #[arg(long, default_value_t = 1.0)]
     power_times: f64,
-    /// Prints what the rows say of error rates, coverage and power in place of the tables of what was found.
+    /// Prints error rates, coverage and power in place of the tables of findings.
     #[arg(long)]
     calibration: bool,
-    /// Model that is handed in: default (what `identify` makes), lean, truth, guess, bad-delays.
+    /// Given model: default (from `identify`), lean, truth, guess, bad-delays.
     #[arg(long, default_value = "default", value_parser = given)]
     given: Given,
     /// Only this group: single, altered, nothing, pair, outside, units, power.
@@ -93,7 +93,7 @@ fn campaign(arguments: &Arguments) -> anyhow::Result<()> {
     (arguments.ledger).keep("hidden-effects", wanted, run, tell, told)
 }
 
-/// A line for whoever watches.
+/// A progress line.
 fn tell(row: &Row) {
     let mark = match (row.is_found(), row.is_right()) {
         (true, true) => "ok   ",

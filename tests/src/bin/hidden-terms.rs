@@ -19,13 +19,13 @@ struct Arguments {
     /// Rigs for each physics and each family.
     #[arg(long, default_value_t = 1)]
     draws: u64,
-    /// Rigs for each effect that is taken out of the catalogue.
+    /// Rigs for each effect that is removed from the catalogue.
     #[arg(long, default_value_t = 1)]
     without: u64,
     /// Rigs with nothing missing, over all families, noises and nuisances.
     #[arg(long, default_value_t = 60)]
     nulls: u64,
-    /// Terms that are asked for.
+    /// Number of terms to search.
     #[arg(long, default_value_t = 1)]
     terms: u32,
     /// Only this group: beyond, single, nothing.
@@ -65,7 +65,7 @@ fn campaign(arguments: &Arguments) -> anyhow::Result<()> {
     })
 }
 
-/// A line for whoever watches.
+/// A progress line.
 fn tell(row: &Row) {
     let mark = match (row.is_right(), row.has_place_in_set()) {
         (true, _) => "ok   ",

@@ -1,4 +1,4 @@
-//! Tries what must not change the answer of the program on rigs that are drawn at random.
+//! Tests invariances of the program's answer on random rigs.
 
 use std::process::ExitCode;
 use std::time::Duration;
@@ -11,25 +11,25 @@ use scenarios::invariances::{Broken, Change, Options, run};
 #[derive(Debug, Parser)]
 #[command(name = "invariances")]
 struct Arguments {
-    /// Rigs; each is changed in every way once.
+    /// Number of rigs; each is changed in every way once.
     #[arg(long, default_value_t = 200)]
     cases: u64,
     /// The first rig.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Records of `tests/data/strangers` in place of rigs, one after the other.
+    /// Use the records of `tests/data/strangers` in place of rigs.
     #[arg(long)]
     strangers: bool,
-    /// Ask `diagnose` of every so-many-th rig; 0 for none.
+    /// Run `diagnose` on every so-many-th rig; 0 for none.
     #[arg(long, value_name = "COUNT", default_value_t = 10)]
     diagnose_every: u64,
     /// Only this change: output, command, inverted, clock, rest, cut, order, names; repeatable.
     #[arg(long, value_name = "CHANGE", value_parser = change)]
     only: Vec<Change>,
-    /// A command that takes longer is stopped.
+    /// Time limit of a command.
     #[arg(long, value_name = "SECONDS", default_value_t = 300)]
     limit: u64,
-    /// Rigs that are asked of side by side.
+    /// Rigs that run in parallel.
     #[arg(long, value_name = "COUNT", default_value_t = 1)]
     jobs: usize,
     /// Print one JSON document.

@@ -1,4 +1,4 @@
-//! Counts wrong refusals of laws, accepted laws that lose attachment, and margins that do not hold.
+//! Counts wrong rejections of laws, accepted laws that lose attachment, and margins that do not hold.
 
 use std::fs::OpenOptions;
 use std::io::Write as _;
@@ -10,20 +10,21 @@ use scenarios::laws::{Row, play, table};
 
 /// Laws on simulated rigs whose plants share no code with the model: one table.
 ///
-/// Rows are kept in a file, one line a rig: a campaign that was stopped goes on where it was.
+/// Results are kept in a file, one line per rig; a stopped campaign continues there.
 #[derive(Debug, Parser)]
 #[command(name = "laws")]
 struct Arguments {
-    /// Rigs.
+    /// Number of rigs.
     #[arg(long, default_value_t = 200)]
     rigs: u64,
     /// Seed of the first rig.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Identify with two lags each and without a diagnosis: a tenth of the time, and fewer models at the noise level.
+    /// Identify with two lags each and without a diagnosis: a tenth of the time, but fewer models at the
+    /// noise level.
     #[arg(long)]
     quick: bool,
-    /// Rows of rigs that were played, and where they are added to.
+    /// File of the results.
     #[arg(long, value_name = "FILE.jsonl")]
     rows: Option<PathBuf>,
 }

@@ -18,11 +18,11 @@ use std::time::{Duration, Instant};
 const DEAD_TIME: usize = 50;
 const LAG: f64 = 150.0;
 
-/// A flow of first order with dead time, read with some noise.
+/// A first-order flow with dead time, read with noise.
 #[derive(Default)]
 struct Flow {
     friction: f64,
-    /// The valve at the latest [`DEAD_TIME`] samples.
+    /// Valve positions of the latest [`DEAD_TIME`] samples.
     valve: std::collections::VecDeque<bool>,
     k: u64,
 }
@@ -83,8 +83,7 @@ fn begin(bench: &mut Bench, runs: &[u32]) -> Result<()> {
     Ok(())
 }
 
-/// What came of a stream: samples, samples that are missing by their numbers, and
-/// those of them that the board counted itself.
+/// Counts of a stream: samples, missing samples by number, and those that the board counted itself.
 fn count(
     bench: &mut Bench,
     while_at_it: &mut dyn FnMut(&mut Host, u32) -> Result<()>,
@@ -115,7 +114,7 @@ fn period_s(bench: &mut Bench) -> Result<f64> {
 fn shut(bench: &mut Bench) -> Result<()> {
     let until = Instant::now() + Duration::from_secs(120);
     let mut seen = None;
-    // Shut, and shut 50 samples later.
+    // Closed, and still closed 50 samples later.
     while Instant::now() < until {
         let samples = bench.emulator.samples();
         match (bench.emulator.is_open(), seen) {
@@ -144,7 +143,7 @@ fn garbage(mut bench: Bench) -> Result<String> {
                 .collect();
             sent += noise.len();
             host.port().send(&noise)?;
-            // Half a request, and the other half never.
+            // Half of a request without the other half.
             host.port().send(&[0, 40, 0x26, 1])?;
         }
         Ok(())
@@ -188,7 +187,7 @@ fn two(mut bench: Bench) -> Result<String> {
         Err(LineError::Refused { reason, .. }) => reason,
         other => bail!("{other:?}"),
     };
-    // The first has gone: what it had played has ended, and the fault waits to be noted.
+    // The first host is gone: its command has ended, and the fault waits to be acknowledged.
     ensure!(
         refused.contains("link") || refused.contains("another host"),
         "{refused}"
@@ -253,7 +252,7 @@ fn typed(mut bench: Bench) -> Result<String> {
     Ok(format!("shut after {came} samples, and the stream says so"))
 }
 
-/// Four thousand samples of the law, on a flow that is not its model's.
+/// Four thousand samples of the law on a plant that differs from its model.
 fn watched(mut bench: Bench) -> Result<String> {
     let period_s = period_s(&mut bench)?;
     let plan = Plan {

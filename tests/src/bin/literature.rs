@@ -6,19 +6,19 @@ use clap::Parser;
 use scenarios::campaign::Ledger;
 use scenarios::campaign::literature::{Row, cases, run, table};
 
-/// The diagnosis on flows that others published, behind the instruments of a real rig.
+/// The diagnosis on flows from the literature with realistic instruments.
 ///
-/// A third of the cases hide nothing. One line a case is kept in a file: a campaign that was stopped goes on where
-/// it was. Rows belong to the program that made them; take a new file for a new program.
+/// A third of the cases hide nothing. Results are kept in a file, one line per case; a stopped campaign
+/// continues there. Results belong to one version of the program: use a new file for a new version.
 #[derive(Debug, Parser)]
 #[command(name = "literature")]
 struct Arguments {
     #[command(flatten)]
     ledger: Ledger,
-    /// How many cases; eighteen hold two effects and a null of every model.
+    /// Number of cases; eighteen include two effects and a null case of every model.
     #[arg(long, default_value_t = 18)]
     cases: usize,
-    /// White noise alone: no converter, no dead time of the valve, the same zero every day.
+    /// White noise only: no converter, no valve dead time, constant offset.
     #[arg(long)]
     ideal_instruments: bool,
 }
@@ -37,7 +37,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// A line for whoever watches.
+/// A progress line.
 fn tell(row: &Row) {
     let over = |over: Option<f64>| over.map_or("-".to_owned(), |over| format!("{over:.3}"));
     eprintln!(

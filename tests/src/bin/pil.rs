@@ -12,12 +12,12 @@ use std::time::Instant;
 /// QEMU's SysTick under `-icount shift=5`: 40 ns a tick, 32 ns an instruction.
 const INSTRUCTIONS_PER_TICK: f64 = 1.25;
 
-/// The processor in the loop.
+/// Commands of the lockstep run.
 #[derive(Parser)]
 enum Task {
     /// Writes the constants of all cases.
     Constants {
-        /// Where to.
+        /// Output folder.
         folder: PathBuf,
         /// This model instead of the usual cases.
         #[arg(long)]
@@ -40,13 +40,13 @@ enum Task {
         /// Steps of every case.
         #[arg(long)]
         steps: Option<usize>,
-        /// Every so many bytes one is left out, to show that it is noticed; 0 never.
+        /// Drop one byte in so many, to test error detection; 0 for none.
         #[arg(long, default_value_t = 997)]
         lose: usize,
         /// Only this case.
         #[arg(long)]
         case: Option<String>,
-        /// Where to write what was measured, for `firmware/budgets.toml`.
+        /// File for the measured figures, for `firmware/budgets.toml`.
         #[arg(long)]
         report: PathBuf,
         /// The command that starts QEMU.
@@ -76,7 +76,7 @@ fn main() -> Result<()> {
             for case in &mut cases {
                 case.steps = steps.unwrap_or(case.steps);
             }
-            // A real board counts the cycles of its core.
+            // A real board counts core cycles.
             let (link, per_tick, unit) = match &serial {
                 Some(device) => (Link::serial(device, lose)?, 1.0, "cycles"),
                 None => (

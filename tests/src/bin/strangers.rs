@@ -1,4 +1,4 @@
-//! Runs the program on records as strangers bring them and prints the table.
+//! Runs the program on records from other loggers and prints the table.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -29,10 +29,10 @@ struct Arguments {
     /// Leave out this command; repeatable.
     #[arg(long, value_name = "COMMAND", value_parser = step)]
     without: Vec<Step>,
-    /// A command that takes longer is stopped.
+    /// Time limit of a command.
     #[arg(long, value_name = "SECONDS", default_value_t = 300)]
     limit: u64,
-    /// Cases that are run side by side.
+    /// Cases that run in parallel.
     #[arg(long, value_name = "COUNT", default_value_t = 1)]
     jobs: usize,
 }

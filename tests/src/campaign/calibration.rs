@@ -1,4 +1,4 @@
-//! What a name is worth: error rates, coverage and power of the diagnosis, as a page for the docs.
+//! Error rates, coverage and power of the diagnosis, as a page of the docs.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -86,8 +86,8 @@ pub fn calibration(seed: u64, rows: &[Row]) -> String {
         share(&seen, Row::is_found),
         "70–90 %",
     );
-    // Delays of the edges, or a drift, are there to be found; a delay that depends on the state is in the base. Where what is true of
-    // the rig is named all the same, p is of that.
+    // Edge-dependent delays or a drift are true effects; a state-dependent delay belongs to the base. If a
+    // true property is named anyway, p belongs to it.
     let in_the_base = |row: &&&Row| {
         let mut others = row.also_right.iter();
         let truly_named = !row.missing.is_empty() && row.named().is_empty();

@@ -1,4 +1,4 @@
-//! What is tried: the cases of a campaign, from a seed.
+//! The cases of a campaign, drawn from a seed.
 
 use std::fmt;
 
@@ -10,7 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// What a case is counted under.
+/// Group of a case in the tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Group {
@@ -22,13 +22,13 @@ pub enum Group {
     Nothing,
     /// Two effects.
     Pair,
-    /// What the catalogue does not have.
+    /// A fault outside the catalogue.
     Outside,
-    /// A rig with one effect, written down in several units.
+    /// A rig with one effect, recorded in several units.
     Units,
-    /// Physics beyond the catalogue, which a search for unknown terms should find.
+    /// Physics outside the catalogue, for the search for unknown terms.
     Beyond,
-    /// One effect of the size at which the diagnosis of the rig without it says that it would be seen.
+    /// One effect at its detectable size according to the diagnosis of the rig without it.
     Power,
 }
 
@@ -44,7 +44,7 @@ impl Group {
         Self::Power,
     ];
 
-    /// The word in keys and on command lines.
+    /// Its name in keys and on command lines.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -60,18 +60,17 @@ impl Group {
     }
 }
 
-/// The model that is handed in.
+/// The model that is given to the diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Given {
-    /// What `identify` makes of the data with its defaults; with fixed delays where a delay law is hidden, which
-    /// would not be missing otherwise.
+    /// The model that `identify` makes by default; with fixed delays if a delay law is hidden.
     Default,
     /// One lag of each kind, identified.
     Lean,
-    /// The lags that the flow has in truth, identified, with a delay law unless that is hidden.
+    /// The true lags of the flow, identified, with a delay law unless that is hidden.
     Truth,
-    /// A rough guess that nobody fitted.
+    /// A rough guess without a fit.
     Guess,
     /// A guess with bad delays.
     BadDelays,
@@ -87,7 +86,7 @@ impl Given {
         Self::BadDelays,
     ];
 
-    /// The word in keys and on command lines.
+    /// Its name in keys and on command lines.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -103,28 +102,28 @@ impl Given {
 /// A rig to be diagnosed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
-    /// What it is counted under.
+    /// Its group.
     pub group: Group,
     /// The kind of flow.
     pub family: Family,
-    /// What is hidden, by the plant's names.
+    /// The hidden effects, by the plant's names.
     pub hidden: Vec<String>,
-    /// What the repeats are disturbed by.
+    /// Kind of noise in the repeats.
     pub noise: NoiseKind,
-    /// What is no effect.
+    /// Nuisances: deviations that are not effects.
     pub nuisances: Vec<Nuisance>,
-    /// So many times what is said to be seen is put in, where that is asked.
+    /// Multiple of the detectable size, in the group `Power`.
     pub times: f64,
-    /// In which units the rig is written down.
+    /// Units of the recorded data.
     pub units: Units,
-    /// The model that is handed in.
+    /// The given model.
     pub given: Given,
     /// Seed of rig, parameters, commands and noise.
     pub seed: u64,
 }
 
 impl Case {
-    /// A case of a first kind: coloured noise, no nuisance, own units, `identify`'s default model.
+    /// A basic case: coloured noise, no nuisance, own units, default model.
     #[must_use]
     pub fn new(group: Group, family: Family, hidden: &[&str], seed: u64) -> Self {
         Self {
@@ -145,7 +144,7 @@ impl Case {
     /// # Errors
     /// [`RigError`] for effects that cannot be in one rig.
     pub fn plan(&self) -> Result<RigPlan, RigError> {
-        // How much there is of an effect of just the size that is seen, its rig without it has to tell first.
+        // The detectable size is known only after diagnosing the rig without the effect.
         let drawn = if self.group == Group::Power {
             &[]
         } else {
@@ -156,7 +155,7 @@ impl Case {
         Ok(plan.in_units(self.units))
     }
 
-    /// What is hidden, in words.
+    /// The hidden effects in words.
     #[must_use]
     pub fn label(&self) -> String {
         if self.hidden.is_empty() {
@@ -167,7 +166,7 @@ impl Case {
     }
 }
 
-/// One word by which a row is found again; everything that determines the case is in it.
+/// Key of a result; contains everything that determines the case.
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let nuisances: Vec<&str> = self.nuisances.iter().map(|n| n.name()).collect();
@@ -192,12 +191,12 @@ impl fmt::Display for Case {
     }
 }
 
-/// How many of each group.
+/// Number of cases per group.
 #[derive(Clone, Copy, Debug)]
 pub struct Sizes {
     /// Rigs for each effect and family.
     pub draws: u64,
-    /// Rigs for each altered law; the families take turns.
+    /// Rigs for each altered law, cycling through the families.
     pub altered: u64,
     /// Rigs without an effect, over all families, noises and nuisances.
     pub nulls: u64,
@@ -205,15 +204,15 @@ pub struct Sizes {
     pub pairs: u64,
     /// Rigs for each fault.
     pub outside: u64,
-    /// Rigs that are written down in five units each.
+    /// Rigs that are recorded in five units each.
     pub units: u64,
-    /// Rigs for each effect of the size at which it is said to be seen; the families take turns …
+    /// Rigs for each effect at its detectable size, cycling through the families.
     pub power: u64,
-    /// … or of so many times that size.
+    /// Multiple of the detectable size in the group `Power`.
     pub power_times: f64,
 }
 
-/// The units of twins: seconds and y times these.
+/// Units of the copies of a rig: factors on time and y.
 const UNITS: [Units; 5] = [
     Units::OWN,
     Units { time: 20.0, y: 1.0 },
@@ -222,11 +221,11 @@ const UNITS: [Units; 5] = [
     Units { time: 1.0, y: 0.02 },
 ];
 
-/// Seeds of campaigns and of groups lie this far apart: no two share a rig.
+/// Distance between the seeds of campaigns and of groups, so that no two share a rig.
 const CAMPAIGN_SEEDS: u64 = 1_000_000;
 const GROUP_SEEDS: u64 = 100_000;
 
-/// Hands every rig of a campaign a seed of its own.
+/// Gives every rig of a campaign its own seed.
 pub(super) struct Seeds {
     campaign: u64,
     used: [u64; 8],
@@ -247,11 +246,11 @@ impl Seeds {
     }
 }
 
-/// One in so many rigs with an effect that shows on off and on is told levels between them nevertheless.
+/// One rig in so many with an on/off effect has a graded command nevertheless.
 const GRADED: u32 = 8;
 
-/// The cases of a campaign in an order that mixes them, so that the first of them are a sample of all. Every
-/// rig has a seed of its own, and with it a flow of its own.
+/// The cases of a campaign in random order, so that any first part is a sample of all. Every rig has its own
+/// seed and flow.
 #[must_use]
 pub fn cases(sizes: &Sizes, given: Given, seed: u64) -> Vec<Case> {
     let mut all: Vec<Case> = Vec::new();
@@ -261,7 +260,7 @@ pub fn cases(sizes: &Sizes, given: Given, seed: u64) -> Vec<Case> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x9013e);
         let mut case = Case::new(group, family, hidden, seed);
         case.given = given;
-        // Half of the rigs have noise that is white and coloured, the others any.
+        // Half of the rigs have white and coloured noise, the others any kind.
         if rng.random_bool(0.5) {
             case.noise = NoiseKind::ALL[rng.random_range(0..NoiseKind::ALL.len())];
         }
@@ -271,7 +270,7 @@ pub fn cases(sizes: &Sizes, given: Given, seed: u64) -> Vec<Case> {
         }
         all.push(case);
     };
-    // Effect, family: every effect meets every family in the course of the rounds.
+    // Over the rounds every effect meets every family.
     let families = Family::ALL.len();
     let turn = |round: u64, index: usize| Family::ALL[(round as usize + index) % families];
 
@@ -298,7 +297,7 @@ pub fn cases(sizes: &Sizes, given: Given, seed: u64) -> Vec<Case> {
     for number in 0..sizes.pairs {
         let (seed, family) = (next(Group::Pair), turn(number, 0));
         let mut name = || Effect::NAMES[rng.random_range(0..Effect::NAMES.len())];
-        // Pairs that cannot be in one rig, or would not show, are drawn again.
+        // Incompatible or undetectable pairs are drawn again.
         let names = loop {
             let names = [name(), name()];
             let shown = names.iter().all(|name| shows(name, family));
@@ -343,7 +342,7 @@ pub fn cases(sizes: &Sizes, given: Given, seed: u64) -> Vec<Case> {
     all
 }
 
-/// The so-manieth rig that hides nothing: in sixty of them each family meets each noise and each nuisance once.
+/// The null rig with this number: sixty cover each combination of family, noise and nuisance once.
 pub(super) fn nothing(number: u64, seed: u64) -> Case {
     let families = Family::ALL.len();
     let number = number as usize;
@@ -357,24 +356,24 @@ pub(super) fn nothing(number: u64, seed: u64) -> Case {
     case
 }
 
-/// Effects that need levels between off and on are asked for on the plain flow only: on others, what a part
-/// jet does to the flow is not defined by anybody.
+/// Effects that need levels between off and on are used on the first-order flow only, because the response of
+/// the others to jets of part strength is undefined.
 fn shows(name: &str, family: Family) -> bool {
     on_off(name) || family == Family::FirstOrder
 }
 
-/// Whether the diagnosis can say on plain records how much of it would be seen.
+/// Whether the diagnosis states a detectable size for it.
 fn has_amplitude(name: &str) -> bool {
     let card = model_core::effects::spec(name);
     let said = card.is_some_and(|card| card.amplitude.is_some() && card.channel.is_none());
     said && on_off(name)
 }
 
-/// Whether off and on are enough for it to show.
+/// Whether it is visible with on/off commands.
 fn on_off(name: &str) -> bool {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let base = firmware_sim::plant::BasePlant::draw(&mut rng);
-    // Laws that are not the catalogue's all do.
+    // Effects with other laws are all visible.
     let effect = Effect::draw(name, &base, &mut rng);
     effect.is_ok_and(|effect| effect.shows_with() == ShowsWith::OnOff)
         || Altered::NAMES.contains(&name)
@@ -409,7 +408,7 @@ mod tests {
         let kinds: BTreeSet<_> = nulls
             .map(|c| (c.family, c.noise, c.nuisances.clone()))
             .collect();
-        // Coloured noise is also what the nuisances come with.
+        // Coloured noise is also combined with the nuisances.
         assert_eq!(kinds.len(), 60);
         assert_eq!(all, cases(&sizes, Given::Default, 5000));
         let other = cases(&sizes, Given::Default, 5001);

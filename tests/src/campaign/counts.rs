@@ -32,7 +32,7 @@ pub(super) fn bounded(hits: usize, all: usize) -> String {
 mod tests {
     use super::*;
 
-    /// Worked out by hand; 0 of n has the upper bound z²/(n + z²).
+    /// Computed by hand; 0 of n has the upper bound z²/(n + z²).
     #[test]
     fn shares_have_wilsons_bounds() {
         assert_eq!(bounded(95, 100), "95 of 100 (95.0 %, 88.8–97.8 %)");

@@ -1,5 +1,5 @@
-//! What campaigns have in common: cases are picked, run side by side, and kept as one line of JSON each, so
-//! that a campaign can be stopped, taken up again and run in pieces.
+//! Bookkeeping of campaigns: selecting cases, running them in parallel, and storing one line of JSON each, so
+//! that a campaign can be stopped, continued and run in parts.
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -16,7 +16,7 @@ use serde::de::DeserializeOwned;
 
 use super::program::Program;
 
-/// What came of a case.
+/// The result of a case.
 pub trait Entry: Clone + Send + Serialize + DeserializeOwned {
     /// The case's key.
     fn key(&self) -> &str;
@@ -37,23 +37,23 @@ pub struct Ledger {
     /// Every N-th case from the I-th on, as 1/4.
     #[arg(long, default_value = "1/1", value_parser = part)]
     part: (usize, usize),
-    /// Only the first so many of these cases; they are mixed.
+    /// Only the first so many of these cases; the order is random.
     #[arg(long)]
     first: Option<usize>,
-    /// Cases that run at the same time. From two on, each run of the program has its share of the cores, and the
-    /// whole is done sooner; times on the clock are those of a user only with one.
+    /// Cases that run in parallel. With two or more the whole is faster, but wall-clock times differ from a
+    /// user's.
     #[arg(long, default_value_t = 1)]
     jobs: usize,
-    /// After how many seconds a run of the program is stopped.
+    /// Time limit of a run of the program, s.
     #[arg(long, default_value_t = 900)]
     limit: u64,
-    /// Keeps a folder for every case that is not as it should be: data set, answer, models, documents.
+    /// Folder for every unsuccessful case: data set, answer, models, documents.
     #[arg(long)]
     keep: Option<PathBuf>,
-    /// The program that is asked; the one beside this one if not given.
+    /// The program to test; by default the one beside this one.
     #[arg(long)]
     program: Option<PathBuf>,
-    /// Only print the tables of the rows that there are.
+    /// Only print the tables of existing results.
     #[arg(long)]
     table: bool,
     /// Only print the cases.
@@ -70,8 +70,8 @@ fn part(text: &str) -> Result<(usize, usize), String> {
 }
 
 impl Ledger {
-    /// Runs those of the `cases` of the campaign `name` that are asked for and not done yet, and prints the
-    /// table of all that are asked for.
+    /// Runs the selected `cases` of the campaign `name` that have no result yet, and prints the table of all
+    /// selected ones.
     ///
     /// # Errors
     /// Files that cannot be read or written.
@@ -127,7 +127,7 @@ impl Ledger {
     }
 }
 
-/// Plays cases and appends their rows.
+/// Runs cases and appends their results.
 fn play_all<C: Sync, R: Entry>(
     left: &[&C],
     jobs: usize,
@@ -163,8 +163,8 @@ fn play_all<C: Sync, R: Entry>(
     })
 }
 
-/// The rows of a file by their keys; the last of each counts. A line that cannot be read, as the last one of a
-/// campaign that was killed, is run again.
+/// The results of a file by key; the last one counts. An unreadable line, for example the last one of a
+/// killed campaign, is run again.
 fn read<R: Entry>(path: &Path) -> anyhow::Result<BTreeMap<String, R>> {
     let mut rows = BTreeMap::new();
     if !path.is_file() {

@@ -1,4 +1,4 @@
-//! The program that a campaign asks, and how long it takes to answer.
+//! Runs the program under test and measures its time.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,31 +11,30 @@ use serde_json::Value;
 /// How long a run of the program took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spent {
-    /// On the clock (s).
+    /// Wall-clock time (s).
     pub wall_s: f64,
-    /// Of all its threads (s); none where the system does not tell.
+    /// Processor time of all threads (s); none if the system does not provide it.
     pub cpu_s: Option<f64>,
 }
 
-/// The program that is asked.
+/// The program under test.
 #[derive(Clone, Debug)]
 pub struct Program {
     /// The binary `host-fit`.
     pub path: PathBuf,
-    /// After how long it is stopped.
+    /// Time limit.
     pub limit: Duration,
     /// Threads that a diagnosis may use; as many as there are cores if 0.
     pub threads: usize,
-    /// Where the folders of cases that are not as they should be are kept: data set, answer, models and
-    /// documents; nowhere if none.
+    /// Folder for unsuccessful cases (data set, answer, models, documents); none to discard them.
     pub keep: Option<PathBuf>,
 }
 
-/// How often a running program is looked at.
+/// Polling interval of a running program.
 const POLL: Duration = Duration::from_millis(5);
 
 impl Program {
-    /// The binary, as many threads as it wants, stopped after `limit`.
+    /// The binary with default threads and a time limit.
     #[must_use]
     pub fn new(path: PathBuf, limit: Duration) -> Self {
         Self {
@@ -46,7 +45,7 @@ impl Program {
         }
     }
 
-    /// Runs a command with `--json`; its document and how long it took.
+    /// Runs a command with `--json`; returns its document and duration.
     pub(super) fn json(
         &self,
         arguments: &[&str],
@@ -72,7 +71,7 @@ impl Program {
                 break status;
             }
             if start.elapsed() > self.limit {
-                // Gone already is as good as killed.
+                // An error means that it has ended already.
                 let _ = child.kill();
                 let _ = child.wait();
                 return Err(failed(&format!("stopped after {} s", self.limit.as_secs())));
@@ -90,10 +89,10 @@ impl Program {
     }
 }
 
-/// Ticks of the processor's clock in Linux's accounts; the same on every machine.
+/// Clock ticks per second in Linux's process accounting; equal on every machine.
 const TICKS_PER_SECOND: f64 = 100.0;
 
-/// What a process has used of the processor so far, all its threads; none where there is no `/proc`.
+/// Processor time of a process so far, all threads; none without `/proc`.
 fn cpu_seconds(process: u32) -> Option<f64> {
     let text = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
     // The second field, the name, may hold blanks; the times are the 14th and 15th.

@@ -1,4 +1,4 @@
-//! What came of a case: one line of JSON.
+//! The result of a case: one line of JSON.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,31 +6,31 @@ use super::case::Group;
 use super::ledger::Entry;
 use super::program::Spent;
 
-/// A parameter of a hidden effect, as it is and as it was found, in the units of the record.
+/// A parameter of a hidden effect: true and estimated value, in the units of the record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Found {
     /// EFFECT.PARAMETER.
     pub name: String,
-    /// As the rig has it.
+    /// True value of the rig.
     pub truth: f64,
-    /// As the written model has it.
+    /// Value in the written model.
     pub found: f64,
     /// Its symbol of unit.
     #[serde(default)]
     pub unit: String,
-    /// The stated 95 % interval; none where the diagnosis states none.
+    /// The stated 95 % interval; none if there is none.
     #[serde(default)]
     pub interval: Option<[f64; 2]>,
 }
 
 impl Found {
-    /// Whether it is right.
+    /// Whether it is within the tolerance.
     #[must_use]
     pub fn is_near(&self) -> bool {
         (self.found - self.truth).abs() <= NEAR * self.truth.abs()
     }
 
-    /// Whether the stated interval holds the truth; none where none is stated.
+    /// Whether the interval contains the truth; none without an interval.
     #[must_use]
     pub fn is_covered(&self) -> Option<bool> {
         let [low, high] = self.interval?;
@@ -48,34 +48,34 @@ impl Found {
     }
 }
 
-/// An effect of the size at which it is said to be seen.
+/// An effect at its detectable size.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PutIn {
     /// Its name.
     pub effect: String,
-    /// Its amplitude; none where the diagnosis says that any size could stay unseen.
+    /// Its amplitude; none if the diagnosis states that any size could stay undetected.
     pub amplitude: Option<f64>,
 }
 
-/// What came of a case.
+/// The result of a case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// The case's key.
+    /// Key of the case.
     pub key: String,
-    /// What it is counted under.
+    /// Its group.
     pub group: Group,
     /// Name of the family.
     pub family: String,
-    /// What is hidden, by the plant's names.
+    /// The hidden effects, by the plant's names.
     pub label: String,
     /// Noise, and nuisances where there are any.
     pub circumstances: String,
     /// The names that should be found.
     pub hidden: Vec<String>,
-    /// Names that would be no error beside them.
+    /// Further correct names.
     pub also_right: Vec<String>,
-    /// Whether the flow has a second lag: nobody can tell a lag of the film from it, so that one in a set with
-    /// `flow-lag` is true. One that is named alone is not.
+    /// Whether the flow has a second lag, which is equivalent to a lag of the film: a film lag in a set with
+    /// `flow-lag` is correct, one that is named alone is not.
     #[serde(default)]
     pub flow_lag: bool,
     /// The verdict, or `failed` with the reason in `failure`.
@@ -85,35 +85,34 @@ pub struct Row {
     pub failure: Option<String>,
     /// The effects named, in their order.
     pub missing: Vec<String>,
-    /// For each of them, what cannot be told from it.
+    /// Equivalence set of each of them.
     #[serde(default)]
     pub sets: Vec<Vec<String>>,
-    /// Terms that describe without being named.
+    /// Surrogates.
     #[serde(default)]
     pub stand_ins: Vec<String>,
-    /// Held-out error of the model as given, over the noise floor.
+    /// Validation error of the given model over the noise level.
     pub given_over_floor: Option<f64>,
-    /// Held-out error of the last model, over the noise floor.
+    /// Validation error of the final model over the noise level.
     pub over_floor: Option<f64>,
-    /// p-value of the whole search, for the effect that stands out most; none where none was tried.
+    /// Family-wise p-value of the most significant effect; none if none was tried.
     #[serde(default)]
     pub p_value: Option<f64>,
-    /// The effect and the size of its amplitude that were put in because the diagnosis of the same rig without
-    /// them said that they would be seen.
+    /// The added effect with its detectable size according to the diagnosis of the rig without it.
     #[serde(default)]
     pub put_in: Option<PutIn>,
     /// Parameters of the effects that were hidden and found.
     pub parameters: Vec<Found>,
-    /// How long the identification took.
+    /// Duration of the identification.
     pub identify: Spent,
-    /// How long the diagnosis took.
+    /// Duration of the diagnosis.
     pub diagnose: Spent,
 }
 
-/// A model is at the noise floor up to this factor.
+/// A model counts as at the noise level up to this ratio.
 pub(super) const AT_FLOOR: f64 = 1.1;
 
-/// Parameters are right up to this share of themselves.
+/// Relative tolerance of a parameter.
 const NEAR: f64 = 0.2;
 
 impl Entry for Row {
@@ -123,7 +122,7 @@ impl Entry for Row {
 }
 
 impl Row {
-    /// The names that count: without those that are true of the rig though nobody hid them.
+    /// The names that count: without those that are true of the rig although not hidden on purpose.
     #[must_use]
     pub fn named(&self) -> Vec<&str> {
         let has = |names: &[String], name: &str| names.iter().any(|other| other == name);
@@ -138,7 +137,7 @@ impl Row {
             .collect()
     }
 
-    /// Named though nothing of the kind is there.
+    /// Names of effects that the rig does not have.
     #[must_use]
     pub fn needless(&self) -> Vec<&str> {
         let named = self.named().into_iter();
@@ -146,8 +145,8 @@ impl Row {
         needless.collect()
     }
 
-    /// Whether what was hidden was found: first for one effect, both for two; nothing named for nothing; for
-    /// what the catalogue does not have, nothing named and something left to explain.
+    /// Whether the hidden effect was found: named first; both names for a pair; no name for a null case; for
+    /// a fault, no name and a verdict other than "nothing missing".
     #[must_use]
     pub fn is_found(&self) -> bool {
         if self.failure.is_some() {
@@ -167,7 +166,7 @@ impl Row {
         }
     }
 
-    /// Needless names with which nothing else is stated.
+    /// Wrong names that are alone in their sets.
     #[must_use]
     pub fn wrong_alone(&self) -> Vec<&str> {
         let mut names = self.needless();
@@ -181,32 +180,32 @@ impl Row {
         names
     }
 
-    /// Found, with nothing needless beside it.
+    /// Found, without a wrong name.
     #[must_use]
     pub fn is_right(&self) -> bool {
         self.is_found() && self.needless().is_empty()
     }
 
-    /// Found, or in the set that the records cannot tell apart.
+    /// Found, or in the equivalence set of a name.
     #[must_use]
     pub fn is_in_set(&self) -> bool {
         let mut sets = self.sets.iter().flatten();
         self.is_found() || sets.any(|name| self.hidden.first() == Some(name))
     }
 
-    /// Whether the last model is at the noise floor.
+    /// Whether the final model is at the noise level.
     #[must_use]
     pub fn is_at_floor(&self) -> bool {
         self.over_floor.is_some_and(|over| over <= AT_FLOOR)
     }
 
-    /// Whether all parameters of the hidden effects are right; none where there are none to compare.
+    /// Whether all parameters of the hidden effects are within the tolerance; none without any.
     #[must_use]
     pub fn parameters_hit(&self) -> Option<bool> {
         (!self.parameters.is_empty()).then(|| self.parameters.iter().all(Found::is_near))
     }
 
-    /// What was said, in short.
+    /// The verdict in short.
     #[must_use]
     pub fn said(&self) -> String {
         if let Some(failure) = &self.failure {

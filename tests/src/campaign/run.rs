@@ -17,7 +17,7 @@ use super::case::{Case, Given, Group};
 use super::program::{Program, Spent};
 use super::row::{Found, PutIn, Row};
 
-/// Runs a case. What goes wrong is a row too.
+/// Runs a case. A failure gives a result too.
 #[must_use]
 pub fn run(case: &Case, program: &Program) -> Row {
     let nuisances = case.nuisances.iter().map(|n| n.name());
@@ -56,7 +56,7 @@ pub fn run(case: &Case, program: &Program) -> Row {
         && row.parameters_hit() != Some(false)
         && let Some(folder) = &kept
     {
-        // What stays is looked at by people; a folder too many does no harm.
+        // Failures to remove a folder are harmless.
         let _ = fs::remove_dir_all(folder);
     }
     row
@@ -110,10 +110,10 @@ fn fill(row: &mut Row, case: &Case, program: &Program, folder: &Path) -> Result<
     Ok(())
 }
 
-/// The model that a diagnosis writes.
+/// File name of the model that a diagnosis writes.
 const FOUND: &str = "found.toml";
 
-/// What `diagnose` says of a rig, after `identify` where the case has no model to hand in; and how long both took.
+/// The diagnosis of a rig, after `identify` unless the case has a model of its own; with both durations.
 fn asked(
     case: &Case,
     plan: &RigPlan,
@@ -122,7 +122,7 @@ fn asked(
 ) -> Result<(Value, Spent, Spent), String> {
     let inside = |name: &str| folder.join(name).to_string_lossy().into_owned();
     let (data, given, found) = (inside("set"), inside("given.toml"), inside(FOUND));
-    // Of an earlier run.
+    // Left over from an earlier run.
     let _ = fs::remove_dir_all(folder.join("set"));
     let _ = fs::remove_file(&found);
     fs::create_dir_all(folder).map_err(|e| e.to_string())?;
@@ -151,8 +151,8 @@ fn verdict(document: &Value) -> Result<String, String> {
         .to_owned())
 }
 
-/// The effect of a case as large as the diagnosis of the rig without it says that it would be seen; none where it
-/// says that any size could stay unseen.
+/// The effect of a case at its detectable size according to the diagnosis of the rig without it; none if any
+/// size could stay undetected.
 fn just_seen(
     case: &Case,
     plan: &RigPlan,
@@ -198,7 +198,7 @@ fn names(list: &Value) -> Vec<String> {
         .collect()
 }
 
-/// Parameters of the hidden effects that the model has too.
+/// Estimated and true parameters of the hidden effects that the model contains.
 fn compare(plan: &RigPlan, model: &Model, document: &Value) -> Vec<Found> {
     let ranking = document["ranking"].as_array();
     let mut found = Vec::new();
@@ -226,7 +226,7 @@ fn compare(plan: &RigPlan, model: &Model, document: &Value) -> Vec<Found> {
     found
 }
 
-/// Options of `identify` for the model that is handed in.
+/// Options of `identify` for the given model.
 pub(super) fn structure(given: Given, plan: &RigPlan) -> Vec<String> {
     let hidden = plan.hidden();
     let lags = match (given, &plan.plant.character) {
@@ -235,7 +235,7 @@ pub(super) fn structure(given: Given, plan: &RigPlan) -> Vec<String> {
         (Given::Truth, Character::Wake { .. }) => 2,
         (Given::Truth, Character::FirstOrder | Character::RateOfFriction { .. })
         | (Given::Lean, _) => 1,
-        // A law that `identify` has found is not missing: what hides one is asked with fixed delays.
+        // A law found by `identify` is not missing: if one is hidden, fixed delays are used.
         (Given::Default, _) if hidden.contains(&"state-dependent-delay") => {
             return ["--delay", "fixed"].map(str::to_owned).to_vec();
         }
@@ -255,8 +255,8 @@ pub(super) fn structure(given: Given, plan: &RigPlan) -> Vec<String> {
         .to_vec()
 }
 
-/// A model as an engineer would hand it in without fitting: a rough guess, without delay law where the law is
-/// hidden; with the wrong lags and delays where the case says so.
+/// A rough model without a fit: without a delay law if the law is hidden, and with wrong lags and delays if
+/// the case requires it.
 fn guess(case: &Case, plan: &RigPlan) -> Option<Model> {
     let bad = match case.given {
         Given::Guess => false,

@@ -9,7 +9,7 @@ use super::case::Group;
 use super::counts::{bounded, seconds, share};
 use super::row::{AT_FLOOR, Row};
 
-/// Everything that was counted.
+/// All results.
 #[must_use]
 pub fn table(rows: &[Row]) -> String {
     let of = |group: Group| -> Vec<&Row> { rows.iter().filter(|r| r.group == group).collect() };
@@ -161,7 +161,7 @@ fn nulls(rows: &[&Row]) -> String {
     text
 }
 
-/// Twins by rig: the key without the units.
+/// Copies of a rig in other units, by the key without the units.
 fn rigs<'a>(rows: &[&'a Row]) -> BTreeMap<String, Vec<&'a Row>> {
     let mut rigs: BTreeMap<String, Vec<&Row>> = BTreeMap::new();
     for row in rows {
@@ -172,7 +172,7 @@ fn rigs<'a>(rows: &[&'a Row]) -> BTreeMap<String, Vec<&'a Row>> {
     rigs
 }
 
-/// Whether all twins say the same.
+/// Whether all copies have the same verdict.
 fn agree(twins: &[&Row]) -> bool {
     let said: BTreeSet<_> = twins.iter().map(|r| (&r.verdict, &r.missing)).collect();
     said.len() == 1

@@ -18,25 +18,25 @@ use rand_chacha::ChaCha8Rng;
 
 pub use targets::{TARGETS, Target};
 
-/// An input takes no longer than this; one that does is a fault.
+/// Time limit for an input; exceeding it is a failure.
 const LONGEST: Duration = Duration::from_secs(20);
-/// Inputs that are kept to be mutated.
+/// Number of inputs kept for mutation.
 const KEPT: usize = 5000;
-/// The longest input, bytes: what is read in lines and tables shows its faults in little.
+/// The longest input, bytes: small inputs are enough for line and table readers.
 const LARGEST: usize = 1 << 14;
 
-/// What came of a target.
+/// Result for a target.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
-    /// Inputs that were tried.
+    /// Number of inputs tried.
     pub executions: u64,
-    /// Different things that were said of them.
+    /// Number of distinct responses.
     pub said: usize,
-    /// The first input that broke something, and how.
+    /// The first input that caused a failure, and the failure.
     pub broken: Option<(Vec<u8>, String)>,
 }
 
-/// Where inputs of a target are kept.
+/// Folder of a target's stored inputs.
 #[must_use]
 pub fn corpus(target: &Target) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -44,7 +44,7 @@ pub fn corpus(target: &Target) -> PathBuf {
         .join(target.name)
 }
 
-/// The kept inputs of a target, by name.
+/// The stored inputs of a target, by name.
 #[must_use]
 pub fn kept(target: &Target) -> Vec<(String, Vec<u8>)> {
     let entries = std::fs::read_dir(corpus(target))
@@ -61,7 +61,7 @@ pub fn kept(target: &Target) -> Vec<(String, Vec<u8>)> {
     inputs
 }
 
-/// Tries one input: what is said of it, or how it broke the target.
+/// Tries one input: the response, or the failure.
 ///
 /// # Errors
 /// The panic's message.
@@ -74,7 +74,7 @@ pub fn try_one(target: &Target, input: &[u8]) -> Result<String, String> {
     })
 }
 
-/// The first words that are said, without numbers, and without what is quoted or bracketed: those are the input's.
+/// The first words of a response without numbers, quotes and brackets, which depend on the input.
 fn shape(said: &str) -> String {
     let mut own = String::new();
     let mut until = None;
@@ -92,7 +92,7 @@ fn shape(said: &str) -> String {
     words.join(" ")
 }
 
-/// Tries mutated inputs for so long, or until one breaks something.
+/// Tries mutated inputs for some time, or until a failure.
 #[must_use]
 pub fn fuzz(target: &Target, time: Duration, seed: u64) -> Outcome {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -135,7 +135,8 @@ pub fn fuzz(target: &Target, time: Duration, seed: u64) -> Outcome {
     outcome
 }
 
-/// Ends the process where an input takes too long: it cannot be ended otherwise. The input is left in the folder of temporary files.
+/// Ends the process if an input takes too long, since a thread cannot be stopped. The input is left in the
+/// folder of temporary files.
 fn watch(name: &'static str, now: std::sync::Weak<Mutex<(Instant, Vec<u8>)>>) {
     std::thread::spawn(move || {
         while let Some(now) = now.upgrade() {
@@ -159,7 +160,7 @@ fn watch(name: &'static str, now: std::sync::Weak<Mutex<(Instant, Vec<u8>)>>) {
 mod tests {
     use super::*;
 
-    /// What once broke something, and the seeds.
+    /// Stored failures, and the seeds.
     #[test]
     fn every_input_that_was_kept_is_withstood() {
         for target in TARGETS {
@@ -174,7 +175,7 @@ mod tests {
         }
     }
 
-    /// A fault is found, with the input that shows it.
+    /// A deliberate failure is found, with its input.
     #[test]
     fn a_fault_is_found() {
         fn odd(input: &[u8]) -> String {

@@ -3,7 +3,7 @@
 use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 
-/// Numbers at which programs break.
+/// Numbers that often cause failures.
 const NUMBERS: &[&str] = &[
     "0",
     "-0.0",
@@ -33,7 +33,7 @@ const NUMBERS: &[&str] = &[
     "",
 ];
 
-/// A changed copy of `input`; parts of `other` and `words` may get into it.
+/// A mutated copy of `input`; may contain parts of `other` and `words`.
 pub(super) fn mutated(
     mut input: Vec<u8>,
     other: &[u8],
@@ -111,7 +111,7 @@ fn change(input: &mut Vec<u8>, other: &[u8], words: &[&str], random: &mut ChaCha
     }
 }
 
-/// Puts one of [`NUMBERS`] in the place of a number that is near.
+/// Replaces a nearby number by one of [`NUMBERS`].
 fn number(input: &mut Vec<u8>, at: usize, random: &mut ChaCha8Rng) {
     let is_part = |b: &u8| b.is_ascii_digit() || matches!(b, b'.' | b'-' | b'+' | b'e' | b'E');
     let Some(from) = input

@@ -1,4 +1,4 @@
-//! What reads what others wrote, and what must hold of it.
+//! The readers of untrusted input, with the properties that must hold.
 
 use std::cell::RefCell;
 use std::fmt::Display;
@@ -16,16 +16,16 @@ use wire::reply::Reply;
 use wire::request::Request;
 use wire::samples::Samples;
 
-/// Something that reads.
+/// A reader under test.
 #[derive(Clone, Copy)]
 pub struct Target {
-    /// Its name, and that of its folder of kept inputs.
+    /// Its name, also of its folder of stored inputs.
     pub name: &'static str,
-    /// Where mutation begins.
+    /// Seeds of the mutation.
     pub seeds: fn() -> Vec<Vec<u8>>,
     /// Words of its language.
     pub words: &'static [&'static str],
-    /// Reads an input and says what it is, or what is wrong with it. It panics where something does not hold.
+    /// Reads an input and describes it or its error. Panics if a property does not hold.
     pub run: fn(&[u8]) -> String,
 }
 
@@ -184,11 +184,11 @@ fn raw() -> String {
 }
 
 thread_local! {
-    /// A folder for what is read from files.
+    /// Folder for inputs that are read from files.
     static ROOM: RefCell<Option<tempfile::TempDir>> = const { RefCell::new(None) };
 }
 
-/// A place for files; in memory where the system has such a folder, since what is saved is flushed to the disk.
+/// A folder for files; in memory if possible, because saved files are flushed to disk.
 fn room() -> PathBuf {
     ROOM.with_borrow_mut(|room| {
         let room = room.get_or_insert_with(|| {
@@ -206,7 +206,7 @@ fn file(name: &str, content: &[u8]) -> PathBuf {
     path
 }
 
-/// What is said of a fault: one paragraph that names the file.
+/// An error message: one paragraph that names the file.
 fn fault(error: impl Display, names: &str) -> String {
     let text = error.to_string();
     assert!(text.contains(names), "no `{names}` in: {text}");
@@ -214,7 +214,7 @@ fn fault(error: impl Display, names: &str) -> String {
     text
 }
 
-/// A set that was loaded is saved and loads again as it was.
+/// A loaded set is unchanged after saving and loading.
 fn survives(set: &DataSet) {
     for record in &set.records {
         assert!(
@@ -264,7 +264,7 @@ fn dataset(input: &[u8]) -> String {
             survives(&set);
             format!("{} records", set.records.len())
         }
-        // Names in it are the input's.
+        // Names in it come from the input.
         Err(error) => fault(error, "").replace(|c: char| !c.is_ascii(), ""),
     }
 }
@@ -330,7 +330,7 @@ fn model(input: &[u8]) -> String {
         true => model.run_free(&Signals::commanded(&model, &u)).is_ok(),
         false => false,
     };
-    // The golden run of a long memory takes its time.
+    // The golden run of a long memory is slow.
     if model.longest_lag().max(model.longest_delay()) > 500 {
         return format!("long, ran {ran}");
     }
@@ -418,7 +418,8 @@ fn frames() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Bytes from the line to either end; and the same bytes as the content of a whole frame, which a checksum hides otherwise.
+/// Bytes from the line to either end, and the same bytes as the content of a valid frame, since a checksum
+/// would reject them otherwise.
 fn framed(input: &[u8]) -> String {
     let mut receiver = Receiver::new();
     let mut said = (0, 0, "");
@@ -442,7 +443,7 @@ fn framed(input: &[u8]) -> String {
             came.push(content.to_vec());
         }
     }
-    // What does not fit into a frame comes as none.
+    // Content that does not fit into a frame gives none.
     assert!(
         came.iter().all(|came| content.starts_with(came)),
         "a frame came changed"

@@ -18,20 +18,20 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// A target of a rig.
+/// A target on a rig.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Asked {
     /// The target, as a share of the reachable interval.
     pub share: f64,
-    /// Why it is refused; `None` where it is accepted.
+    /// Why it is rejected; `None` if accepted.
     pub refused: Option<String>,
-    /// Whether the law keeps attachment on the true plant; `None` where there is no law.
+    /// Whether the law keeps attachment on the true plant; `None` without a law.
     pub works: Option<bool>,
-    /// The rms error there over that on the model.
+    /// Rms error there relative to that on the model.
     pub rms_ratio: Option<f64>,
 }
 
-/// An end of a stated margin, and what comes of it on the true plant.
+/// An end of a stated margin, tested on the true plant.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct End {
     /// Error and end.
@@ -49,30 +49,31 @@ pub struct Row {
     pub seed: u64,
     /// Its family.
     pub family: String,
-    /// What it hides; empty for nothing.
+    /// The hidden effect; empty for none.
     pub hidden: String,
-    /// What the diagnosis named.
+    /// Effects named by the diagnosis.
     pub named: Vec<String>,
     /// Validation error over the noise level.
     pub over_noise: f64,
-    /// Flows that the records leave possible.
+    /// Number of plants consistent with the records.
     pub possible: usize,
     /// The targets.
     pub targets: Vec<Asked>,
-    /// The ends of the margin of the first law that is accepted.
+    /// The ends of the margin of the first accepted law.
     pub ends: Vec<End>,
 }
 
-/// Targets on each rig.
+/// Number of targets per rig.
 const TARGETS: usize = 3;
 
-/// A model is at the noise level up to this, times the noise.
+/// A model counts as at the noise level up to this ratio.
 const AT_THE_NOISE: f64 = 1.1;
 
-/// A diagnosis is left out up to this, times the noise.
+/// Up to this ratio the diagnosis is omitted.
 const NOTHING_TO_EXPLAIN: f64 = 1.03;
 
-/// What the rig of this seed hides: every third one an effect of the catalogue that on/off records can show.
+/// The hidden effect of the rig of this seed: every third rig has an effect of the catalogue that on/off
+/// records show.
 fn plan_of(seed: u64) -> anyhow::Result<(RigPlan, String)> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let family = Family::ALL[rng.random_range(0..Family::ALL.len())];
@@ -117,7 +118,7 @@ fn with_errors(plant: &PlantSpec, [delay, gain, time]: [f64; 3]) -> PlantSpec {
     }
 }
 
-/// The rig in the loop, with its own noise.
+/// The rig in closed loop, with its own noise.
 fn in_the_loop(plan: &RigPlan, plant: &PlantSpec) -> anyhow::Result<Disturbed<Rig>> {
     let rig = Rig::new(plant, None).context("no such plant")?;
     let instrument = &plan.instrument;
@@ -130,7 +131,7 @@ fn in_the_loop(plan: &RigPlan, plant: &PlantSpec) -> anyhow::Result<Disturbed<Ri
     ))
 }
 
-/// Figures after the start, and whether attachment was kept: as `design` judges it.
+/// Figures after the start, and whether attachment was kept, as in `design`.
 fn judged(trace: &Trace, blown: &Trace, reference: f64) -> (Figures, bool) {
     let period_s = trace.sample_period_s;
     let [from, window] =
@@ -155,7 +156,7 @@ fn on_the_rig(model: &Model, law: &Track, flow: &(impl Controlled + Clone)) -> (
     judged(&trace, &blown, law.reference)
 }
 
-/// Plays the rig of a seed; a `quick` one is identified with two lags each and not diagnosed.
+/// Runs the rig of a seed; a `quick` one is identified with two lags each and not diagnosed.
 ///
 /// # Errors
 /// A rig that cannot be drawn, recorded or identified.
@@ -182,7 +183,7 @@ pub fn play(seed: u64, quick: bool) -> anyhow::Result<Row> {
     };
     let mut over_noise = of_noise(&identified.scores);
     let (mut model, mut named) = (identified.model, Vec::new());
-    // Nobody looks for what is missing from a model at the noise level.
+    // A model at the noise level is not diagnosed.
     let diagnosed = !quick && (over_noise > NOTHING_TO_EXPLAIN || over_noise.is_nan());
     if diagnosed {
         let found = steps::diagnose(&model, &set, &Options::default(), &())?;
@@ -268,7 +269,7 @@ fn ends(
         for (side, share) in [("lowest", interval.low), ("highest", interval.high)] {
             let mut factors = [1.0; 3];
             factors[index] = 1.0 + share;
-            // A plant that the simulator refuses says nothing.
+            // Plants that the simulator rejects are not counted.
             let Ok(flow) = in_the_loop(plan, &with_errors(&plan.plant, factors)) else {
                 continue;
             };

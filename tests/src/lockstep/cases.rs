@@ -1,5 +1,5 @@
-//! The models that a board runs in lockstep: base, averaged, laws, a user's own
-//! effects, terms that were found, and every effect of the catalogue by itself.
+//! The models that a board runs in lockstep: base, averaged, laws, user effects, discovered terms, and every
+//! effect of the catalogue by itself.
 
 use anyhow::{Context, Result};
 use host_fit::codegen::generate;
@@ -12,7 +12,7 @@ use model_core::effect::{Place, Spec};
 use model_core::effects::{LAWS, NUISANCES, SPECS};
 use std::path::Path;
 
-/// Steps of the cases that budgets are for, and of the many others.
+/// Steps of the cases with budgets, and of the others.
 const LONG: usize = 20_000;
 const SHORT: usize = 3_000;
 
@@ -31,14 +31,14 @@ macro_rules! bundled {
 pub struct Case {
     /// Name of its module on the board.
     pub name: String,
-    /// The model, its law with it.
+    /// The model with its law.
     pub model: Model,
-    /// Steps to make.
+    /// Number of steps.
     pub steps: usize,
 }
 
 impl Case {
-    /// A case that is judged over a long run.
+    /// A case with a long run.
     #[must_use]
     pub fn new(name: &str, model: Model) -> Self {
         Self {
@@ -91,7 +91,7 @@ pub fn all() -> Result<Vec<Case>> {
         let name = format!("effect_{}", spec.name.replace('-', "_"));
         cases.push(Case::new(&name, with_effect(&base, spec)).short());
     }
-    // As the board counts them.
+    // In the order of the board.
     cases.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(cases)
 }
@@ -113,7 +113,7 @@ pub fn at(periods_s: &[f64]) -> Result<Vec<Case>> {
             cases.push(Case::new(&format!("{name}_{us}us"), model).short());
         }
     }
-    // As the board counts them.
+    // In the order of the board.
     cases.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(cases)
 }
@@ -127,7 +127,7 @@ fn slower(period_s: f64) -> Result<Vec<(&'static str, Model)>> {
         ..Units::NONE
     };
     let on_clock = |model: &Model| Model {
-        // Not 0.0010000000000000002.
+        // Avoids 0.0010000000000000002.
         sample_period_s: period_s,
         ..clock.model_out(model)
     };
@@ -164,14 +164,14 @@ fn slower(period_s: f64) -> Result<Vec<(&'static str, Model)>> {
     ])
 }
 
-/// Every effect and delay law that a model can have, those of base models among them.
+/// Every effect and delay law of a model, base terms included.
 fn known() -> impl Iterator<Item = &'static Spec> {
     let effects = SPECS.iter().filter(|spec| spec.place != Place::Delay);
     LAWS.iter().chain(effects).chain(NUISANCES)
 }
 
-/// `base` with an effect at the first of its usual values. Its natural flow is a
-/// little below 0, for the effects that tell signs apart.
+/// `base` with an effect at the first of its starting values. Its rest level is slightly below 0, for effects
+/// that depend on the sign.
 fn with_effect(base: &Model, spec: &'static Spec) -> Model {
     let mut model = slightly_negative(base);
     let values: Vec<f64> = spec
@@ -179,7 +179,7 @@ fn with_effect(base: &Model, spec: &'static Spec) -> Model {
         .iter()
         .map(|parameter| {
             let start = parameter.starts.first().copied();
-            // 0 would do nothing.
+            // At 0 it would have no effect.
             start.filter(|start| *start != 0.0).unwrap_or(0.05)
         })
         .collect();
@@ -188,7 +188,7 @@ fn with_effect(base: &Model, spec: &'static Spec) -> Model {
     model
 }
 
-/// `base` with terms as `discover` writes them: a table, and a delay that changes.
+/// `base` with terms in the form of `discover`: a table, and a varying delay.
 fn with_found(base: &Model) -> Result<Model> {
     let mut model = slightly_negative(base);
     for text in [
@@ -211,7 +211,7 @@ fn slightly_negative(base: &Model) -> Model {
     }
 }
 
-/// `model` with a law that holds half its friction.
+/// `model` with a law that holds half of its friction.
 fn designed(mut model: Model) -> Result<Model> {
     let request = TrackRequest {
         min_on_s: 20.0 * model.sample_period_s,
@@ -222,11 +222,10 @@ fn designed(mut model: Model) -> Result<Model> {
     Ok(model)
 }
 
-/// Writes the constants of `cases` into `folder`, which must be there, and
-/// removes those of others.
+/// Writes the constants of `cases` into the existing folder `folder` and removes those of others.
 ///
 /// # Errors
-/// A model that has no constants, or a folder that takes no files.
+/// A model that has no constants, or a folder that cannot be written.
 pub fn write(cases: &[Case], folder: &Path) -> Result<()> {
     for file in std::fs::read_dir(folder).with_context(|| folder.display().to_string())? {
         let path = file?.path();
@@ -238,7 +237,7 @@ pub fn write(cases: &[Case], folder: &Path) -> Result<()> {
     for case in cases {
         let text = generate(&case.model).with_context(|| case.name.clone())?;
         let path = folder.join(&case.name).with_extension("rs");
-        // Only what changed is compiled anew.
+        // Unchanged files are not rewritten, to avoid recompilation.
         if std::fs::read_to_string(&path).ok().as_deref() != Some(&text) {
             std::fs::write(&path, text).with_context(|| path.display().to_string())?;
         }
@@ -246,7 +245,7 @@ pub fn write(cases: &[Case], folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The effects that a model has, by place.
+/// The effects of a model, by place.
 #[must_use]
 pub fn places(model: &Model) -> Vec<(String, Option<Place>)> {
     let names = model.effect_names().into_iter();
@@ -263,7 +262,7 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    /// What a model predicts to readings that make a relay blow most of the time.
+    /// Predictions of a model for readings that make a relay blow most of the time.
     fn predictions(model: &Model) -> Vec<u32> {
         let mut step = crate::lockstep::host::steps(model);
         let readings =
@@ -273,7 +272,7 @@ mod tests {
             .collect()
     }
 
-    /// A lockstep run of an effect that does nothing would show nothing.
+    /// A lockstep run of an effect without influence would test nothing.
     #[test]
     fn every_effect_changes_what_its_model_predicts() {
         let cases = all().expect("cases");
@@ -284,7 +283,7 @@ mod tests {
         }
     }
 
-    /// Effects that keep their times in seconds are other ones to a slower clock.
+    /// Effects with times in seconds differ at a slower clock.
     #[test]
     fn effects_in_seconds_follow_the_clock() {
         let cases = at(&[2e-4, 1e-3, 0.01, 0.1]).expect("cases");
@@ -296,7 +295,7 @@ mod tests {
         assert_ne!(predicted(1000), predicted(10_000));
     }
 
-    /// What is said of a board's memory before a build, against what the build takes.
+    /// The predicted memory of a board agrees with the build.
     #[test]
     fn the_boards_memory_is_known_before_it_is_built() {
         use firmware::on_board::{MOST, OnBoard};

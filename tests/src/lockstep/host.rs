@@ -1,4 +1,4 @@
-//! The host's side: the loop of the firmware around the model file itself.
+//! The host's side of a lockstep run: the firmware's loop around the model file.
 
 use closed_loop::AHEAD;
 use firmware::cases::{RELAY, armed, settings, step};
@@ -15,7 +15,7 @@ use model_core::history::{Memory as _, Past as _};
 /// measured channel.
 type Step = Box<dyn FnMut(u16, u16) -> (f32, bool)>;
 
-/// The readings' moving average with a window chosen at run time.
+/// The readings' moving average, window chosen at run time.
 struct Mean {
     window: u32,
     past: Ring<f32>,
@@ -34,7 +34,7 @@ impl Smoothing for Mean {
     }
 }
 
-/// The loop that a board runs with the constants of `model`.
+/// The board's loop with `model` itself in place of its constants.
 #[must_use]
 pub fn steps(model: &Model) -> Step {
     match &model.law {

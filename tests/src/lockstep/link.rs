@@ -1,5 +1,4 @@
-//! The host's end of the serial line: requests that are repeated until they are
-//! answered, and bytes that are lost on purpose.
+//! The host's end of the serial line in lockstep runs: requests with retries, and deliberately lost bytes.
 
 use anyhow::{Context, Result, bail};
 use firmware::link::lockstep::DAMAGED;
@@ -9,7 +8,7 @@ use std::sync::mpsc::{Receiver as Channel, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 use wire::frame::{Frame, Receiver};
 
-/// A request is repeated this often before the link is given up.
+/// Number of attempts per request.
 const ATTEMPTS: u32 = 5;
 
 /// The host's end of the serial line.
@@ -19,12 +18,12 @@ pub struct Link {
     from: Channel<u8>,
     receiver: Receiver,
     number: u16,
-    /// Every so many bytes one is left out, to show that it is noticed; 0 never.
+    /// Drop one byte in so many, to test error detection; 0 for none.
     lose: usize,
     sent: usize,
-    /// Bytes left out.
+    /// Number of dropped bytes.
     pub lost: usize,
-    /// Requests sent again.
+    /// Number of repeated requests.
     pub repeated: usize,
 }
 
@@ -100,7 +99,7 @@ impl Link {
         }
     }
 
-    /// Sends a request until its reply has come.
+    /// Repeats a request until its reply arrives.
     ///
     /// # Errors
     /// A board that does not answer.
@@ -112,7 +111,7 @@ impl Link {
         for attempt in 0..ATTEMPTS {
             self.repeated += usize::from(attempt > 0);
             let mut bytes = Vec::with_capacity(frame.bytes().len() + 1);
-            // A zero first: whatever was cut off before ends here.
+            // A leading zero terminates any truncated frame.
             for byte in std::iter::once(&0).chain(frame.bytes()) {
                 self.sent += 1;
                 if self.lose > 0 && self.sent.is_multiple_of(self.lose) {
@@ -128,7 +127,7 @@ impl Link {
                 match reply.split_first_chunk::<3>() {
                     Some(([DAMAGED, ..], _)) => break,
                     Some((head, rest)) if *head == [kind, low, high] => return Ok(rest.to_vec()),
-                    // The reply to an earlier sending.
+                    // A reply to an earlier attempt.
                     _ => {}
                 }
             }
@@ -136,12 +135,12 @@ impl Link {
         bail!("no reply after {ATTEMPTS} requests; is the right firmware running?");
     }
 
-    /// The next undamaged frame; `None` when time is up.
+    /// The next valid frame; `None` after the timeout.
     fn reply(&mut self, until: Instant) -> Result<Option<Vec<u8>>> {
         loop {
             let left = until.saturating_duration_since(Instant::now());
             match self.from.recv_timeout(left) {
-                // A damaged reply is no reply: the request is repeated.
+                // A damaged reply is ignored: the request is repeated.
                 Ok(byte) => {
                     if let Some(Ok(content)) = self.receiver.receive(byte) {
                         return Ok(Some(content.to_vec()));

@@ -7,22 +7,22 @@ use firmware::cases::SETTINGS;
 use firmware::link::lockstep::{BATCH, REPORT, Report, START, STEPS};
 use firmware_sim::plant::{BasePlant, FlowDelay, PlantSpec, RateLaw, Rig};
 
-/// Switches below which a run shows nothing.
+/// A run with fewer switches is not meaningful.
 const FEWEST_SWITCHES: usize = 10;
 
-/// What a case gave.
+/// Result of a case.
 #[derive(Clone, Copy, Debug)]
 pub struct Measured {
-    /// What the board counted.
+    /// Figures counted by the board.
     pub report: Report,
-    /// How often the valve switched.
+    /// Number of valve switches.
     pub switches: usize,
     /// Mean friction of the plant.
     pub friction: f64,
 }
 
-/// A rig with both sides of the bilinear class and the paper's delay law. Its millisecond is a sample of the loop,
-/// whatever the loop's period: the delay is longer than a batch.
+/// A plant with different attachment and separation and the paper's delay law. One millisecond of it is one
+/// sample of the loop at any period: the delay is longer than a batch.
 fn plant() -> Result<Rig> {
     let base = BasePlant {
         attach_s: 0.055,
@@ -38,8 +38,8 @@ fn plant() -> Result<Rig> {
     Ok(Rig::new(&PlantSpec::new(base, &[]), None)?)
 }
 
-/// The measured channel at sample `k`, counts: a slow swing by a tenth about the
-/// middle, which stands for the channel's reference.
+/// The measured channel at sample `k`, counts: a slow variation by a tenth about the middle, which is the
+/// channel's reference.
 fn channel(k: usize) -> u16 {
     let phase = k as f64 / 700.0 * std::f64::consts::TAU;
     (2048.0 + 200.0 * phase.sin()).round() as u16
@@ -59,8 +59,7 @@ pub fn run_case(link: &mut Link, number: u8, case: &Case) -> Result<Measured> {
     let (mut switches, mut friction, mut open, mut done) = (0, 0.0, false, 0);
     while done < case.steps {
         let batch = BATCH.min(case.steps - done);
-        // What the sensor shows during the batch: the air that arrives in it
-        // left the valve before.
+        // The reading during the batch: jets that arrive in it were issued before.
         let mut ahead = plant.clone();
         let mut readings = Vec::with_capacity(batch);
         let channel = channel(done);

@@ -1,4 +1,4 @@
-//! One run of the program: its exit code, its document, its words.
+//! One run of the program: exit code, JSON document, text.
 
 use serde_json::Value;
 use std::fs;
@@ -6,25 +6,25 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// How often a running program is looked at.
+/// Polling interval of a running program.
 const POLL: Duration = Duration::from_millis(5);
 
-/// What a command answered.
+/// Output of a command.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Answer {
     /// The command's name, for messages.
     pub(crate) command: String,
-    /// Exit code; none where it was stopped or ended by a signal.
+    /// Exit code; none if it was stopped or ended by a signal.
     pub(crate) exit: Option<i32>,
-    /// The JSON document; null where there is none.
+    /// The JSON document; null without one.
     pub(crate) document: Value,
-    /// Everything that it wrote.
+    /// All its text output.
     pub(crate) said: String,
-    /// Time on the clock, s.
+    /// Wall-clock time, s.
     pub(crate) seconds: f64,
 }
 
-/// Runs a command of the program with `--json`, stopped after `limit`.
+/// Runs a command of the program with `--json` and a time limit.
 pub(crate) fn ask(name: &str, arguments: &[String], scratch: &Path, limit: Duration) -> Answer {
     let start = Instant::now();
     let mut answer = Answer {
@@ -45,7 +45,7 @@ pub(crate) fn ask(name: &str, arguments: &[String], scratch: &Path, limit: Durat
                 return Ok(status.code());
             }
             if start.elapsed() > limit {
-                // Gone already is as good as killed.
+                // An error means that it has ended already.
                 let _ = child.kill();
                 let _ = child.wait();
                 return Ok(None);
@@ -62,13 +62,13 @@ pub(crate) fn ask(name: &str, arguments: &[String], scratch: &Path, limit: Durat
     answer.document = serde_json::from_str(&document).unwrap_or(Value::Null);
     answer.said += &document;
     answer.said += &fs::read_to_string(&err).unwrap_or_default();
-    // The temporary folder has another name every time.
+    // The temporary folder's name differs between runs.
     answer.said = answer.said.replace(&*scratch.to_string_lossy(), "…");
     answer
 }
 
 impl Answer {
-    /// The first line of what was said to a person.
+    /// The first line of the error message.
     pub(crate) fn complaint(&self) -> String {
         let lines = self.said.lines().map(str::trim);
         let first = lines.filter(|line| line.starts_with("error")).take(1);

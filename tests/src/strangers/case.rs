@@ -1,4 +1,4 @@
-//! A case: records, the commands that are run on them, and the right answer.
+//! A case: records, commands, and the expected answer.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -36,30 +36,30 @@ impl Step {
     }
 }
 
-/// Records, commands and the right answer.
+/// Records, commands and the expected answer.
 #[derive(Clone, Debug, Default)]
 pub struct Case {
     /// Name of the set.
     pub set: String,
     /// Name of the case.
     pub name: String,
-    /// What kind of record it is.
+    /// Kind of the records.
     pub kind: String,
     /// Estimation records.
     pub files: Vec<PathBuf>,
     /// Validation records.
     pub validate: Vec<PathBuf>,
-    /// Options of `import`; none for CSV files that are given as they are.
+    /// Options of `import`; none for CSV files that are used directly.
     pub import: Option<Vec<String>>,
-    /// What is run.
+    /// Commands to run.
     pub commands: Vec<Step>,
-    /// The case of the same set whose answer must be the same.
+    /// A case of the same set that must have the same answer.
     pub same_answer_as: Option<String>,
-    /// What is right.
+    /// The expected answer.
     pub right: Right,
 }
 
-/// The right answer; what is not said is not checked, but for what holds of every case.
+/// The expected answer; omitted items are not checked, apart from general requirements.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Right {
@@ -73,7 +73,7 @@ pub struct Right {
     pub n1_at_most: Option<usize>,
     /// Most product lags.
     pub n2_at_most: Option<usize>,
-    /// Verdicts of `diagnose` that are right; all if empty.
+    /// Correct verdicts of `diagnose`; any if empty.
     pub verdicts: Vec<String>,
     /// Effects that may be named.
     pub names: Vec<String>,
@@ -81,19 +81,19 @@ pub struct Right {
     pub terms_at_most: Option<usize>,
     /// Least FIT of `compare`, in percent.
     pub fit_at_least: Option<f64>,
-    /// Least share of the samples that is scored; half if not said.
+    /// Least share of scored samples; half by default.
     pub scored_at_least: Option<f64>,
     /// Range of the sampling period of the data set, s.
     pub period_s: Option<[f64; 2]>,
-    /// Range that u of the data set must lie in and reach, within 1 %.
+    /// Range that u of the data set must stay in and reach, within 1 %.
     pub u: Option<[f64; 2]>,
-    /// Range that y of the data set must lie in.
+    /// Range that y of the data set must stay in.
     pub y: Option<[f64; 2]>,
     /// Range of the number of samples of the data set.
     pub samples: Option<[usize; 2]>,
-    /// Words that the answers together have.
+    /// Phrases that the output must contain.
     pub said: Vec<String>,
-    /// Words that no answer has.
+    /// Phrases that the output must not contain.
     pub not_said: Vec<String>,
 }
 
@@ -101,7 +101,7 @@ pub struct Right {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Expected {
-    /// What kind of record it is.
+    /// Kind of the records.
     pub(super) kind: String,
     #[serde(rename = "case")]
     pub(super) cases: Vec<ExpectedCase>,
@@ -117,7 +117,7 @@ pub(super) struct ExpectedCase {
     pub(super) import: Option<Vec<String>>,
     pub(super) commands: Option<Vec<Step>>,
     pub(super) same_answer_as: Option<String>,
-    /// The rest, which is checked for unknown keys.
+    /// Further keys, checked for unknown names.
     #[serde(flatten)]
     pub(super) right: toml::Table,
 }

@@ -1,4 +1,4 @@
-//! What is wrong with what the program said: against the right answer of a case, and against what holds of every case.
+//! Checks of the program's output against a case's expected answer and against general requirements.
 
 use super::Row;
 use super::answer::Answer;
@@ -8,19 +8,19 @@ use host_fit::baseline::BaselineFits;
 use host_fit::data::{DataSet, Record};
 use serde_json::Value;
 
-/// Points of FIT that a model may stay below the best baseline.
+/// Points of FIT by which a model may be below the best baseline.
 const BELOW_BASELINE: f64 = 1.0;
-/// The least share of the samples that is scored.
+/// Least share of scored samples.
 const SCORED: f64 = 0.5;
-/// Points of FIT, and samples of delay, within which two answers are the same.
+/// Tolerances of two equal answers: points of FIT, and samples of delay.
 const SAME_FIT: f64 = 0.5;
 
-/// Everything that the program said of a case.
+/// All output of the program for a case.
 #[derive(Debug, Default)]
 pub(super) struct Heard {
-    /// Why the records could not be given to a command.
+    /// Why the records could not be passed to a command.
     pub(super) unusable: Option<String>,
-    /// The data set that the commands were given.
+    /// The data set passed to the commands.
     pub(super) data: Option<DataSet>,
     pub(super) import: Option<Answer>,
     pub(super) delay: Option<Answer>,
@@ -79,7 +79,7 @@ fn numbers(value: &Value) -> Vec<f64> {
     list.filter_map(Value::as_f64).collect()
 }
 
-/// Everything that is wrong, one sentence each.
+/// All problems, one sentence each.
 pub(super) fn wrong(case: &Case, heard: &Heard) -> Vec<String> {
     let mut wrong = exits(&case.right, heard);
     if let Some(reason) = &heard.unusable {
@@ -116,7 +116,7 @@ fn exits(right: &Right, heard: &Heard) -> Vec<String> {
     let mut wrong = Vec::new();
     for answer in heard.answers() {
         let code = right.exit.get(&answer.command).copied().unwrap_or(0);
-        // An effect that does not help is refused, and nothing is written.
+        // An effect without a gain is rejected, and nothing is written.
         let refused = answer.command == "extend"
             && answer.exit == Some(1)
             && answer.complaint().contains("nothing was written: with");
@@ -159,7 +159,7 @@ fn of_data(right: &Right, heard: &Heard) -> Vec<String> {
     if let Some([low, high]) = right.u {
         let [least, most] = range(|r| &r.u);
         let near = 0.01 * (high - low);
-        // A command that never reaches full strength is right as long as it lies inside.
+        // A command that does not reach full strength is valid if it lies inside.
         if least < low - near || most > high + near || most <= least {
             wrong.push(format!("u from {least} to {most}"));
         }
@@ -185,7 +185,7 @@ fn of_words(right: &Right, heard: &Heard) -> Vec<String> {
         }
     }
     for words in &right.said {
-        // What `compare` says of channels is not an answer to the question what is missing.
+        // Remarks of `compare` on channels are not part of the diagnosis.
         let diagnosis = heard.found(Step::Diagnose);
         if diagnosis.is_some_and(|answer| !answer.document["words"].to_string().contains(words)) {
             wrong.push(format!("diagnose: does not say \"{words}\""));
@@ -262,7 +262,7 @@ fn of_structure(right: &Right, document: &Value) -> Vec<String> {
         }
     }
     if let Some([low, high]) = right.delay_samples {
-        // A law of one parameter is a constant delay between samples.
+        // A law with one parameter is a constant unrounded delay.
         let law = numbers(&delays["law"]);
         let input = if law.len() == 1 {
             law.clone()
@@ -321,7 +321,7 @@ fn of_diagnose(right: &Right, heard: &Heard) -> Vec<String> {
             allowed.join(" or ")
         ));
     }
-    // Of measured sets nobody has said which names are right.
+    // For measured sets the correct names are unknown.
     if !allowed.is_empty() {
         let names = answer.document["missing"].as_array().into_iter().flatten();
         for name in names.filter_map(Value::as_str) {
@@ -333,8 +333,7 @@ fn of_diagnose(right: &Right, heard: &Heard) -> Vec<String> {
     wrong
 }
 
-/// The error that is printed of a model is that of the file, to the last digit, and no worse than that of the model
-/// that was given.
+/// The error printed for a model must equal that of its file, and must not exceed that of the given model.
 fn of_written(step: Step, found: &Answer, compared: &Value, given: &Value) -> Vec<String> {
     let mut wrong = Vec::new();
     let command = &found.command;
@@ -364,7 +363,7 @@ fn of_written(step: Step, found: &Answer, compared: &Value, given: &Value) -> Ve
     wrong
 }
 
-/// Adds to rows what differs from the case that they must agree with.
+/// Adds the differences from the case with which the answers must agree.
 pub(super) fn same_answers(cases: &[Case], rows: &mut [Row]) {
     let found: Vec<Row> = rows.to_vec();
     for (case, row) in cases.iter().zip(rows) {

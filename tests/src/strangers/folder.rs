@@ -6,11 +6,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 const EXPECTED: &str = "expected.toml";
-/// What is run where nothing else is said.
+/// Commands by default.
 const USUAL: [Step; 3] = [Step::Identify, Step::Delay, Step::Diagnose];
-/// What is run on measured sets: `delay` needs an on/off command.
+/// Commands for measured sets; `delay` needs an on/off command.
 const MEASURED: [Step; 2] = [Step::Identify, Step::Diagnose];
-/// How deep below `recordings` the sets of its own tests are looked for.
+/// Search depth for sets of the tests of `recordings`.
 const DEPTH: usize = 4;
 
 /// The sets of this project.
@@ -84,7 +84,7 @@ fn expected(file: &Path, set: &Path, name: &str) -> Result<Vec<Case>> {
     Ok(cases)
 }
 
-/// A file of a set, or of the set of that name with the tests of `recordings`.
+/// A file of a set, or of the set of that name in the tests of `recordings`.
 fn record_of(set: &Path, name: &str, file: &str) -> PathBuf {
     let here = set.join(file);
     if here.is_file() {
@@ -112,7 +112,7 @@ fn elsewhere(folder: &Path, name: &str, depth: usize) -> Option<PathBuf> {
     })
 }
 
-/// A measured set: every file of the estimation part, held out every file of the test part.
+/// A measured set: estimation files, and test files as validation records.
 fn measured(set: &Path, name: &str) -> Result<Vec<Case>> {
     let entries = fs::read_dir(set).with_context(|| set.display().to_string())?;
     let (mut files, mut validate) = (Vec::new(), Vec::new());

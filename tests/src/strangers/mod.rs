@@ -22,41 +22,41 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-/// What is to be run.
+/// Options of a run.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Folders of sets; `tests/data/strangers` if empty.
     pub folders: Vec<PathBuf>,
     /// Only sets or cases whose name contains one of these; all if empty.
     pub only: Vec<String>,
-    /// Also `extend` and `discover` for every case, and their files.
+    /// Run `extend` and `discover` for every case too, and check their files.
     pub all_commands: bool,
-    /// Commands that are left out.
+    /// Commands to skip.
     pub without: Vec<Step>,
-    /// After how long a command is stopped.
+    /// Time limit of a command.
     pub limit: Duration,
-    /// Cases that are run side by side.
+    /// Cases that run in parallel.
     pub jobs: usize,
 }
 
-/// A case and what came of it.
+/// The result of a case.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Row {
     /// Name of the set.
     pub set: String,
     /// Name of the case.
     pub case: String,
-    /// What kind of record it is.
+    /// Kind of the records.
     pub kind: String,
-    /// Samples of all records; 0 where the case is about `import` alone.
+    /// Samples of all records; 0 if the case is only about `import`.
     pub samples: usize,
     /// Samples of all records that were scored.
     pub scored: usize,
-    /// Records of whose FIT is told: `validate`, or `identify` where nothing was held out.
+    /// Records of the FIT: `validate`, or `identify` without validation records.
     pub judged: String,
     /// The baselines on the scored samples of those records.
     pub baselines: BaselineFits,
-    /// FIT of the file that `identify` wrote, as `compare` says it, in percent.
+    /// FIT of the file written by `identify`, according to `compare`, in percent.
     pub fit_percent: Option<f64>,
     /// State lags, product lags and delay of the model in words.
     pub structure: String,
@@ -64,18 +64,18 @@ pub struct Row {
     pub edge_delay_samples: Option<f64>,
     /// Verdict of `diagnose`.
     pub verdict: Option<String>,
-    /// What `diagnose` named.
+    /// Names in the diagnosis.
     pub names: Vec<String>,
     /// Time of all commands together, s.
     pub seconds: f64,
-    /// What is wrong, one sentence each; empty if all is right.
+    /// Problems, one sentence each; empty if none.
     pub wrong: Vec<String>,
-    /// Why nothing was run, if nothing was.
+    /// Why nothing was run, if so.
     pub skipped: Option<String>,
 }
 
 impl Row {
-    /// Whether everything is as it should be.
+    /// Whether there are no problems.
     #[must_use]
     pub fn is_right(&self) -> bool {
         self.wrong.is_empty() && self.skipped.is_none()
@@ -90,7 +90,7 @@ pub fn bundled_cases() -> anyhow::Result<Vec<Case>> {
     folder::cases(&folder::bundled())
 }
 
-/// Runs every case and tells `tell` of each row as it comes; rows are in the order of the cases.
+/// Runs every case and passes each result to `tell` as it arrives; results are in the order of the cases.
 ///
 /// # Errors
 /// A folder or an `expected.toml` that cannot be read, with its path.

@@ -1,4 +1,4 @@
-//! A case run from its files to the last command.
+//! A complete run of a case.
 
 use super::answer::{Answer, ask};
 use super::case::{Case, Step};
@@ -10,7 +10,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The effect that `extend` adds: every rig could have it.
+/// The effect for `extend`; plausible on any rig.
 const EFFECT: &str = "hot-film-lag";
 
 /// Runs every command of `case` in a folder of its own.
@@ -45,7 +45,7 @@ pub(super) fn rehearse(case: &Case, options: &Options) -> Row {
     row
 }
 
-/// Where a case is run.
+/// Working folder of a case.
 struct Stage<'a> {
     case: &'a Case,
     options: &'a Options,
@@ -115,7 +115,7 @@ impl Stage<'_> {
         self.ask(name, &arguments)
     }
 
-    /// What the commands are given: a file, an imported folder, or a folder put together here.
+    /// Input of the commands: a file, an imported folder, or a folder created here.
     fn data(&self, heard: &mut Heard) -> Result<PathBuf, String> {
         let folder = self.scratch.join("data");
         if let Some(options) = &self.case.import {
@@ -162,7 +162,7 @@ fn put_together(case: &Case, folder: &Path) -> Result<(), String> {
 }
 
 impl Heard {
-    /// Fits the baselines and judges them on the samples that the program scored.
+    /// Fits the baselines and scores them on the samples that the program scored.
     fn judge_baselines(&mut self) {
         let (Some(data), Some(compared)) = (&self.data, self.compared(Step::Identify)) else {
             return;
@@ -190,7 +190,7 @@ impl Heard {
             })
             .collect();
         self.fits = found.fit_percent(&judged);
-        // A baseline of what nobody scored says nothing.
+        // Without scored samples a baseline is meaningless.
         if judged.iter().all(|(_, scored)| scored.is_empty()) {
             self.fits = BaselineFits::default();
         }
@@ -202,7 +202,7 @@ pub(super) fn rows(document: &Value) -> impl Iterator<Item = &Value> {
     document["records"].as_array().into_iter().flatten()
 }
 
-/// The row of what is judged: the validation records, or the estimation records where there are no others.
+/// The row of the validation records, or of the estimation records if there are none.
 pub(super) fn judged(document: &Value) -> &Value {
     match &document["validate"] {
         Value::Null => &document["identify"],

@@ -1,10 +1,10 @@
-//! The rows as a Markdown table with what is wrong below it, and as JSON.
+//! The results as a Markdown table with the problems below, and as JSON.
 
 use super::Row;
 use serde_json::{Value, json as value};
 use std::fmt::Write;
 
-/// A table of all cases, and below it what is wrong and what was skipped.
+/// A table of all cases, followed by the problems and the skipped cases.
 #[must_use]
 pub fn table(rows: &[Row]) -> String {
     let mut text = String::from(
@@ -60,7 +60,7 @@ pub fn table(rows: &[Row]) -> String {
     text
 }
 
-/// The same as one document: every row, how many ran and how many are right.
+/// All results as one document with the numbers of run and correct cases.
 #[must_use]
 pub fn json(rows: &[Row]) -> Value {
     value!({

@@ -1,5 +1,5 @@
-//! Makes the two files of a new effect or delay law, with physics that changes
-//! nothing yet, and enters them in the two catalogues.
+//! Creates the two files of a new effect or delay law, initially without influence, and adds them to both
+//! catalogues.
 
 mod proof;
 
@@ -20,12 +20,12 @@ pub(crate) const TASK: Task = Task {
 const MODEL: &str = "model-core/src/effects";
 const PLANT: &str = "firmware-sim/src/plant/effects";
 
-/// What differs between the places; empty for delay laws, whose templates are whole.
+/// Text that differs between the places; empty for delay laws, which have complete templates.
 struct Holes {
     place: &'static str,
-    /// In the model: place of the card, name of the test bench's run, the hook.
+    /// In the model: place of the card, run of the test bench, hook.
     model: [(&'static str, &'static str); 6],
-    /// In the plant: room, kind of part, its trait and hooks.
+    /// In the plant: module, kind of part, its trait and hooks.
     plant: [(&'static str, &'static str); 6],
 }
 
@@ -156,7 +156,7 @@ fn new_effect(arguments: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// Writes both files below `root` and enters them; gives their paths.
+/// Writes both files below `root` and adds them to the catalogues; returns their paths.
 pub(crate) fn write(root: &Path, name: &str, place: &str) -> Result<[String; 2]> {
     let word = |word: &str| {
         word.starts_with(|c: char| c.is_ascii_lowercase())
@@ -166,7 +166,7 @@ pub(crate) fn write(root: &Path, name: &str, place: &str) -> Result<[String; 2]>
     };
     if !name.split('-').all(word) {
         bail!(
-            "`{name}` is no name for an effect: use small letters and digits, words joined by `-`"
+            "`{name}` is not a valid effect name: use small letters and digits, words joined by `-`"
         );
     }
     let delay = place == "delay";
@@ -246,8 +246,7 @@ pub(crate) fn write(root: &Path, name: &str, place: &str) -> Result<[String; 2]>
     Ok(written)
 }
 
-/// The catalogue with `module` among the modules, in order, and `line` as the last
-/// of the list.
+/// The catalogue with `module` among the modules, in order, and `line` at the end of the list.
 fn entered(text: &str, module: &str, list: &str, line: &str) -> Option<String> {
     let keyword = &module[..=module.rfind(' ')?];
     let is_module = |line: &&str| line.starts_with(keyword) && line.ends_with(';');

@@ -1,6 +1,5 @@
-//! Proves that an effect of each place and a delay law are each added with one file and one line:
-//! in a copy of the tree, which is built, lists them, tries them in a diagnosis,
-//! fits the law and generates constants from it.
+//! Test that an effect of each place and a delay law can be added with one file and one line: a copy of the
+//! tree is built, lists them, tries them in a diagnosis, fits the law and generates constants from it.
 
 use super::{MODEL, write};
 use crate::shell::{cargo, output, root, run, target};
@@ -10,14 +9,14 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-/// An effect at every place, as the templates have it.
+/// An effect at every place, from the templates.
 const EFFECTS: [(&str, &str); 3] = [
     ("scratch-nozzle", "jet"),
     ("scratch-wall", "flow"),
     ("scratch-film", "sensor"),
 ];
 const LAW: &str = "clamped-linear-delay";
-/// Named apart from the product's, whose folder of artefacts it shares.
+/// A different name from the product's, since both share the folder of build products.
 const PROGRAM: &str = "host-fit-scratch";
 
 pub(crate) fn proof() -> Result<()> {
@@ -95,9 +94,8 @@ pub(crate) fn proof() -> Result<()> {
     run(cargo(&["check", "--release", "--package", "identified"]).in_copy(&copy))
 }
 
-/// Gives the packages of a workspace a version of their own: artefacts are told apart
-/// by name and version, not by folder, and the copy's must not be taken for the
-/// product's.
+/// Gives the packages of a workspace another version: cargo distinguishes build products by name and version,
+/// not by folder.
 fn rename_version(manifest: &Path) -> Result<()> {
     const BEFORE: &str = "[workspace.package]\nversion = \"";
     let text = fs::read_to_string(manifest)?;
@@ -108,7 +106,7 @@ fn rename_version(manifest: &Path) -> Result<()> {
     };
     let (before, after) = text.split_at(end);
     let own = &before[version.unwrap_or(end)..];
-    // Its packages name each other with it.
+    // Its packages refer to each other by it.
     let after = after.replace(
         &format!("version = \"{own}\" }}"),
         &format!("version = \"{own}-scratch\" }}"),
@@ -116,14 +114,14 @@ fn rename_version(manifest: &Path) -> Result<()> {
     Ok(fs::write(manifest, format!("{before}-scratch{after}"))?)
 }
 
-/// Has the copy's packages compiled with little optimisation: they run for seconds only.
+/// Reduces the optimisation of the copy's packages, which run for seconds only.
 fn compile_quickly(manifest: &Path) -> Result<()> {
     let mut text = fs::read_to_string(manifest)?;
     let workspace: toml::Table = text.parse()?;
     let members = workspace["workspace"]["members"].as_array();
     for member in members.into_iter().flatten().filter_map(|m| m.as_str()) {
         let table = format!("[profile.release.package.{member}]");
-        // The scenarios' package has another name than its folder, and is not compiled.
+        // The scenarios' package has another name than its folder and is not compiled.
         if member != "tests" && !text.contains(&table) {
             write!(text, "\n{table}\nopt-level = 1\ndebug = false\n")?;
         }
@@ -136,7 +134,7 @@ trait InCopy {
 }
 
 impl InCopy for std::process::Command {
-    /// With the artefacts of the product, so that the libraries are not built again.
+    /// Uses the product's build folder, so that the libraries are not rebuilt.
     fn in_copy(&mut self, copy: &Path) -> &mut Self {
         self.current_dir(copy).env("CARGO_TARGET_DIR", target())
     }
@@ -148,12 +146,12 @@ fn has(list: &Value, key: &str, value: &str) -> bool {
     entries.iter().any(|entry| entry[key] == value)
 }
 
-/// Everything but what is built and what is hidden.
+/// Copies everything except build products and hidden files.
 fn copy_tree(from: &Path, to: &Path) -> Result<()> {
     fs::create_dir_all(to)?;
     for entry in fs::read_dir(from)? {
         let entry = entry?;
-        // What a link leads to: the program's data is linked into its package.
+        // Links are followed: the program's data is linked into its package.
         let (name, kind) = (entry.file_name(), fs::metadata(entry.path())?);
         let skipped = name.to_string_lossy().starts_with('.') && name != ".cargo";
         if skipped || entry.path() == target() || name == "target" {
@@ -170,8 +168,8 @@ fn copy_tree(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Short records of a flow whose delay falls in proportion to its mean friction,
-/// down to a shortest, and a lean model that lacks it.
+/// Short records of a flow whose delay decreases linearly with its mean friction down to a minimum, and a
+/// low-order model without that law.
 fn recordings(folder: &Path) -> Result<std::path::PathBuf> {
     const RECORDS: [(&str, &str, usize); 4] = [
         ("a", "identify", 170),
@@ -190,7 +188,7 @@ fn recordings(folder: &Path) -> Result<std::path::PathBuf> {
             let u = f64::from(u8::from(k / half_period % 2 == 1 && k / 60 % 5 != 3));
             commands.push(u);
             let y = friction[k];
-            // A linear congruence serves as noise.
+            // A linear congruential generator as noise.
             noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             let measured = y + (f64::from(noise) / f64::from(u32::MAX) - 0.5) * 0.01;
             writeln!(table, "{},{u},{measured}", k as f64 * 0.001)?;

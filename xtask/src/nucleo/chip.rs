@@ -45,32 +45,32 @@ const ADC_DR: u32 = ADC1 + 0x4C;
 const ADC_JDR1: u32 = ADC1 + 0x3C;
 const IWDG_KR: u32 = IWDG;
 
-/// Bits of the converter's status.
+/// Bits of the converter's status register.
 const EOC: u32 = 1 << 1;
 const JEOC: u32 = 1 << 2;
 const OVR: u32 = 1 << 5;
 
-/// One write, whole words.
+/// A write of one word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Written {
     pub(super) address: u32,
     pub(super) value: u32,
 }
 
-/// The registers, what was written to them, and what is wrong with that.
+/// The registers, the writes to them, and errors in these.
 pub(super) struct Chip {
     values: BTreeMap<u32, u32>,
     pub(super) written: Vec<Written>,
     /// Accesses to peripherals without a clock.
     pub(super) unclocked: Vec<String>,
-    /// Times the watchdog was fed.
+    /// Number of watchdog feeds.
     pub(super) fed: u32,
     /// The blue button.
     pub(super) pressed: bool,
 }
 
 impl Chip {
-    /// After power was switched on (RM0390: each register's reset value).
+    /// State after power-on (RM0390: reset values).
     pub(super) fn after_reset() -> Self {
         let values = [
             (RCC_CR, 0x0000_0083),
@@ -95,7 +95,7 @@ impl Chip {
         }
     }
 
-    /// Every word to be watched.
+    /// Every watched word.
     pub(super) fn words() -> Vec<u32> {
         let whole = BLOCKS
             .iter()
@@ -103,26 +103,26 @@ impl Chip {
         let bits = BIT_BANDED
             .iter()
             .flat_map(|register| (0..32).map(move |bit| alias(RCC + register) + 4 * bit));
-        // Status and data of the line are QEMU's, and asked for all the time.
+        // Status and data of the serial line are handled by QEMU and read constantly.
         let whole = whole.filter(|word| ![USART2, USART2 + 4].contains(word));
         whole.chain([ADC_CCR]).chain(bits).collect()
     }
 
-    /// Whether QEMU has the peripheral itself and only its set-up is looked at.
+    /// Whether QEMU implements the peripheral and only its set-up is checked.
     pub(super) fn is_qemus(address: u32) -> bool {
         (USART2..USART2 + 0x1C).contains(&address)
     }
 
-    /// A register's value, without an effect.
+    /// A register's value, without side effects.
     pub(super) fn value(&self, address: u32) -> u32 {
         let stored = self.values.get(&address).copied().unwrap_or(0);
         match address {
-            // What is turned on is ready at once.
+            // Enabled clocks are ready immediately.
             RCC_CR => {
                 stored & !(1 << 17 | 1 << 25) | (stored >> 16 & 1) << 17 | (stored >> 24 & 1) << 25
             }
             RCC_CFGR => stored & !0b1100 | (stored & 0b11) << 2,
-            // What a pin drives is what it shows; the others are pulled up.
+            // Output pins read their own level; others are pulled up.
             _ if [GPIOA, GPIOB, GPIOC].contains(&(address - 0x10)) => self.inputs(address - 0x10),
             _ => stored,
         }
@@ -142,7 +142,7 @@ impl Chip {
         driven & outputs | 0xFFFF & !outputs & !button
     }
 
-    /// What the program reads.
+    /// A read by the program.
     pub(super) fn read(&mut self, address: u32) -> u32 {
         self.clocked(address, "read");
         let value = self.value(address);
@@ -152,7 +152,7 @@ impl Chip {
         value
     }
 
-    /// What the program writes.
+    /// A write by the program.
     pub(super) fn write(&mut self, address: u32, value: u32) {
         if let Some((register, bit)) = banded(address) {
             let old = self.value(register);
@@ -162,9 +162,9 @@ impl Chip {
         self.clocked(address, "written");
         self.written.push(Written { address, value });
         match address {
-            // Zero clears, one leaves (RM0390, 13.13.1).
+            // Writing zero clears, one keeps (RM0390, 13.13.1).
             ADC_SR => self.change(ADC_SR, |status| status & value),
-            // Bits 24 to 31: what the last restart was for; RMVF forgets it.
+            // Bits 24 to 31: reason of the last restart; RMVF clears it.
             RCC_CSR if value & 1 << 24 != 0 => self.set(RCC_CSR, value & 0xFF_FFFF),
             IWDG_KR => self.fed += u32::from(value & 0xFFFF == 0xAAAA),
             // Set and reset of single pins (RM0390, 7.4.7).
@@ -184,11 +184,11 @@ impl Chip {
         self.set(address, change(value));
     }
 
-    /// The timer starts a conversion, and it is done: counts of both channels.
-    /// `false` if nothing was set up to convert.
+    /// Completes a conversion started by the timer: counts of both channels. Returns `false` if the converter
+    /// is not set up.
     pub(super) fn convert(&mut self, counts: [u16; 2]) -> bool {
         let timer = self.value(TIM2) & 1 == 1;
-        // Started by TIM2's update, and on (RM0390, 13.13.3).
+        // Triggered by TIM2's update, and enabled (RM0390, 13.13.3).
         let triggered =
             self.value(ADC1 + 0x08) & (3 << 28 | 0xF << 24 | 1) == 1 << 28 | 6 << 24 | 1;
         if !timer || !triggered {
@@ -205,7 +205,7 @@ impl Chip {
         true
     }
 
-    /// A register without its clock reads 0 and takes nothing; the program must not do that.
+    /// A register without its clock reads 0 and ignores writes; such accesses are errors of the program.
     fn clocked(&mut self, address: u32, done: &str) {
         let block = BLOCKS
             .iter()
@@ -220,12 +220,12 @@ impl Chip {
     }
 }
 
-/// The word that stands for bit 0 of a register (RM0390, 2.2.3).
+/// Bit-band alias of bit 0 of a register (RM0390, 2.2.3).
 fn alias(register: u32) -> u32 {
     0x4200_0000 + (register - 0x4000_0000) * 32
 }
 
-/// Register and bit that an alias stands for.
+/// Register and bit of a bit-band alias.
 fn banded(address: u32) -> Option<(u32, u32)> {
     let offset = address.checked_sub(0x4200_0000)?;
     Some((0x4000_0000 + offset / 128 * 4, offset / 4 % 32))

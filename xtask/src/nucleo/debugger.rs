@@ -1,5 +1,5 @@
-//! QEMU's debugger port (gdb's remote protocol), as far as a register that QEMU
-//! does not have can be played through it: watchpoints, core registers, memory.
+//! Client of QEMU's debugger port (gdb remote protocol), for simulating registers that QEMU lacks:
+//! watchpoints, core registers, memory.
 
 use anyhow::{Context, Result, bail, ensure};
 use std::io::{Read, Write};
@@ -7,26 +7,26 @@ use std::process::{Child, ChildStdin};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-/// How long an answer may take.
+/// Timeout of an answer.
 const ANSWER: Duration = Duration::from_secs(10);
 
-/// Why the core stands still.
+/// Why the core has stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stop {
-    /// It is about to read or write a watched word.
+    /// Before an access to this watched word.
     Access(u32),
-    /// It was asked to.
+    /// On request.
     Asked,
 }
 
-/// The debugger's end.
+/// The debugger's connection.
 pub(super) struct Debugger {
     to: ChildStdin,
     from: Receiver<u8>,
 }
 
 impl Debugger {
-    /// Over the standard input and output of `qemu … -gdb stdio`.
+    /// A connection over the standard input and output of `qemu … -gdb stdio`.
     pub(super) fn over(qemu: &mut Child) -> Result<Self> {
         let to = qemu.stdin.take().context("QEMU has no input")?;
         let mut from = qemu.stdout.take().context("QEMU has no output")?;
@@ -42,7 +42,7 @@ impl Debugger {
             }
         });
         let mut debugger = Self { to, from: receiver };
-        // Only who has asked what a core is made of gets single registers.
+        // QEMU provides single registers only after the target description was requested.
         debugger.ask("qXfer:features:read:target.xml:0,800")?;
         Ok(debugger)
     }
@@ -53,10 +53,10 @@ impl Debugger {
         Ok(self.to.flush()?)
     }
 
-    /// The next packet's text; `None` if none has come within `patience`.
+    /// The next packet's text; `None` after a timeout of `patience`.
     fn packet(&mut self, patience: Duration) -> Result<Option<String>> {
         let mut text = String::new();
-        // Acknowledgements stand between packets.
+        // Acknowledgements are skipped.
         loop {
             match self.from.recv_timeout(patience) {
                 Ok(b'$') => break,
@@ -92,7 +92,7 @@ impl Debugger {
         Ok(())
     }
 
-    /// Lets the core carry out the access that it was stopped at.
+    /// Executes the access at which the core was stopped.
     pub(super) fn step_over(&mut self, address: u32) -> Result<()> {
         let answer = self.ask(&format!("z4,{address:x},4"))?;
         ensure!(answer == "OK", "the watchpoint at {address:#x} stays");
@@ -101,12 +101,12 @@ impl Debugger {
         self.watch(address)
     }
 
-    /// Lets the core run.
+    /// Resumes the core.
     pub(super) fn resume(&mut self) -> Result<()> {
         self.send("c")
     }
 
-    /// Waits for the core to stand still; `None` if it still runs.
+    /// Waits for the core to stop; `None` if it still runs.
     pub(super) fn stopped(&mut self, patience: Duration) -> Result<Option<Stop>> {
         let Some(text) = self.packet(patience)? else {
             return Ok(None);
@@ -122,7 +122,7 @@ impl Debugger {
         }
     }
 
-    /// Asks the core to stand still.
+    /// Requests the core to stop.
     pub(super) fn interrupt(&mut self) -> Result<()> {
         self.to.write_all(&[3])?;
         Ok(self.to.flush()?)
@@ -143,7 +143,7 @@ impl Debugger {
         Ok(())
     }
 
-    /// Memory from `address` on.
+    /// Reads memory from `address` on.
     pub(super) fn memory(&mut self, address: u32, length: usize) -> Result<Vec<u8>> {
         let text = self.ask(&format!("m{address:x},{length:x}"))?;
         let read = bytes(&text)?;

@@ -1,5 +1,5 @@
-//! The registers after the start, against the reference manual (RM0390) and the
-//! data sheet (DS10693): what each group of them must say, and in which order.
+//! Checks of the register set-up after the start against the reference manual (RM0390) and the data sheet
+//! (DS10693).
 
 use super::chip::{
     ADC_CCR, ADC1, Chip, FLASH, GPIOA, GPIOB, GPIOC, IWDG, RCC_CFGR, RCC_CR, RCC_PLLCFGR, TIM2,
@@ -12,7 +12,7 @@ const CRYSTAL: f64 = 8e6;
 /// The bundled model's sample period, s.
 const PERIOD: f64 = 0.001;
 
-/// A group of registers: what it is about, and what is found.
+/// A group of registers: its subject and its check.
 type Group = (&'static str, fn(&Chip) -> Result<String>);
 
 const GROUPS: [Group; 8] = [
@@ -42,7 +42,7 @@ pub(super) fn check(chip: &Chip) -> Result<Vec<String>> {
         .collect()
 }
 
-/// `bits` bits of a register from bit `low` on.
+/// `bits` bits of a register starting at bit `low`.
 pub(super) fn field(value: u32, low: u32, bits: u32) -> u32 {
     value >> low & ((1 << bits) - 1)
 }

@@ -1,7 +1,5 @@
-//! A day at the rig, unattended: a simulated rig with a hidden effect behind the
-//! board under QEMU, and nothing but the serial line between it and the program.
-//! Every step is a command that a user would type; the page in `docs` is made of
-//! what they print.
+//! The complete workflow on a simulated rig with a hidden effect, behind the board under QEMU: the program reaches it
+//! over the serial line only. Every step is a command that a user would type; `docs/rig-day.md` shows their output.
 
 mod picture;
 
@@ -20,23 +18,23 @@ pub(crate) const TASK: Task = Task {
     run: rig_day,
 };
 
-/// What the rig hides, and which rig it is.
+/// The hidden effect of the simulated rig, and the seed of the rig.
 const HIDDEN: &str = "echo-path";
 const RIG: &str = "7";
-/// How much is recorded and watched. Commands are those of the bundled set.
+/// Amount of recording and watching. Commands are those of the bundled set.
 struct Form {
-    /// To identify on.
+    /// Estimation records.
     identify: &'static [&'static str],
-    /// Held out; the page shows the first.
+    /// Validation records; the page shows the first.
     validate: &'static [&'static str],
-    /// Seconds of the commands that are played, the last of them shut.
+    /// Length of each command, s; the valve is closed at its end.
     period: &'static str,
     repeats: &'static str,
-    /// More words for the calibration.
+    /// Additional options of the calibration.
     calibration: &'static [&'static str],
-    /// Of the law at work, and of it until the model is judged.
+    /// Duration of `watch`, and of its learning phase, s.
     watched: [&'static str; 2],
-    /// The second law's rms error over that of the first, at most.
+    /// Largest allowed ratio of the second law's rms error to the first's.
     law: f64,
 }
 
@@ -49,7 +47,7 @@ const LONG: Form = Form {
     watched: ["90", "30"],
     law: 1.0,
 };
-/// The page's.
+/// For the page.
 const SHORT: Form = Form {
     identify: &["step", "sq4-50", "random-a"],
     validate: &["sq2-30", "random-b"],
@@ -57,7 +55,7 @@ const SHORT: Form = Form {
     watched: ["25", "10"],
     ..LONG
 };
-/// As little as names the effect: CI's.
+/// For CI: the least data with which the effect is named.
 const BRIEF: Form = Form {
     identify: &["step", "random-a"],
     validate: &["random-b"],
@@ -65,18 +63,18 @@ const BRIEF: Form = Form {
     repeats: "5",
     calibration: &["--steady", "1.5", "--pulses", "8"],
     watched: ["20", "8"],
-    // The ripple of the shortest pulses is most of the error; so short a watch tells it to 3 %.
+    // Most of the error is the ripple of the shortest pulses, which so short a watch measures to 3 %.
     law: 1.06,
 };
-/// Where a command that is cut is shut for the rest: no bundled one has an edge shortly before.
+/// Rest at the end of a shortened command, ms; no bundled command has an edge shortly before it.
 const CUT_MS: usize = 450;
 
-/// What the law is to hold.
+/// Target of the law, y.
 const TARGET: &str = "0.5";
-/// Of the noise floor that the held-out error may be at most.
+/// Largest allowed validation error, as a multiple of the noise level.
 const FLOOR: f64 = 1.15;
 
-/// The day's folder, program and page.
+/// Working folder, program and page.
 struct Day {
     folder: PathBuf,
     program: PathBuf,
@@ -124,7 +122,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         std::fs::write(day.folder.join("commands").join(&file), cut(&text, samples))?;
     }
 
-    day.say("## 1. What is this rig?\n\nThe board comes with the bundled firmware: it knows neither the rig nor a model of it. The rig is measured first.");
+    day.say("## 1. Calibrate the rig\n\nThe bundled firmware contains neither a model nor the properties of the rig. `--calibrate` measures sensor scale, noise\nand shortest pulses.");
     day.firmware("first", None, false)?;
     day.fit(
         "calibrate",
@@ -135,7 +133,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         ),
     )?;
 
-    day.say("## 2. Recordings\n\nCommands are played, each from rest; the board streams every sample. The rig file says what its counts mean.");
+    day.say("## 2. Record and average\n\nThe board plays each command from rest and streams every sample. `rig.toml` converts counts to y. The scatter between\nrepeats becomes `y_sd`, the noise level of every later comparison.");
     let commands: Vec<String> = identify
         .iter()
         .chain(*validate)
@@ -159,7 +157,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
     line.extend(validate.iter().map(|n| format!("--validate={n}")));
     day.fit("average", &line)?;
 
-    day.say("## 3. A model, and what it lacks");
+    day.say("## 3. Identify and diagnose");
     day.fit("identify", &words(&["identify", "set", "-o", "model.toml"]))?;
     day.fit("compare", &words(&["compare", "model.toml", "set"]))?;
     day.fit(
@@ -175,7 +173,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         ]),
     )?;
     if day.folder.join("experiment.csv").exists() {
-        day.say("The records leave something open, and the diagnosis says which command would tell. It is played, and the diagnosis repeated.");
+        day.say("Several effects are not distinguishable on these records. The command that distinguishes them is played, and the diagnosis\nrepeated.");
         day.fit(
             "record experiment",
             &port(
@@ -229,7 +227,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         day.quietly(&words(&["simulate", &model, &record, "-o", &run]))?;
     }
 
-    day.say("## 4. The law before and after the effect was known\n\nThe same goal for both models. Each law is tried on its model and on every flow that the records leave possible; these decide. Effects at their worst, which the records exclude, are tried as well and warn. The firmware is built with model and rig, and refuses a rig that contradicts the model.");
+    day.say("## 4. Design a law with each model\n\nBoth models get a law for the same target. Each law is tried in simulation on its model and on every plant that the\nrecords do not exclude; losing attachment there rejects the law. Stress trials only warn. The firmware is built from model\nand rig file, and a rig file that contradicts the model is refused.");
     let mut rms = Vec::new();
     for (name, model) in [("before", "model.toml"), ("after", "better.toml")] {
         let controlled = format!("{name}.toml");
@@ -274,7 +272,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         rms.push((number(&said, "rms error ")?, number(&said, "air ")?));
     }
 
-    day.say("## 5. The model in service\n\nThe log of the loop is a data set: the model that the law uses is judged on its own operation.");
+    day.say("## 5. Check the model in operation\n\nThe log of the closed loop is a data set: `compare` validates the model on it.");
     day.fit(
         "compare in service",
         &words(&["compare", "better.toml", "service-after"]),
@@ -292,13 +290,13 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         day.started.elapsed().as_secs_f64()
     );
     let summary = format!(
-        "hidden: {HIDDEN}; named: {}\nheld-out error {held_out:.4}, noise floor {noise:.4} ({:.2} times)\n\
-         the law: rms error {before:.4} before, {after:.4} after; air {air_before:.3} and {air_after:.3}",
+        "hidden effect: {HIDDEN}; named: {}\nvalidation error {held_out:.4} = {:.2} × the noise level ({noise:.4})\n\
+         rms error of the law: {before:.4} with the first model, {after:.4} with the second; air {air_before:.3} and {air_after:.3}",
         effects.join(", "),
         held_out / noise
     );
     println!("{summary}");
-    day.say(&format!("## What came of it\n\n```\n{summary}\n```\n\nTimes on the machine that made this page, in seconds:\n\n{table}"));
+    day.say(&format!("## Result\n\n```\n{summary}\n```\n\nDuration of each step on two cores, in seconds:\n\n{table}"));
     ensure!(
         effects.iter().any(|e| e == HIDDEN),
         "the effect was not named: {}",
@@ -306,7 +304,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
     );
     ensure!(
         held_out <= FLOOR * noise,
-        "the held-out error is {:.2} times the noise floor",
+        "the validation error is {:.2} × the noise level",
         held_out / noise
     );
     ensure!(
@@ -327,10 +325,11 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
 }
 
 const HEAD: &str = "# A day at the rig\n\n\
-`cargo xtask rig-day --short --page` made this page: a simulated rig that hides an effect, behind the board under QEMU, and nothing but the\n\
-serial line between it and the program. With a board at a port it is `--port /dev/ttyACM0` instead of `--port qemu …`, and the\n\
-program is flashed (`firmware/README.md`). What is printed below is what the commands printed.\n\n\
-![A held-out record and both models; the reading under both laws](rig-day.svg)\n\n";
+The complete workflow on one rig: calibrate, record, identify, diagnose, design a law, run it, check the model.\n\
+The rig is simulated and hides an echo of the jet. The board runs under QEMU; the program reaches it over the serial line only.\n\
+With a real board, flash the program (`firmware/README.md`) and use `--port /dev/ttyACM0` in place of `--port qemu …`.\n\n\
+`cargo xtask rig-day --short --page` wrote this page; long outputs are shortened.\n\n\
+![A validation record with both models; the reading under both laws](rig-day.svg)\n\n";
 
 /// The first `samples` of a recording, with the valve shut at the end.
 fn cut(text: &str, samples: usize) -> String {
@@ -367,7 +366,7 @@ impl Day {
         let _ = writeln!(self.page, "{text}\n");
     }
 
-    /// A command of which nobody needs to read.
+    /// Runs a command without showing it.
     fn quietly(&self, line: &[String]) -> Result<()> {
         let done = Command::new(&self.program)
             .args(line)
@@ -378,7 +377,7 @@ impl Day {
         Ok(())
     }
 
-    /// A command of the program; what it prints goes to the page.
+    /// Runs a command of the program and adds its output to the page.
     fn fit(&mut self, step: &str, line: &[String]) -> Result<String> {
         let shown = format!("host-fit {}", line.join(" "));
         eprintln!("$ {shown}");
@@ -400,12 +399,16 @@ impl Day {
             .push((step.to_owned(), started.elapsed().as_secs_f64()));
         if line.iter().all(|word| word != "--json") {
             print!("{said}");
-            let _ = writeln!(self.page, "```\n$ {shown}\n{}\n```\n", said.trim_end());
+            let _ = writeln!(
+                self.page,
+                "```\n$ {shown}\n{}\n```\n",
+                shortened(said.trim_end())
+            );
         }
         Ok(said)
     }
 
-    /// The board's program under the name `name` in the day's folder.
+    /// Builds the firmware and copies it to `name` in the working folder.
     fn firmware(&mut self, name: &str, model: Option<&str>, rig: bool) -> Result<()> {
         let path = |file: &str| self.folder.join(file);
         let chosen = Chosen {
@@ -428,6 +431,23 @@ impl Day {
     }
 }
 
+/// Long output for the page: its first and last lines, with the number of lines left out.
+fn shortened(said: &str) -> String {
+    const FIRST: usize = 12;
+    const LAST: usize = 3;
+    let lines: Vec<&str> = said.lines().map(str::trim_end).collect();
+    if lines.len() <= FIRST + LAST + 1 {
+        return lines.join("\n");
+    }
+    let left_out = lines.len() - FIRST - LAST;
+    let (first, last) = (&lines[..FIRST], &lines[lines.len() - LAST..]);
+    format!(
+        "{}\n… {left_out} more lines\n{}",
+        first.join("\n"),
+        last.join("\n")
+    )
+}
+
 /// Names of a model's effects.
 fn effects(model: &Path) -> Result<Vec<String>> {
     let text = std::fs::read_to_string(model).with_context(|| model.display().to_string())?;
@@ -442,7 +462,7 @@ fn effects(model: &Path) -> Result<Vec<String>> {
         .collect())
 }
 
-/// Error and noise floor of the held-out records.
+/// Validation error and noise level.
 fn held_out(compared: &str) -> Result<(f64, f64)> {
     let document: serde_json::Value = serde_json::from_str(compared)?;
     let of = |key: &str| {
@@ -453,7 +473,7 @@ fn held_out(compared: &str) -> Result<(f64, f64)> {
     Ok((of("rmse")?, of("noise_rmse")?))
 }
 
-/// The period of a recording, with the rest that the board keeps between repeats, as its header says it.
+/// The period of a recording from its header, rest between repeats included.
 fn played_period(header: &Path) -> Result<String> {
     let text = std::fs::read_to_string(header)?;
     let said = text.lines().find_map(|line| line.split("--period ").nth(1));

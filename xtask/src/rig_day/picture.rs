@@ -1,5 +1,4 @@
-//! The page's picture: a held-out record beside both models, and the reading under
-//! both laws.
+//! The picture of the page: a validation record with both models, and the reading under both laws.
 
 use super::TARGET;
 use anyhow::{Context, Result};
@@ -8,9 +7,9 @@ use std::path::Path;
 
 const WIDTH: f64 = 860.0;
 const PANEL: f64 = 170.0;
-/// Samples that one point of a line is the mean of.
+/// Samples averaged per point of a line.
 const MEAN: usize = 20;
-/// Measured; before and after the effect was known; what is asked for.
+/// Colours of the measurement and target, and of the models without and with the effect.
 const GREY: &str = "#57606A";
 const BEFORE: &str = "#D55E00";
 const AFTER: &str = "#0072B2";
@@ -19,7 +18,7 @@ const AFTER: &str = "#0072B2";
 pub(super) fn draw(folder: &Path, shown: &str) -> Result<String> {
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"900\" height=\"{}\" viewBox=\"0 0 900 {0}\" role=\"img\" \
-         font-family=\"Helvetica, Arial, sans-serif\">\n<title>A held-out record and both models; the reading under both \
+         font-family=\"Helvetica, Arial, sans-serif\">\n<title>A validation record with both models; the reading under both \
          laws</title>\n<rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>\n",
         3.0 * PANEL + 30.0
     );
@@ -30,7 +29,7 @@ pub(super) fn draw(folder: &Path, shown: &str) -> Result<String> {
         (read("better-run.csv", 0)?, AFTER),
     ];
     let words = format!(
-        "{shown}, held out, 4 s: measured (grey), the model before (orange) and after (blue) the effect was known"
+        "validation record {shown}, 4 s: measured (grey), model without (orange) and with (blue) the effect"
     );
     panel(&mut svg, 0, &words, &record, None);
     for (i, (name, colour)) in [("before", BEFORE), ("after", AFTER)]
@@ -38,7 +37,7 @@ pub(super) fn draw(folder: &Path, shown: &str) -> Result<String> {
         .enumerate()
     {
         let reading = read(&format!("service-{name}/service.csv"), 6000)?;
-        let words = format!("the law {name}: the reading for 4 s, dashed what it is to hold");
+        let words = format!("law {name} the effect was added: reading for 4 s, target dashed");
         panel(
             &mut svg,
             i + 1,

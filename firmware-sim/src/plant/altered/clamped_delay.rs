@@ -1,4 +1,4 @@
-//! The delay falls in a straight line with the mean friction, down to a floor.
+//! A delay that decreases linearly with the mean friction, down to a minimum.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -14,7 +14,7 @@ pub struct ClampedDelay {
     pub floor: f64,
     /// Extra delay of the separated flow (s).
     pub rise: f64,
-    /// Mean friction from which on nothing changes (y).
+    /// Mean friction above which the delay is constant (y).
     pub level: f64,
 }
 

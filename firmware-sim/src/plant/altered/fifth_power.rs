@@ -1,4 +1,4 @@
-//! A fifth power holds large friction back.
+//! Saturation by the fifth power of the friction.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

@@ -1,6 +1,6 @@
-//! Effects in other laws than the catalogue's: what a rig has in truth is rarely what a textbook writes.
+//! Effects with other laws than the catalogue's, as on real rigs.
 //!
-//! Each resembles an effect of the catalogue, and a diagnosis that names that effect is right.
+//! Each resembles an effect of the catalogue, whose name is then a correct diagnosis.
 
 mod clamped_delay;
 mod fifth_power;
@@ -24,7 +24,7 @@ use super::effects::{
 use super::part::{Part, Place, Surroundings};
 
 catalogue! {
-    /// An effect in another law than the catalogue's.
+    /// An effect with another law than the catalogue's.
     Altered {
         clamped_delay::ClampedDelay,
         second_order_valve::SecondOrderValve,

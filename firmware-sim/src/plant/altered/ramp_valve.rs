@@ -1,4 +1,4 @@
-//! A valve that waits and then travels at constant speed.
+//! A valve with a dead time and constant travel speed.
 
 use std::collections::VecDeque;
 
@@ -9,10 +9,10 @@ use crate::plant::base::BasePlant;
 use crate::plant::effects::{Card, Limits, Physics, ValveLag};
 use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
 
-/// After a dead time the opening goes to where it is told at a constant speed.
+/// After a dead time the opening moves to the commanded level at constant speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RampValve {
-    /// Time before anything moves (s).
+    /// Dead time (s).
     pub dead_time: f64,
     /// Time from closed to open (s).
     pub opening_time: f64,
@@ -53,7 +53,7 @@ struct Valve {
     law: RampValve,
     target: f64,
     opening: f64,
-    /// When which level is obeyed.
+    /// Delayed command levels with their times.
     waiting: VecDeque<(f64, f64)>,
 }
 

@@ -59,7 +59,7 @@ impl JetPart for Valve {
         self.opening
     }
 
-    /// Midpoint rule: a sub-step is a thousandth of its period.
+    /// Midpoint rule: a sub-step is a thousandth of the period.
     fn advance(&mut self, _t: f64, piece: &Piece) -> f64 {
         let pull = |v: f64, v_dot: f64| {
             self.omega * (self.omega * (piece.to - v) - 2.0 * self.damping_ratio * v_dot)

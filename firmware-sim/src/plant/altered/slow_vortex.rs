@@ -1,4 +1,4 @@
-//! A starting vortex that has to roll up before it is felt.
+//! A starting vortex with a finite roll-up time.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -14,7 +14,7 @@ pub struct SlowVortex {
     pub gain: f64,
     /// Time constant of its decay, τ (s).
     pub decay_time: f64,
-    /// Time constant of its rolling up, τ_r (s).
+    /// Roll-up time constant, τ_r (s).
     pub rise_time: f64,
 }
 

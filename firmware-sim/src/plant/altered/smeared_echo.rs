@@ -1,4 +1,4 @@
-//! The jet arrives a second time, later and washed out.
+//! A delayed and smeared second arrival of the jet.
 
 use rand_chacha::ChaCha8Rng;
 
@@ -13,9 +13,9 @@ use crate::waveform::{Cursor, Waveform};
 pub struct SmearedEcho {
     /// Strength of the echo (-).
     pub gain: f64,
-    /// How much later it begins to arrive (s).
+    /// Additional delay of its start (s).
     pub echo_delay: f64,
-    /// Time constant of its washing out (s).
+    /// Smearing time constant (s).
     pub smear_time: f64,
 }
 

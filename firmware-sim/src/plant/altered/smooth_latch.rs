@@ -1,4 +1,4 @@
-//! Attached flow helps itself, without a switch.
+//! Self-sustained attachment without a sharp threshold.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -10,15 +10,15 @@ use crate::plant::part::{FlowPart, Part, Place, Surroundings};
 /// settling·λ̇ = ½ + ½·tanh((s − centre + half·(2λ − 1))/width) − λ; gain·λ is added to the drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SmoothLatch {
-    /// Middle between locking on and letting go (y).
+    /// Centre of the hysteresis (y).
     pub centre: f64,
-    /// Half the way between them (y).
+    /// Half width of the hysteresis (y).
     pub half_width: f64,
-    /// Over which friction the lock closes (y).
+    /// Width of the transition (y).
     pub softness: f64,
-    /// What the closed lock adds to the drive (y).
+    /// Contribution of the closed latch to the drive (y).
     pub gain: f64,
-    /// How fast the lock follows (s).
+    /// Time constant of the latch (s).
     pub settling_time: f64,
 }
 
@@ -41,7 +41,7 @@ impl Physics for SmoothLatch {
             centre: 0.5 * (lower + upper),
             half_width: 0.5 * (upper - lower),
             softness: rng.random_range(0.04..0.08) * base.gain,
-            // Without a jet the lock must let go.
+            // The latch must release without a jet.
             gain: rng.random_range(0.5..0.75) * lower,
             settling_time: rng.random_range(0.002..0.008),
         }

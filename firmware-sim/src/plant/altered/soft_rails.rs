@@ -1,4 +1,4 @@
-//! An amplifier that gives way before its upper rail.
+//! An amplifier with soft saturation below its upper limit.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -10,9 +10,9 @@ use crate::plant::part::{Moment, Part, Place, SensorPart, Surroundings};
 /// Above the knee the reading is knee + room·tanh((x − knee)/room).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SoftRails {
-    /// Where it begins to give way (y).
+    /// Start of the saturation (y).
     pub knee: f64,
-    /// What is left above the knee (y).
+    /// Remaining range above the knee (y).
     pub room: f64,
 }
 

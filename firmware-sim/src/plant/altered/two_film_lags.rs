@@ -1,4 +1,4 @@
-//! The film follows with two lags: film and substrate.
+//! A film with two lags in series: film and substrate.
 
 use rand_chacha::ChaCha8Rng;
 
@@ -56,7 +56,7 @@ impl SensorPart for Film {
         self.second
     }
 
-    /// Each lag sees the mean of what it follows over the piece.
+    /// The input of each lag is averaged over the piece.
     fn advance(&mut self, piece: &Piece) -> f64 {
         let before = self.first;
         let felt = 0.5 * (piece.from + piece.to);

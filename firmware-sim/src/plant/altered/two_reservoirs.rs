@@ -1,4 +1,4 @@
-//! A plenum fed from a tank that is itself emptied.
+//! A plenum fed from a tank that empties as well.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -101,7 +101,7 @@ mod tests {
         };
         let mut jet = jet([law.at_rest()]);
         jet.command(1.0);
-        // The plenum alone would rest at 1/(1 + κτ_p).
+        // The plenum alone would settle at 1/(1 + κτ_p).
         let first = run(&mut jet, 1.5);
         let plenum_alone = 1.0 / 1.2;
         assert!(first < plenum_alone && first > 0.7, "{first}");

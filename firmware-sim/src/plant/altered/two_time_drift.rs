@@ -1,4 +1,4 @@
-//! The zero creeps, quickly at first and slowly for long.
+//! Sensor drift with a fast and a slow time constant.
 
 use rand_chacha::ChaCha8Rng;
 
@@ -9,7 +9,7 @@ use crate::plant::part::{Moment, Part, Place, SensorPart, Surroundings};
 /// Half the amplitude with each of two time constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TwoTimeDrift {
-    /// Where the zero ends up (y).
+    /// Final offset (y).
     pub amplitude: f64,
     /// Time constant of the film's support (s).
     pub fast_time: f64,

@@ -1,4 +1,4 @@
-//! A bubble that was filled for long lowers what the jet can reach.
+//! A separation bubble that reduces the jet's effect after long filling.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -8,10 +8,10 @@ use crate::plant::base::{BasePlant, log_uniform};
 use crate::plant::effects::{Card, Limits, Physics};
 use crate::plant::part::{FlowPart, Part, Place, Surroundings};
 
-/// −square·b² in what the flow goes to, time·ḃ = s − b.
+/// −square·b² in the level of the flow, time·ḃ = s − b.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BubbleMemory {
-    /// How much (1/y).
+    /// Coefficient (1/y).
     pub square: f64,
     /// Time constant of filling and emptying (s).
     pub time: f64,

@@ -1,4 +1,4 @@
-//! The jet is carried a part of its way by the free stream.
+//! A jet that is partly convected by the free stream.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -14,9 +14,9 @@ use crate::plant::part::{Part, Place, Surroundings};
 /// way·(Ū/U)^exponent on top of the transport delay, U the measured free stream when it sets out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConvectiveLine {
-    /// Time that the part takes at the mean free stream (s).
+    /// Convection time at the mean free stream (s).
     pub way: f64,
-    /// 1 where everything moves with the stream (-).
+    /// Exponent; 1 if everything moves with the stream (-).
     pub exponent: f64,
 }
 

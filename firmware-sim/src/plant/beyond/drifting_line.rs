@@ -1,4 +1,4 @@
-//! The line to the valve takes longer and longer.
+//! A delay of the valve line that increases during the record.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -13,7 +13,7 @@ use crate::plant::part::{Part, Place, Surroundings};
 /// more·(1 − exp(−t/time)) on top of the transport delay, t the time in the record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriftingLine {
-    /// By how much it is longer in the end (s).
+    /// Final additional delay (s).
     pub more: f64,
     /// Time constant of the drift (s).
     pub time: f64,

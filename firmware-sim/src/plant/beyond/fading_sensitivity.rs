@@ -1,4 +1,4 @@
-//! The sensor gets dirty and shows less and less.
+//! Sensor fouling: sensitivity decreases with time.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -11,9 +11,9 @@ use crate::plant::part::{Moment, Part, Place, SensorPart, Surroundings};
 /// Reading times 1 − loss·(1 − exp(−t/time)), t the time in the record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FadingSensitivity {
-    /// What is missing in the end (-).
+    /// Final loss (-).
     pub loss: f64,
-    /// Time constant of the dirt (s).
+    /// Time constant of the fouling (s).
     pub time: f64,
 }
 

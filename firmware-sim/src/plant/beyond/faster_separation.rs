@@ -1,4 +1,4 @@
-//! After a long blow the flow separates faster.
+//! Faster separation after a long pulse.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -9,12 +9,13 @@ use crate::plant::base::{BasePlant, log_uniform};
 use crate::plant::effects::{Card, Limits, Physics};
 use crate::plant::part::{FlowPart, Part, Piece, Place, Surroundings};
 
-/// Where no jet arrives, the rate is 1 + gain·(1 − exp(−length/time)) times what it was, length that of the last blow.
+/// Without a jet the rate is multiplied by 1 + gain·(1 − exp(−length/time)), with length that of the last
+/// pulse.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FasterSeparation {
-    /// How much faster after a blow for ever (-).
+    /// Relative increase after an infinitely long pulse (-).
     pub gain: f64,
-    /// Time constant of the blow (s).
+    /// Time constant of the pulse length (s).
     pub time: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Blowing heats the valve; a hot valve lets less through and regains its strength over seconds.
+//! Valve heating: blowing heats the valve, whose strength decreases and recovers over seconds.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -11,11 +11,11 @@ use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
 /// time·ḣ = u − h; strength 1 − loss·h²/(h² + knee²).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HotJet {
-    /// What the heat costs at most (-).
+    /// Largest loss (-).
     pub loss: f64,
     /// Time constant of heating and cooling (s).
     pub time: f64,
-    /// Heat at which half of it is lost, 1 under blowing for ever (-).
+    /// Heat at half of the loss; 1 is steady blowing (-).
     pub knee: f64,
 }
 
@@ -64,7 +64,7 @@ impl JetPart for Valve {
         to * (1.0 - self.law.loss * square / (square + self.law.knee * self.law.knee))
     }
 
-    /// Exact for a jet that stays at its mean over the piece.
+    /// Exact for a jet that is constant over the piece.
     fn advance(&mut self, t: f64, piece: &Piece) -> f64 {
         let mean = 0.5 * (piece.from + piece.to);
         self.heat = mean + (self.heat - mean) * (-piece.dt / self.law.time).exp();

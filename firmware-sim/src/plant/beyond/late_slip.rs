@@ -1,4 +1,4 @@
-//! Late in the record the sensor slips and shows less from then on.
+//! A sensor that loses sensitivity at one time late in the record.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -11,9 +11,9 @@ use crate::plant::part::{Moment, Part, Place, SensorPart, Surroundings};
 /// Reading times 1 − loss from `at` on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LateSlip {
-    /// What is missing then (-).
+    /// Loss (-).
     pub loss: f64,
-    /// When (s from the record's start).
+    /// Time of the loss (s from the record's start).
     pub at: f64,
 }
 

@@ -1,4 +1,4 @@
-//! A line from the coil to the valve that does not always take the same time, on top of the transport delay.
+//! A valve line with a variable delay, in addition to the transport delay.
 
 use std::collections::VecDeque;
 use std::fmt::Debug;
@@ -6,9 +6,9 @@ use std::fmt::Debug;
 use super::pulses::Pulses;
 use crate::plant::part::{JetPart, Part, Piece};
 
-/// How long the line takes.
+/// The law of the line's delay.
 pub(super) trait LineLaw: Clone + Debug + Send + Sync + 'static {
-    /// For what the coil is told at `t`, the last of these `pulses` (s, not negative).
+    /// The delay of a command issued at `t`, the last of these `pulses` (s, ≥ 0).
     fn takes(&self, pulses: &Pulses, t: f64) -> f64;
 }
 
@@ -22,8 +22,8 @@ pub(super) fn line(law: impl LineLaw) -> Part {
     }))
 }
 
-/// The coil is told levels that jump; each travels for the time that the line takes when it sets out. One
-/// that would overtake earlier ones wipes them out.
+/// Commands are level changes; each travels for the delay at its start. One that would overtake earlier ones
+/// cancels them.
 #[derive(Debug, Clone)]
 struct Line<L> {
     law: L,
@@ -61,14 +61,14 @@ impl<L: LineLaw> JetPart for Line<L> {
     }
 }
 
-/// For the tests of laws: when edges arrive.
+/// For tests: arrival times of edges.
 #[cfg(test)]
 pub(super) mod bench {
     use super::Part;
     use crate::plant::jet::bench::{jet, run};
     use crate::waveform::Cursor;
 
-    /// Arrival times of edges sent at these times, on and off in turn.
+    /// Arrival times of edges sent at these times, alternating on and off.
     pub(in super::super) fn arrivals(part: Part, sent: &[f64]) -> Vec<f64> {
         let mut jet = jet([part]);
         let mut level = 0.0;

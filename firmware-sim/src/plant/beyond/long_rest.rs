@@ -1,4 +1,4 @@
-//! A jet that coughs after a long rest, and is in order otherwise.
+//! A jet that is weaker after a long rest.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -13,9 +13,9 @@ use crate::plant::part::{Part, Place, Surroundings};
 /// Strength 1 − loss for the whole pulse after a rest longer than `rest`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LongRest {
-    /// What is missing then (-).
+    /// Loss (-).
     pub loss: f64,
-    /// Longest rest without harm (s).
+    /// Longest rest without loss (s).
     pub rest: f64,
 }
 

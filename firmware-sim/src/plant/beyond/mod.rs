@@ -1,8 +1,4 @@
-//! Physics that the catalogue lacks: what a search for an unknown term is tried on.
-//!
-//! Each knows where it acts and on what it depends, in the words in which a finding is told. The laws and
-//! their ranges were fixed from what rigs do (pulses of 20–600 ms, flow times of 20–150 ms, friction of order
-//! 1) before any search was run on them.
+//! Physics outside the catalogue, for tests of the search for unknown terms.
 
 mod bubble_memory;
 mod convective_line;
@@ -36,16 +32,16 @@ use super::effects::{
 };
 use super::part::{Part, Place, Surroundings};
 
-/// Where a term acts, as a finding says it.
+/// Place of a term, in the words of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Port {
     /// The jet's strength.
     Jet,
-    /// The way from the coil to the flow.
+    /// The path from the coil to the flow.
     Delay,
-    /// What drives the flow.
+    /// The drive of the flow.
     Flow,
-    /// What the sensor shows.
+    /// The sensor's reading.
     Sensor,
 }
 
@@ -61,23 +57,22 @@ impl Port {
     }
 }
 
-/// Where physics breaks that is as modelled everywhere else: above a value of the coordinate.
+/// Region in which the physics deviates from the model: above a value of the coordinate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Region {
-    /// From which value on, in the rig's own units.
+    /// The threshold, in the rig's own units.
     pub above: f64,
 }
 
-/// Where a term acts and on what it depends.
+/// Place and coordinates of a term.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Truth {
-    /// Where.
+    /// The place.
     pub port: Port,
-    /// On what, in the words of a finding: the first is how the rig is built, the others are the same to
-    /// everybody who has only the commands and the readings. A time in brackets is the rig's (s); words
-    /// without one stand for any.
+    /// Coordinates in the words of a finding: the first is the true one, the others are equivalent for given
+    /// commands and readings. A time in brackets is the rig's (s); without one any time is accepted.
     pub coordinates: Vec<String>,
-    /// Where it acts alone, if it does.
+    /// The region outside of which it has no effect, if limited.
     pub region: Option<Region>,
 }
 
@@ -99,28 +94,28 @@ impl Truth {
     }
 }
 
-/// A window and a fading memory of this share of its length say nearly the same of what was blown: with the
-/// commands of the rigs, a curve over the one describes 84–94 % of one over the other, the most at this ratio.
+/// Ratio of an exponential memory's time constant to a window with nearly the same information: with the
+/// rigs' commands, a curve over one explains 84–94 % of a curve over the other, most at this ratio.
 const MEMORY_PER_WINDOW: f64 = 0.6;
 
-/// What one file of this folder defines beside its physics.
+/// Interface of each file in this folder.
 trait Hidden: Physics {
-    /// What a search should find.
+    /// The term to be found.
     fn truth(&self) -> Truth;
 }
 
 macro_rules! beyond {
     ($($file:ident :: $physics:ident),+ $(,)?) => {
         catalogue! {
-            /// One physical mechanism that the catalogue lacks, with its parameters.
+            /// A physical mechanism outside the catalogue, with its parameters.
             Beyond { $($file :: $physics),+ }
         }
 
         impl Beyond {
-            /// The channel of the temperature of the air (°C), beside that of the free stream.
+            /// Channel of the air temperature (°C), beside that of the free stream.
             pub const TEMPERATURE: &'static str = "temperature";
 
-            /// What a search should find.
+            /// The term to be found.
             pub fn truth(&self) -> Truth {
                 match self { $(Self::$physics(physics) => physics.truth(),)+ }
             }
@@ -170,7 +165,7 @@ mod tests {
                 physics.validate().unwrap();
                 let truth = physics.truth();
                 assert!(!truth.coordinates.is_empty() && !physics.parameters().is_empty());
-                // Two hertz, and a second of rest before the end.
+                // 2 Hz, with a rest of one second at the end.
                 let on = |k: usize| k < 7500 && k % 500 >= 250;
                 let command: Vec<f64> = (0..8500).map(|k| f64::from(u8::from(on(k)))).collect();
                 let stream = FreeStream::draw(&mut rng, command.len());
@@ -188,7 +183,7 @@ mod tests {
         }
     }
 
-    /// Words that [`Truth::coordinates`] may have.
+    /// Words allowed in [`Truth::coordinates`].
     #[test]
     fn coordinates_are_told_in_the_words_of_a_finding() {
         const WORDS: &[&str] = &[

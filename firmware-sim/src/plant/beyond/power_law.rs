@@ -1,4 +1,4 @@
-//! The sensor follows a power of the friction.
+//! A sensor with a power-law characteristic.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -13,7 +13,7 @@ use crate::plant::part::{Part, Place, SensorPart, Surroundings};
 pub struct PowerLaw {
     /// The power (-).
     pub exponent: f64,
-    /// Friction that is shown as it is (y).
+    /// Friction at which reading and friction are equal (y).
     pub full: f64,
 }
 

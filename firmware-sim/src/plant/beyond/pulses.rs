@@ -1,6 +1,6 @@
-//! What is known of the pulses of a signal that is switched on and off.
+//! History of the pulses of an on/off signal.
 
-/// Pulses so far. Before the first one the signal has been off for ever.
+/// State of the pulses so far. Before the first one the signal has always been off.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pulses {
     on: bool,
@@ -23,7 +23,7 @@ impl Default for Pulses {
 }
 
 impl Pulses {
-    /// The signal is at `level` from `t` on; it is on above 0.
+    /// The signal is `level` from `t` on; it counts as on above 0.
     pub(super) fn see(&mut self, t: f64, level: f64) {
         let on = level > 0.0;
         if on == self.on {
@@ -39,12 +39,12 @@ impl Pulses {
         }
     }
 
-    /// Whether one is going on.
+    /// Whether a pulse is in progress.
     pub(super) fn is_on(&self) -> bool {
         self.on
     }
 
-    /// How many there were, one that is going on among them.
+    /// Number of pulses, the present one included.
     pub(super) fn number(&self) -> u32 {
         self.number
     }
@@ -54,17 +54,17 @@ impl Pulses {
         self.rest_before
     }
 
-    /// Since the last one began (s).
+    /// Time since the last pulse began (s).
     pub(super) fn since_rise(&self, t: f64) -> f64 {
         t - self.rose_at
     }
 
-    /// Since the last one ended (s).
+    /// Time since the last pulse ended (s).
     pub(super) fn since_fall(&self, t: f64) -> f64 {
         t - self.fell_at
     }
 
-    /// Length of the last one, or of the one that is going on so far (s); 0 before the first.
+    /// Length of the last pulse, or of the present one so far (s); 0 before the first.
     pub(super) fn length(&self, t: f64) -> f64 {
         match (self.on, self.number) {
             (_, 0) => 0.0,

@@ -1,4 +1,4 @@
-//! The drive has a square of the friction.
+//! A drive with a term quadratic in the friction.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -8,7 +8,7 @@ use crate::plant::base::BasePlant;
 use crate::plant::effects::{Card, Limits, Physics};
 use crate::plant::part::{FlowPart, Part, Place, Surroundings};
 
-/// square·s² in what the flow goes to.
+/// square·s² in the level of the flow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct QuadraticDrive {
     /// Its coefficient (1/y).
@@ -23,7 +23,7 @@ impl Physics for QuadraticDrive {
     })];
 
     fn draw(base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        // With a quarter of 1/gain and more the flow would run away.
+        // From about a quarter of 1/gain the flow would diverge.
         let size = if rng.random_bool(0.5) {
             rng.random_range(0.10..0.18)
         } else {

@@ -1,4 +1,4 @@
-//! After a blow the flow is in no hurry to separate.
+//! Delayed separation after a pulse.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -9,10 +9,10 @@ use crate::plant::base::{BasePlant, log_uniform};
 use crate::plant::effects::{Card, Limits, Physics};
 use crate::plant::part::{FlowPart, Part, Piece, Place, Surroundings};
 
-/// Where no jet arrives, the rate is 1 − reluctance·exp(−t/time) times what it was, t since the jet ended.
+/// Without a jet the rate is multiplied by 1 − reluctance·exp(−t/time), t since the jet ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReluctantSeparation {
-    /// What of the rate is missing at first (-).
+    /// Initial relative reduction of the rate (-).
     pub reluctance: f64,
     /// Time constant of its recovery (s).
     pub time: f64,
@@ -92,7 +92,7 @@ mod tests {
         flow.jump(0.0);
         let t = 0.1_f64;
         let expected = s * (-10.0 * (t - 0.04 * (1.0 - (-t / 0.05).exp()))).exp();
-        // The part's clock stands still within a sub-step.
+        // The part's clock is constant within a sub-step.
         assert!((hold(&mut flow, 0.0, t) - expected).abs() < 1e-3);
     }
 }

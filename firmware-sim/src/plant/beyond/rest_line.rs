@@ -1,4 +1,4 @@
-//! The line empties at rest and has to be filled again.
+//! A supply line that empties at rest and has to be refilled.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -13,7 +13,7 @@ use crate::plant::part::{Part, Place, Surroundings};
 /// more·(1 − exp(−rest/time)) on top of the transport delay, for the whole pulse after that rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RestLine {
-    /// By how much it takes longer after a rest for ever (s).
+    /// Additional delay after an infinitely long rest (s).
     pub more: f64,
     /// Time constant of emptying (s).
     pub time: f64,

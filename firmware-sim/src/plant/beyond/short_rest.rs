@@ -13,9 +13,9 @@ use crate::plant::part::{Part, Place, Surroundings};
 /// Strength 1 − loss·exp(−rest/recovery), rest the pause before the pulse.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShortRest {
-    /// What is missing after no rest at all (-).
+    /// Loss without any rest (-).
     pub loss: f64,
-    /// Rest after which 63 % of it are back (s).
+    /// Rest after which 63 % have recovered (s).
     pub recovery: f64,
 }
 

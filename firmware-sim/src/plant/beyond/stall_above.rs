@@ -1,4 +1,4 @@
-//! Above a level the flow is held back, and nowhere else.
+//! Saturation of the flow above a level only.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -8,12 +8,12 @@ use crate::plant::base::BasePlant;
 use crate::plant::effects::{Card, Limits, Physics};
 use crate::plant::part::{FlowPart, Part, Place, Surroundings};
 
-/// −slope·(s − level) in what the flow goes to, where s is above the level.
+/// −slope·(s − level) in the level of the flow where s exceeds it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StallAbove {
-    /// How hard (-).
+    /// Strength (-).
     pub slope: f64,
-    /// From which friction on (y).
+    /// Threshold friction (y).
     pub level: f64,
 }
 

@@ -1,4 +1,4 @@
-//! After much blowing the flow separates faster.
+//! Faster separation after much blowing.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -10,12 +10,13 @@ use crate::plant::effects::{Card, Limits, Physics};
 use crate::plant::part::{FlowPart, Part, Piece, Place, Surroundings};
 use crate::waveform::{Cursor, Waveform};
 
-/// Where no jet arrives, the rate is 1 + gain·b times what it was, b the share of the last `window` seconds in which a jet arrived.
+/// Without a jet the rate is multiplied by 1 + gain·b, b the fraction of the last `window` seconds with a
+/// jet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StirredLayer {
-    /// How much faster when it has been blown on all the time (-).
+    /// Relative increase after continuous blowing (-).
     pub gain: f64,
-    /// How long blowing counts (s).
+    /// Window length (s).
     pub window: f64,
 }
 
@@ -58,10 +59,10 @@ impl Hidden for StirredLayer {
 struct Stirred {
     law: StirredLayer,
     time: f64,
-    /// For how long a jet has arrived within the window (s).
+    /// Blowing time within the window (s).
     blown: f64,
     pulses: Pulses,
-    /// For how long one has arrived since the start (s).
+    /// Blowing time since the start (s).
     past: Waveform,
     cursor: Cursor,
 }
@@ -98,7 +99,7 @@ mod tests {
     use super::*;
     use crate::plant::flow::bench::{flow, hold};
 
-    /// Within the window, the longer the rest, the less it has been blown on: here not yet.
+    /// With increasing rest the blowing time in the window decreases; here not yet.
     #[test]
     fn recent_blowing_sets_the_rate() {
         let law = StirredLayer {
@@ -113,7 +114,7 @@ mod tests {
         let left = hold(&mut flow, 0.0, 0.1);
         let rate: f64 = 10.0 * (1.0 + 1.5 * 0.2 / 0.5);
         assert!((left - s * (-0.1 * rate).exp()).abs() < 1e-6, "{left}");
-        // All of it forgotten.
+        // The window no longer contains blowing.
         let s = hold(&mut flow, 0.0, 0.7);
         let left = hold(&mut flow, 0.0, 0.1);
         assert!((left - s * (-1.0_f64).exp()).abs() < 1e-9 * s);

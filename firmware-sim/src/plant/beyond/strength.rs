@@ -1,13 +1,13 @@
-//! A jet whose strength depends on its pulses.
+//! A jet whose strength depends on the history of pulses.
 
 use std::fmt::Debug;
 
 use super::pulses::Pulses;
 use crate::plant::part::{JetPart, Part, Piece};
 
-/// How strong the jet is.
+/// The law of the jet's strength.
 pub(super) trait StrengthLaw: Copy + Debug + Send + Sync + 'static {
-    /// Its strength at `t`, relative to that of a jet that nothing is the matter with.
+    /// Its strength at `t`, relative to the nominal jet.
     fn strength(&self, pulses: &Pulses, t: f64) -> f64;
 }
 
@@ -36,13 +36,13 @@ impl<L: StrengthLaw> JetPart for Pulsing<L> {
     }
 }
 
-/// For the tests of laws: what a jet is like at moments of a sequence of switching.
+/// For tests: jet strengths during a switching sequence.
 #[cfg(test)]
 pub(super) mod bench {
     use super::Part;
     use crate::plant::jet::bench::{jet, run};
 
-    /// The jet's strength `at` these times when the coil is switched `on` and off in turn at those.
+    /// The jet's strength at times `at` when the coil is switched at the times `on`, alternating.
     pub(in super::super) fn strengths(part: Part, switching: &[f64], at: &[f64]) -> Vec<f64> {
         let mut jet = jet([part]);
         let mut switching = switching.iter().copied().peekable();

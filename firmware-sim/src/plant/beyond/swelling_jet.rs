@@ -1,4 +1,4 @@
-//! A jet that swells within the pulse.
+//! A jet whose strength builds up within the pulse.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -13,9 +13,9 @@ use crate::plant::part::{Part, Place, Surroundings};
 /// Strength 1 − deficit·exp(−t/time), t since the pulse began.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SwellingJet {
-    /// What is missing at first (-).
+    /// Initial deficit (-).
     pub deficit: f64,
-    /// Time constant of the swelling (s).
+    /// Build-up time constant (s).
     pub time: f64,
 }
 
@@ -41,7 +41,7 @@ impl Physics for SwellingJet {
 
 impl Hidden for SwellingJet {
     fn truth(&self) -> Truth {
-        // A jet is only there while the pulse lasts; until then both are the same time.
+        // A jet exists only during the pulse, in which both coordinates are equal.
         Truth::new(Port::Jet, &["since rising edge", "pulse length"])
     }
 }

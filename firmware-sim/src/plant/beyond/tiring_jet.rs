@@ -1,4 +1,4 @@
-//! A jet that tires with every pulse.
+//! A jet that weakens with every pulse.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -13,9 +13,9 @@ use crate::plant::part::{Part, Place, Surroundings};
 /// Strength 1 − loss·(1 − exp(−(n − 1)/pulses)), n the number of the pulse in the record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TiringJet {
-    /// What the pulses cost in the end (-).
+    /// Final loss (-).
     pub loss: f64,
-    /// Pulses after which 63 % of it are lost (-).
+    /// Number of pulses after which 63 % of the loss has occurred (-).
     pub pulses: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Motion stirs the flow up; a stirred flow holds on less well.
+//! Motion of the flow reduces its attachment.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -8,12 +8,12 @@ use crate::plant::base::{BasePlant, log_uniform};
 use crate::plant::effects::{Card, Limits, Physics};
 use crate::plant::part::{FlowPart, Part, Place, Surroundings};
 
-/// −loss·m in what the flow goes to, time·ṁ = |ṡ| − m.
+/// −loss·m in the level of the flow, time·ṁ = |ṡ| − m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unrest {
-    /// How much (s).
+    /// Strength (s).
     pub loss: f64,
-    /// Time constant of calming down (s).
+    /// Decay time constant (s).
     pub time: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The jet is stronger in warm air.
+//! A jet that is stronger in warm air.
 
 use rand_chacha::ChaCha8Rng;
 

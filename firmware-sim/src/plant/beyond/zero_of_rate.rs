@@ -1,4 +1,4 @@
-//! A sensor that is shaken shows too much for a while.
+//! A sensor offset caused by rapid changes.
 
 use rand_chacha::ChaCha8Rng;
 
@@ -10,9 +10,9 @@ use crate::plant::part::{Part, Piece, Place, SensorPart, Surroundings};
 /// gain·m on the reading, time·ṁ = |ṡ| − m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZeroOfRate {
-    /// How much (s).
+    /// Strength (s).
     pub gain: f64,
-    /// Time constant of calming down (s).
+    /// Decay time constant (s).
     pub time: f64,
 }
 
@@ -63,7 +63,7 @@ impl SensorPart for Shaken {
         to + self.law.gain * self.unrest
     }
 
-    /// Exact for what goes in straight lines.
+    /// Exact for piecewise linear signals.
     fn advance(&mut self, piece: &Piece) -> f64 {
         let rate = (piece.to - piece.from).abs() / piece.dt;
         self.unrest = rate + (self.unrest - rate) * (-piece.dt / self.law.time).exp();

@@ -1,4 +1,4 @@
-//! A cubic holds large friction back.
+//! Saturation by a cubic of the friction.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

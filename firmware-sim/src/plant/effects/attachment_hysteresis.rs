@@ -1,4 +1,4 @@
-//! Attached flow helps itself.
+//! Hysteresis of attachment.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -7,14 +7,14 @@ use super::{Card, Limits, Physics};
 use crate::plant::base::BasePlant;
 use crate::plant::part::{FlowPart, Part, Piece, Place, Surroundings};
 
-/// A relay with two thresholds adds to the drive.
+/// A relay with two thresholds, added to the drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttachmentHysteresis {
-    /// Friction above which the flow locks on (y).
+    /// Friction above which the flow attaches (y).
     pub upper_threshold: f64,
-    /// Friction below which it lets go (y).
+    /// Friction below which it detaches (y).
     pub lower_threshold: f64,
-    /// What the lock adds to the drive (y).
+    /// Contribution of the closed relay to the drive (y).
     pub gain: f64,
 }
 
@@ -36,7 +36,7 @@ impl Physics for AttachmentHysteresis {
         Self {
             upper_threshold: rng.random_range(0.55..0.75) * base.gain,
             lower_threshold,
-            // Without a jet the lock must let go: gain below the lower threshold.
+            // Without a jet the relay must release: gain below the lower threshold.
             gain: rng.random_range(0.5..0.75) * lower_threshold,
         }
     }
@@ -88,11 +88,11 @@ mod tests {
             gain: 0.2,
         };
         let mut flow = flow([relay.at_rest()]);
-        // Below the threshold nothing differs; a half-open jet settles at two levels.
+        // Below the threshold there is no difference; a half-open jet has two steady levels.
         assert!((hold(&mut flow, 0.6, 2.0) - 0.6).abs() < 1e-6);
         assert!((hold(&mut flow, 1.0, 2.0) - 1.2).abs() < 1e-6);
         assert!((hold(&mut flow, 0.6, 2.0) - 0.8).abs() < 1e-6);
-        // Without a jet it relaxes towards the gain, reaches 0.3 and lets go.
+        // Without a jet the friction relaxes towards the gain, reaches 0.3 and the relay releases.
         assert!(hold(&mut flow, 0.0, 3.0).abs() < 1e-6);
     }
 

@@ -10,13 +10,13 @@ use crate::plant::part::{FlowPart, Part, Place, Surroundings};
 /// ż = A·ṡ − β·|ṡ|·z − γ·ṡ·|z|, −α·z in the drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoucWenHysteresis {
-    /// A, the initial slope of the loop (only α·A shows in y: 1 by convention) (-).
+    /// A, the initial slope of the loop (1 by convention, because only α·A is identifiable) (-).
     pub stiffness: f64,
-    /// β, how fast the loop saturates (1/y).
+    /// β, saturation rate of the loop (1/y).
     pub beta: f64,
-    /// γ, the loop's shape (1/y).
+    /// γ, shape of the loop (1/y).
     pub gamma: f64,
-    /// α, the loop's weight in the drive (-).
+    /// α, weight of the loop in the drive (-).
     pub alpha: f64,
 }
 

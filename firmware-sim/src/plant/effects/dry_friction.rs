@@ -1,4 +1,4 @@
-//! The friction sticks and moves in jerks.
+//! Dry friction with stick-slip.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -8,7 +8,7 @@ use crate::plant::SAMPLE_PERIOD_S;
 use crate::plant::base::BasePlant;
 use crate::plant::part::{FlowPart, Part, Place, Resistance, Surroundings};
 
-/// −F·sign(ṡ) against every motion.
+/// −F·sign(ṡ) opposes every motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DryFriction {
     /// F (y per sample).
@@ -28,7 +28,7 @@ impl Physics for DryFriction {
     fn draw(base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
         let slow = base.attach_s.max(base.separate_s);
         Self {
-            // It sticks this far from the equilibrium of the slower motion.
+            // Sticking range around the equilibrium of the slower motion.
             level: rng.random_range(0.10..0.25) * SAMPLE_PERIOD_S / slow,
         }
     }
@@ -54,7 +54,7 @@ mod tests {
 
     #[test]
     fn dry_friction_stops_the_flow_short_of_its_equilibrium_on_both_sides() {
-        // It sticks where rate·|drive − s| = F per sample.
+        // Sticks where rate·|drive − s| = F per sample.
         let level = 0.002;
         let mut flow = flow([DryFriction { level }.at_rest()]);
         let band_on = level / 0.001 * 0.04;

@@ -1,4 +1,4 @@
-//! The jet arrives a second time, later.
+//! A delayed second arrival of the jet.
 
 use std::collections::VecDeque;
 
@@ -15,7 +15,7 @@ use crate::waveform::{Cursor, Waveform};
 pub struct EchoPath {
     /// Strength of the echo (-).
     pub gain: f64,
-    /// How much later it arrives (s).
+    /// Additional delay (s).
     pub echo_delay: f64,
 }
 
@@ -45,7 +45,7 @@ impl Physics for EchoPath {
     }
 }
 
-/// (t + d) − d may round to either side of t; the echo of a jump must be read from the right one (s).
+/// (t + d) − d may round to either side of t; the echo of a jump must be read on the correct side (s).
 const RETURN_SLACK_S: f64 = SHORTEST_PIECE_S;
 
 #[derive(Debug, Clone)]
@@ -54,7 +54,7 @@ struct Echo {
     delay_s: f64,
     direct: Waveform,
     cursor: Cursor,
-    /// When the jumps of the direct jet come back.
+    /// Times at which the jumps of the direct jet return.
     returning: VecDeque<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Rising and falling edges travel for different times.
+//! Different delays of rising and falling edges.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

@@ -1,4 +1,4 @@
-//! The jet matters more or less as the measured free stream varies.
+//! Dependence of the jet's influence on the measured free stream.
 
 use rand_chacha::ChaCha8Rng;
 
@@ -79,7 +79,7 @@ mod tests {
         let mut rig = Rig::new(&spec, Some(stream.clone())).unwrap();
         let y = rig.play(&vec![1.0; 10_000]);
         for k in (100..10_000).step_by(100) {
-            // A 2 ms flow follows the jet of 22 ms ago closely.
+            // A 2 ms flow closely follows the jet of 22 ms before.
             let expected = 1.0 - 2.0 * (stream.velocity(k as f64 * 1e-3 - 0.022) / 10.0 - 1.0);
             assert!((y[k] - expected).abs() < 1e-4);
         }

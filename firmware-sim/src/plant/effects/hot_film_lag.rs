@@ -1,4 +1,4 @@
-//! The film follows with a first-order lag.
+//! First-order lag of the film.
 
 use rand_chacha::ChaCha8Rng;
 

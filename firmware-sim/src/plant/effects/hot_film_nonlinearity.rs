@@ -47,7 +47,7 @@ impl Physics for HotFilmNonlinearity {
 }
 
 impl HotFilmNonlinearity {
-    /// Reversed flow cools no less than none.
+    /// Negative friction counts as 0.
     fn voltage(&self, s: f64) -> f64 {
         (1.0 + self.king_ratio * (s + self.king_offset).max(0.0).cbrt()).sqrt()
     }

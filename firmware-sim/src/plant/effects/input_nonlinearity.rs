@@ -28,7 +28,7 @@ impl Physics for InputNonlinearity {
         loop {
             let quadratic = signed(rng, 0.20, 0.50);
             let cubic = signed(rng, 0.08, 0.25);
-            // A valve opened further never blows less.
+            // The jet must increase monotonically with the opening.
             let steepness = |v: f64| 1.0 + v * (2.0 * quadratic + 3.0 * v * cubic);
             if steepness(0.5).min(steepness(1.0)) > 0.15 {
                 break Self { quadratic, cubic };

@@ -1,5 +1,5 @@
-//! The physical effects a plant can hide: one file each, with name, parameters, units, limits, usual
-//! values and physics in continuous time.
+//! The physical effects of a plant: one file each, with name, parameters, units, limits, usual values and
+//! continuous-time physics.
 //!
 //! A new effect is such a file, its `mod` and one line in `catalogue!`.
 
@@ -35,15 +35,15 @@ use thiserror::Error;
 use super::base::{BasePlant, FlowDelay};
 use super::part::{Part, Place, Surroundings};
 
-/// Why an effect could not be made.
+/// Why an effect could not be created.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum EffectError {
     /// No effect of that name.
     #[error("there is no effect `{name}`; the names are: {known}")]
     UnknownEffect {
-        /// What was asked for.
+        /// The requested name.
         name: String,
-        /// What there is.
+        /// The known names.
         known: String,
     },
     /// The effect has no such parameter.
@@ -51,21 +51,21 @@ pub enum EffectError {
     UnknownParameter {
         /// Name of the effect.
         effect: &'static str,
-        /// The parameter asked for.
+        /// The requested parameter.
         parameter: String,
-        /// What the effect does have.
+        /// The parameters of the effect.
         known: String,
     },
-    /// A parameter is not a usable number.
+    /// A parameter outside its physical range.
     #[error("`{parameter}` of `{effect}` is {value}, it must be {requirement}; give another value")]
     OutOfRange {
         /// Name of the effect.
         effect: &'static str,
         /// Name of the parameter.
         parameter: &'static str,
-        /// The value refused.
+        /// The rejected value.
         value: f64,
-        /// What is allowed.
+        /// The allowed range.
         requirement: &'static str,
     },
 }
@@ -81,7 +81,7 @@ pub struct Parameter {
     pub unit: &'static str,
 }
 
-/// What the physics admits (not what is usual).
+/// Physical limits (not the usual range).
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limits {
     low: f64,
@@ -104,7 +104,7 @@ impl Limits {
         }
     }
 
-    /// NaN is nowhere.
+    /// NaN is outside.
     fn contain(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value)
     }
@@ -139,7 +139,7 @@ impl<E: Copy> Card<E> {
     }
 }
 
-/// Commands with which an effect shows.
+/// Commands with which an effect is visible.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ShowsWith {
     /// Off and on are enough.
@@ -150,37 +150,36 @@ pub enum ShowsWith {
     SignedLevels,
 }
 
-/// What one file of the catalogue defines.
+/// Interface of each file of the catalogue.
 pub(crate) trait Physics: Copy + Debug + PartialEq + Sized + 'static {
     /// Name in model files and reports.
     const NAME: &'static str;
-    /// The effect of the catalogue that it is, or is nearest to.
+    /// The effect of the catalogue that it is or resembles.
     const RESEMBLES: &'static str = Self::NAME;
-    /// Where it sits.
+    /// Its place.
     const PLACE: Place;
     /// Its parameters, in the catalogue's order.
     const PARAMETERS: &'static [Card<Self>];
-    /// Commands with which it shows.
+    /// Commands with which it is visible.
     const SHOWS_WITH: ShowsWith = ShowsWith::OnOff;
-    /// The measured channel without which it cannot be told.
+    /// The measured channel that is required to identify it.
     const CHANNEL: Option<&'static str> = None;
 
-    /// Visible, physically sensible, neither tiny nor extreme, for the rig `base`.
+    /// Random parameters for the rig `base`: visible and plausible.
     ///
     /// The ranges were fixed from the physics (flow times 20–150 ms, friction of order 1) before any
     /// diagnosis was run on these plants.
     fn draw(base: &BasePlant, rng: &mut ChaCha8Rng) -> Self;
 
-    /// What the parameters must be to each other, beyond their own limits: the first that is not, and
-    /// what it must be.
+    /// The first constraint between parameters that is violated, and its requirement.
     fn conflict(&self) -> Option<(&'static str, &'static str)> {
         None
     }
 
-    /// The effect at rest, ready to run.
+    /// The effect in its initial state.
     fn part(&self, surroundings: &Surroundings<'_>) -> Part;
 
-    /// The same in surroundings that do not change.
+    /// The same in constant surroundings.
     #[cfg(test)]
     fn at_rest(&self) -> Part {
         self.part(&Surroundings::default())
@@ -276,23 +275,23 @@ macro_rules! catalogue {
                 match self { $(Self::$effect(_) => $effect::NAME,)+ }
             }
 
-            /// Where it sits in the plant.
+            /// Its place in the plant.
             pub fn place(&self) -> Place {
                 match self { $(Self::$effect(_) => $effect::PLACE,)+ }
             }
 
-            /// Before whom it comes in the plant.
+            /// Its position in the plant.
             pub(crate) fn order(&self) -> (Place, usize) {
                 let names = Self::NAMES.iter();
                 (self.place(), names.take_while(|name| **name != self.name()).count())
             }
 
-            /// Commands with which it shows.
+            /// Commands with which it is visible.
             pub fn shows_with(&self) -> ShowsWith {
                 match self { $(Self::$effect(_) => $effect::SHOWS_WITH,)+ }
             }
 
-            /// The measured channel without which it cannot be told.
+            /// The measured channel that is required to identify it.
             pub fn channel(&self) -> Option<&'static str> {
                 match self { $(Self::$effect(_) => $effect::CHANNEL,)+ }
             }
@@ -312,7 +311,7 @@ macro_rules! catalogue {
                 }
             }
 
-            /// Checks the parameters against what the physics admits (not against what is usual).
+            /// Checks the parameters against their physical limits (not the usual ranges).
             ///
             /// # Errors
             /// [`EffectError::OutOfRange`] naming the first bad parameter.
@@ -320,7 +319,7 @@ macro_rules! catalogue {
                 match self { $(Self::$effect(effect) => validate(effect),)+ }
             }
 
-            /// The effect of the catalogue that it is, or is nearest to.
+            /// The effect of the catalogue that it is or resembles.
             pub fn resembles(&self) -> &'static str {
                 match self { $(Self::$effect(_) => $effect::RESEMBLES,)+ }
             }
@@ -364,12 +363,12 @@ catalogue! {
 }
 
 impl Effect {
-    /// Whether the effect only shows with commands of more levels than off and on.
+    /// Whether the effect requires commands with more levels than off and on.
     pub fn needs_levels(&self) -> bool {
         self.shows_with() != ShowsWith::OnOff
     }
 
-    /// The transport delay that it gives a plant, if it is a delay law.
+    /// The transport delay of the plant, if the effect is a delay law.
     pub fn delay(&self) -> Option<FlowDelay> {
         match self.part(&Surroundings::default()) {
             Part::Delay(delay) => Some(delay),
@@ -377,7 +376,7 @@ impl Effect {
         }
     }
 
-    /// Whether `other` acts on the same part of the rig so that the two exclude each other.
+    /// Whether it and `other` act on the same part of the rig and exclude each other.
     pub fn excludes(&self, other: &Self) -> bool {
         exclude(
             (self.resembles(), self.place()),
@@ -386,7 +385,7 @@ impl Effect {
     }
 }
 
-/// Whether two effects, by what they resemble and where they sit, want the same part of a rig.
+/// Whether two effects, by similar effect and place, need the same part of a rig.
 pub(crate) fn exclude(a: (&str, Place), b: (&str, Place)) -> bool {
     a.0 == b.0 || [a.1, b.1] == [Place::Transport; 2]
 }
@@ -398,7 +397,7 @@ pub(super) fn signed(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
 }
 
 impl FlowDelay {
-    /// The effect of the catalogue that it is, or is nearest to; none for a delay that is always the same.
+    /// The effect of the catalogue that it is or resembles; none for a constant delay.
     pub fn effect(self) -> Option<&'static str> {
         match self {
             Self::Fixed { .. } => None,

@@ -1,4 +1,4 @@
-//! Blowing empties the plenum.
+//! Pressure drop of the plenum during blowing.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -55,7 +55,7 @@ impl JetPart for Plenum {
         to * self.pressure
     }
 
-    /// Exact for an opening that stays at its mean over the piece.
+    /// Exact for an opening that is constant over the piece.
     fn advance(&mut self, _t: f64, piece: &Piece) -> f64 {
         let PlenumDroop {
             recovery_time,

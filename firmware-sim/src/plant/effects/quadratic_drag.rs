@@ -1,4 +1,4 @@
-//! Fast changes are resisted more than in proportion.
+//! Quadratic resistance against fast changes.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -54,7 +54,7 @@ mod tests {
 
     #[test]
     fn quadratic_drag_slows_fast_changes_by_its_closed_form() {
-        // Speed per sample over the first or the next 50 µs.
+        // Change per sample over the first or the next 50 µs.
         let speed = |flow: &mut _, jet| {
             let before = hold(flow, jet, 0.0);
             20.0 * (hold(flow, jet, 5e-5) - before)

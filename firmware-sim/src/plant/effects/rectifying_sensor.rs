@@ -1,4 +1,4 @@
-//! The sensor cannot tell the direction of the flow.
+//! A sensor that loses the sign.
 
 use rand_chacha::ChaCha8Rng;
 
@@ -6,7 +6,7 @@ use super::{Card, Physics, ShowsWith};
 use crate::plant::base::BasePlant;
 use crate::plant::part::{Part, Place, SensorPart, Surroundings};
 
-/// The film feels the size of the friction.
+/// The film measures the magnitude of the friction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RectifyingSensor;
 
@@ -14,7 +14,7 @@ impl Physics for RectifyingSensor {
     const NAME: &'static str = "rectifying-sensor";
     const PLACE: Place = Place::Sense;
     const PARAMETERS: &'static [Card<Self>] = &[];
-    /// It only folds what goes below zero.
+    /// It only changes negative friction.
     const SHOWS_WITH: ShowsWith = ShowsWith::SignedLevels;
 
     fn draw(_base: &BasePlant, _rng: &mut ChaCha8Rng) -> Self {

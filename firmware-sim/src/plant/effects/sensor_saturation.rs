@@ -1,4 +1,4 @@
-//! The sensor reads no further than its rails.
+//! Saturation of the sensor.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -7,12 +7,12 @@ use super::{Card, Limits, Physics};
 use crate::plant::base::BasePlant;
 use crate::plant::part::{Moment, Part, Place, SensorPart, Surroundings};
 
-/// The reading stays between two rails.
+/// The reading is limited at both ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorSaturation {
-    /// Lower rail (y).
+    /// Lower limit (y).
     pub lower_limit: f64,
-    /// Upper rail (y).
+    /// Upper limit (y).
     pub upper_limit: f64,
 }
 

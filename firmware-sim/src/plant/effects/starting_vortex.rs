@@ -1,4 +1,4 @@
-//! Switching on sheds a vortex that adds to the jet.
+//! A vortex after switching on, added to the jet.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

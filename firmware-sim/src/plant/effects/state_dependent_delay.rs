@@ -1,4 +1,4 @@
-//! The delay follows the flow: h = floor + rise·exp(−rate·ỹ).
+//! State-dependent delay: h = floor + rise·exp(−rate·ỹ).
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -15,7 +15,7 @@ pub struct StateDependentDelay {
     pub delay_floor: f64,
     /// Extra delay of the separated flow (samples).
     pub delay_rise: f64,
-    /// How fast the extra delay vanishes with the mean friction (1/y).
+    /// Rate at which the extra delay decreases with the mean friction (1/y).
     pub delay_rate: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Switching off rolls up a vortex that works against the jet.
+//! A vortex after switching off, opposed to the jet.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;

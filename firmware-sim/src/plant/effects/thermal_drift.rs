@@ -1,4 +1,4 @@
-//! The zero creeps while the film's support warms up.
+//! Sensor drift while the film's support warms up.
 
 use rand_chacha::ChaCha8Rng;
 
@@ -9,9 +9,9 @@ use crate::plant::part::{Moment, Part, Place, SensorPart, Surroundings};
 /// amplitude·(1 − e^(−t/τ)) is added to the reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThermalDrift {
-    /// Where the zero ends up (y).
+    /// Final offset (y).
     pub amplitude: f64,
-    /// Time constant of the creep (s).
+    /// Time constant of the drift (s).
     pub time_constant: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The valve opens and closes exponentially.
+//! First-order valve.
 
 use rand_chacha::ChaCha8Rng;
 
@@ -49,7 +49,7 @@ impl JetPart for Valve {
         self.opening
     }
 
-    /// Exact: where it is going does not change within a piece.
+    /// Exact: the target is constant within a piece.
     fn advance(&mut self, _t: f64, piece: &Piece) -> f64 {
         let target = piece.to;
         let tau = if target > self.opening {

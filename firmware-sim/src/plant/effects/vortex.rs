@@ -1,4 +1,4 @@
-//! What starting and stopping vortices have in common: fed by one kind of edge, decaying, added to the jet.
+//! Common part of starting and stopping vortices: driven by one kind of edge, decaying, added to the jet.
 
 use crate::plant::part::{JetPart, Piece};
 
@@ -6,13 +6,13 @@ use crate::plant::part::{JetPart, Piece};
 pub(super) struct Vortex {
     gain: f64,
     decay_s: f64,
-    /// +1 is fed by a growing jet, −1 by a shrinking one; also the sign of what the flow receives.
+    /// +1 if driven by an increasing jet, −1 by a decreasing one; also the sign of the contribution.
     sign: f64,
     strength: f64,
 }
 
 impl Vortex {
-    /// Fed by a growing jet, adds to it.
+    /// Driven by an increasing jet, adds to it.
     pub(super) fn starting(gain: f64, decay_s: f64) -> Self {
         Self {
             gain,
@@ -22,7 +22,7 @@ impl Vortex {
         }
     }
 
-    /// Fed by a shrinking jet, works against it.
+    /// Driven by a decreasing jet, opposes it.
     pub(super) fn stopping(gain: f64, decay_s: f64) -> Self {
         Self {
             sign: -1.0,
@@ -37,7 +37,7 @@ impl JetPart for Vortex {
         to
     }
 
-    /// ẇ = −w/τ + max(±dj/dt, 0), solved exactly for a straight jet.
+    /// ẇ = −w/τ + max(±dj/dt, 0), exact for a linear jet.
     fn advance(&mut self, _t: f64, piece: &Piece) -> f64 {
         let left = (-piece.dt / self.decay_s).exp();
         let feed = (self.sign * (piece.to - piece.from) / piece.dt).max(0.0);

@@ -1,4 +1,4 @@
-//! A damped oscillation, excited by the arriving jet, is superposed on the friction.
+//! A damped oscillation excited by the arriving jet and added to the friction.
 
 use std::f64::consts::TAU;
 
@@ -9,14 +9,14 @@ use super::{Card, Limits, Physics};
 use crate::plant::base::{BasePlant, log_uniform};
 use crate::plant::part::{FlowPart, Part, Piece, Place, Surroundings};
 
-/// q̈ = ω²·(j − q) − 2ζω·q̇; the film feels s + gain·(q − j).
+/// q̈ = ω²·(j − q) − 2ζω·q̇; the film measures s + gain·(q − j).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VortexShedding {
     /// Undamped natural frequency (Hz).
     pub frequency: f64,
-    /// ζ, below 1 for a ringing flow (-).
+    /// ζ, below 1 for an oscillation (-).
     pub damping_ratio: f64,
-    /// Size of the ringing (y).
+    /// Amplitude of the oscillation (y).
     pub gain: f64,
 }
 
@@ -66,7 +66,7 @@ struct Ringing {
 }
 
 impl FlowPart for Ringing {
-    /// Runge–Kutta of order 4; nothing else acts on it.
+    /// Runge–Kutta of order 4, independent of the flow.
     fn passed(&mut self, jet: &Piece, _s: f64) {
         let (dt, j0, j1) = (jet.dt, jet.from, jet.to);
         let jm = 0.5 * (j0 + j1);

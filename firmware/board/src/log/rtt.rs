@@ -4,10 +4,10 @@
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 const SIZE: u32 = 1024;
-/// The host is not to wait for, nor to make the program wait.
+/// RTT mode: drop what does not fit, and never wait.
 const DROP_WHAT_DOES_NOT_FIT: u32 = 0;
 
-/// What the probe looks for, laid out as it expects it.
+/// The control block that the probe searches for, in its prescribed layout.
 #[repr(C)]
 struct Control {
     id: [u8; 16],
@@ -21,9 +21,9 @@ struct Channel {
     name: &'static [u8; 6],
     buffer: &'static [AtomicU8; SIZE as usize],
     size: u32,
-    /// Moved by the program.
+    /// Advanced by the program.
     write: AtomicU32,
-    /// Moved by the probe.
+    /// Advanced by the probe.
     read: AtomicU32,
     flags: AtomicU32,
 }
@@ -46,7 +46,7 @@ static _SEGGER_RTT: Control = Control {
     },
 };
 
-/// Where the frame that is being written has got to.
+/// Write position within the present frame.
 static CURSOR: AtomicU32 = AtomicU32::new(0);
 static NO_ROOM: AtomicBool = AtomicBool::new(false);
 

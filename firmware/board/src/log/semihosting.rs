@@ -3,7 +3,7 @@
 
 use core::arch::asm;
 
-/// Writes the byte that is pointed to.
+/// Semihosting operation: write the byte at an address.
 const WRITE_BYTE: u32 = 3;
 
 pub(super) fn begin() {}

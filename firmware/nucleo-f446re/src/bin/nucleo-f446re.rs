@@ -15,7 +15,7 @@ use stm32f4xx_hal::pac::{CorePeripherals, Peripherals};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
-/// The watchdog's patience; its own clock may be 50 % off.
+/// Watchdog timeout; its own clock may be wrong by 50 %.
 const PATIENCE_MS: u32 = on_board::PATIENCE_US.div_ceil(1000);
 
 #[entry]
@@ -50,7 +50,7 @@ fn main() -> ! {
     let mut desk = Desk::new(on_board::BOARD);
     let mut sampled = periods();
     loop {
-        // No sample, no food: a converter that stands still ends in a restart.
+        // Without samples the watchdog is not fed: a stopped converter ends in a restart.
         while periods() == sampled {
             uart.work();
         }
@@ -78,7 +78,7 @@ unsafe fn DefaultHandler(_irqn: i16) {
     stopped();
 }
 
-/// Valves shut until the watchdog, if it runs, restarts the board.
+/// Keeps the valves closed until the watchdog, if running, restarts the board.
 fn stopped() -> ! {
     loop {
         valve::emergency();

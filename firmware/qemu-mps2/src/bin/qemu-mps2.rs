@@ -29,20 +29,20 @@ use qemu_mps2::uart::Line;
 use qemu_mps2::watchdog::{Watchdog, restarted};
 use wire::Outbox;
 
-/// SysTick ticks in a sample, at 25 MHz.
+/// SysTick ticks per sample, at 25 MHz.
 const TICKS_PER_SAMPLE: u32 = 25 * on_board::PERIOD_US;
 /// Instructions, at 32 ns each.
 const TWO_AND_A_HALF_PERIODS: u32 = TICKS_PER_SAMPLE / 2 * 5 * 40 / 32;
-/// The watchdog waits twice so many ticks.
+/// Watchdog reload value; the restart follows after twice this time.
 const PATIENCE: u32 = 25 * on_board::PATIENCE_US / 2;
 
-/// What is to be damaged at the next start; RAM survives a restart.
+/// Damage to apply at the next start; RAM survives a restart.
 #[unsafe(link_section = ".uninit.damage")]
 static mut DAMAGE: MaybeUninit<u32> = MaybeUninit::uninit();
 const COEFFICIENT: u32 = 0xDA_0001;
 const TRAJECTORY: u32 = 0xDA_0002;
 
-/// The flow, played by the model, and the sensor's illness.
+/// The flow simulated by the model, and the injected sensor fault.
 struct Played {
     model: model::Identified,
     state: model::IdentifiedState,
@@ -82,7 +82,7 @@ impl Sensor for Played {
     }
 }
 
-/// Counts sample periods.
+/// Counter of sample periods.
 struct Samples(core::cell::Cell<u32>);
 
 impl Clock for &Samples {
@@ -91,7 +91,7 @@ impl Clock for &Samples {
     }
 }
 
-/// A pin that nothing is wired to; QEMU has no valve.
+/// A pin without hardware: QEMU has no valve.
 struct Pin;
 
 impl ErrorType for Pin {
@@ -145,7 +145,7 @@ fn main() -> ! {
         uart.work(&mut outbox, on_board::PERIOD_US);
         while let Some(byte) = uart.receive() {
             match byte {
-                // In frames they mean what they mean there.
+                // Within frames such bytes are data.
                 _ if desk.frames_come() => {
                     desk.receive(byte, rig.controller(), &mut outbox);
                 }
@@ -163,7 +163,7 @@ fn main() -> ! {
     }
 }
 
-/// The self-test, with what was to be damaged.
+/// The self-test with the injected damage.
 fn self_test(model: model::Identified) -> Result<(), start::Failure> {
     // SAFETY: the word is in RAM, any bits are a u32, and nothing runs beside.
     let damage = unsafe { addr_of!(DAMAGE).cast::<u32>().read_volatile() };
@@ -183,7 +183,7 @@ fn self_test(model: model::Identified) -> Result<(), start::Failure> {
     }
 }
 
-/// The model with another constant.
+/// The model with a changed constant.
 struct Damaged<M>(M);
 
 impl<M: Parts<f32>> Parts<f32> for Damaged<M> {
@@ -207,7 +207,7 @@ impl<M: Parts<f32>> Parts<f32> for Damaged<M> {
     }
 }
 
-/// Restarts by command, which is not the watchdog's doing.
+/// A restart by command, which does not count as the watchdog's.
 fn restart(damage: u32) {
     let _ = restarted();
     // SAFETY: as in `self_test`.

@@ -19,10 +19,10 @@ use firmware::{on_board, start};
 use qemu_mps2::uart::{Line, ToRig};
 use wire::Outbox;
 
-/// The rig's reset button.
+/// Flag for the rig's reset button.
 const PRESSED: u8 = 1;
 
-/// What came from the rig.
+/// A sample from the rig.
 #[derive(Clone, Copy, Default)]
 struct Converted {
     counts: u16,
@@ -47,7 +47,7 @@ impl Clock for Converter<'_> {
     }
 }
 
-/// A pin, as the rig is told of it.
+/// A pin whose state is sent to the rig.
 struct Pin<'a>(&'a Cell<bool>);
 
 impl ErrorType for Pin<'_> {
@@ -83,7 +83,8 @@ fn main() -> ! {
     let mut outbox = Outbox::new();
     loop {
         to_rig.send(&[valve.get().into()]);
-        // A real line brings a hundred bytes in a long period: here they come while the board waits for the rig.
+        // A real line would deliver about a hundred bytes in a long period: here they arrive while the board
+        // waits for the rig.
         let [button, low, mixed, high] = core::array::from_fn(|_| {
             to_rig.wait_beside(|| {
                 if let Some(byte) = line.receive() {

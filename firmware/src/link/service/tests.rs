@@ -15,12 +15,12 @@ use wire::samples::{Sample, Samples};
 
 const US: u32 = 11;
 
-/// A board on the table: what it is told, and what came of it.
+/// A board under test, with its inputs and outputs.
 struct Bench {
     controller: Controller<driven!(Relay, full)>,
     desk: Desk,
     outbox: Outbox,
-    /// Bytes the line takes in a sample.
+    /// Bytes that the line transmits per sample.
     line: usize,
     receiver: Receiver,
     number: u16,
@@ -99,7 +99,7 @@ impl Bench {
         );
     }
 
-    /// Samples with a healthy sensor; a host that is there is heard.
+    /// Runs samples with a healthy sensor; `there` sends keep-alive messages.
     fn run(&mut self, samples: usize, there: bool) {
         for _ in 0..samples {
             if there && self.k.is_multiple_of(100) {
@@ -129,7 +129,7 @@ impl Bench {
                 continue;
             };
             self.text.clear();
-            // Text between frames is no frame.
+            // Text between frames is ignored.
             let Ok(content) = content else { continue };
             if let Some(samples) = Samples::read(content) {
                 self.left_out = samples.left_out;
@@ -216,9 +216,9 @@ fn what_is_played_ends_on_every_fault_on_disarm_and_with_the_link() {
         assert_eq!(bench.controller.mode(), mode, "{name}");
         assert!(!bench.controller.is_open(), "{name}");
         bench.run(100, false);
-        // A lost host is told nothing more.
+        // A lost host receives nothing more.
         assert_eq!(bench.last, mode != Mode::Faulted(Fault::Link), "{name}");
-        // A fault is latched: nothing is played until it is taken note of.
+        // A latched fault must be acknowledged before anything is played.
         if let Mode::Faulted(_) = mode {
             bench.play(&COMMAND, 1);
             bench.run(50, true);
@@ -231,8 +231,8 @@ fn what_is_played_ends_on_every_fault_on_disarm_and_with_the_link() {
     }
 }
 
-/// A line that takes too little: the loop goes on, and every sample that is
-/// missing is missing by its number and counted.
+/// With a line that is too slow the loop continues, and every dropped sample is detectable by number and
+/// counted.
 #[test]
 fn what_finds_no_room_is_counted_and_known() {
     let mut bench = Bench::new();
@@ -256,7 +256,7 @@ fn a_request_is_carried_out_once_and_another_host_is_told_to_wait() {
     let number = bench.number;
     bench.run(20, true);
     let first = bench.replies.last().copied().expect("an answer");
-    // The answer was lost: the same request comes again.
+    // The answer was lost: the request is repeated.
     bench.number = number - 1;
     bench.ask(
         US,
@@ -278,7 +278,7 @@ fn a_request_is_carried_out_once_and_another_host_is_told_to_wait() {
         panic!("{answer:?}");
     };
     assert_eq!((info.phase, info.period_us), (Phase::Playing, 1000));
-    // The first host has gone; the second need not wait for ever.
+    // The first host is gone; the second can connect after the timeout.
     bench.run(600, false);
     bench.ask(99, Ask::Arm);
     bench.run(20, false);
@@ -294,18 +294,18 @@ fn the_law_is_shown_with_reference_model_and_residual() {
     assert_eq!(bench.status(), Some((Status::Done, 0)));
     let laws: Vec<_> = bench.samples.iter().filter_map(|(_, s, _)| s.law).collect();
     assert!(laws.len() > 950);
-    // The sensor says 800 to 806 counts, whatever the model expects.
+    // Readings of 800 to 806 counts, independent of the model.
     for ((_, sample, _), law) in bench.samples.iter().rev().zip(laws.iter().rev()) {
         let y = f32::from(sample.counts);
         assert!((y - law.model - law.residual).abs() <= 2.0 / wire::samples::STEPS);
     }
     assert!(laws.iter().any(|law| law.model > 900.0));
-    // The host goes; the law needs none.
+    // The host disconnects; the law does not need it.
     bench.run(1000, false);
     assert_eq!(bench.controller.mode(), Mode::Armed);
 }
 
-/// The operator's lines come back when the host has gone.
+/// The line returns to the operator after the host is gone.
 #[test]
 fn the_line_is_the_operators_again_after_frames() {
     let mut bench = Bench::new();
@@ -326,7 +326,7 @@ fn the_line_is_the_operators_again_after_frames() {
     assert!(bench.text.starts_with(b"disarmed"), "{:?}", bench.text);
 }
 
-/// A host that dies is lost after half a second, or ten samples where those are longer, at any period.
+/// A silent host is lost after half a second, or after ten samples if that is longer, at any period.
 #[test]
 fn a_dead_host_is_lost_after_a_time_and_not_after_samples() {
     for (period_us, samples) in [(200, 2500), (1000, 500), (10_000, 50), (100_000, 10)] {
@@ -341,7 +341,7 @@ fn a_dead_host_is_lost_after_a_time_and_not_after_samples() {
     }
 }
 
-/// What is streamed is on its way after a tenth of a second, however few samples those are.
+/// Every streamed sample is sent within a tenth of a second.
 #[test]
 fn no_sample_of_the_stream_waits_longer_than_a_tenth_of_a_second() {
     for (period_us, waiting) in [
@@ -362,20 +362,20 @@ fn no_sample_of_the_stream_waits_longer_than_a_tenth_of_a_second() {
             bench.run(1, false);
             most = most.max(k - bench.samples.len());
         }
-        // The frame goes out with its last sample.
+        // The frame is sent with its last sample.
         assert_eq!(most, waiting - 1, "{period_us}");
     }
 }
 
-/// Whatever comes over the line, the valve is open only while somebody has armed
-/// or had something played, and the loop goes on.
+/// For any input on the line the valve opens only if the law is armed or a command is played, and the loop
+/// continues.
 #[test]
 fn garbage_opens_no_valve() {
     let mut bench = Bench::new();
     let mut seed = 3_u32;
     for k in 0..60_000_u32 {
         seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        // Every other stretch without zeros, which would be the operator's.
+        // Every second interval without zero bytes, as an operator would type.
         let byte = (seed >> 24) as u8;
         if (k / 1000) % 3 > 0 {
             bench.say(&[if (k / 1000) % 3 == 1 { byte | 1 } else { byte }]);

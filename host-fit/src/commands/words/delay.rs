@@ -88,7 +88,7 @@ fn study_words(report: &DelayReport) -> String {
     text
 }
 
-/// The dead time of all edges with its interval, in both units, and where it comes from.
+/// The dead time of all edges with its interval, in both units, and its method.
 fn dead_time_words(study: &DelayStudy, period: f64) -> String {
     let mut text = String::new();
     let both = |time: DeadTime| {
@@ -131,11 +131,11 @@ fn dead_time_words(study: &DelayStudy, period: f64) -> String {
             )
         }
         (_, DelayMethod::Window) => format!(
-            "from {}; one plant with one dead time does not describe the records",
+            "from {}; one plant with one dead time does not fit the records",
             study.method.words()
         ),
         _ => format!(
-            "from {}; one plant does not describe the records. The interval covers other choices of --reach ({} samples, {} s, here)",
+            "from {}; one plant does not fit the records. The interval covers other choices of --reach ({} samples, {} s, here)",
             study.method.words(),
             study.reach,
             brief(study.reach as f64 * period)
@@ -179,7 +179,7 @@ fn law_words(text: &mut String, study: &DelayStudy) {
             DelayVerdict::EdgeDependent | DelayVerdict::EdgeAndStateDependent => "",
             _ => " The delay is constant.",
         };
-        let _ = writeln!(text, "law (2) is not kept: {reason}.{otherwise}");
+        let _ = writeln!(text, "delay law (2) is rejected: {reason}.{otherwise}");
     }
 }
 
@@ -188,7 +188,8 @@ fn brief(value: f64) -> String {
     host_fit::picture::significant(value, 3)
 }
 
-/// Mean and standard error of some delays, each with its own standard error; never 0: edges share a clock.
+/// Mean and standard error of some delays, each with its own standard error; never 0, because edges share a
+/// clock.
 fn mean_words(delays: &[(f64, f64)]) -> String {
     if delays.is_empty() {
         return "–".into();
@@ -197,7 +198,7 @@ fn mean_words(delays: &[(f64, f64)]) -> String {
     let mean = delays.iter().map(|d| d.0).sum::<f64>() / n;
     let scatter = delays.iter().map(|d| (d.0 - mean).powi(2)).sum::<f64>();
     let scatter = (scatter / (n - 1.0).max(1.0) / n).sqrt();
-    // What the edges share is in every one of their errors.
+    // The common part is contained in every single error.
     let shared = delays.iter().map(|d| d.1).fold(f64::INFINITY, f64::min);
     let error = scatter.max(shared).max(0.1);
     format!("{mean:.1} ± {error:.1} ({})", delays.len())

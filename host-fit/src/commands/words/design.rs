@@ -21,12 +21,12 @@ impl Words for Proof {
     }
 }
 
-/// So many samples as a time, ms, without the digits that a product of decimals adds.
+/// A number of samples as a time, ms, rounded to remove binary representation errors.
 fn milliseconds(samples: f64, period_s: f64) -> f64 {
     (1e6 * samples * period_s).round() / 1e3
 }
 
-/// How long a run of so many samples is, in words: whole minutes, else seconds.
+/// The length of a run in words: whole minutes, else seconds.
 fn duration(samples: usize, period_s: f64) -> String {
     let seconds = 1e-3 * milliseconds(span(samples, period_s) as f64, period_s);
     let minutes = seconds / 60.0;
@@ -62,7 +62,7 @@ fn track_words(design: &TrackDesign, period_s: f64) -> String {
     text
 }
 
-/// The loop's period; the usual one is not said.
+/// The loop's period in words; empty for the usual one.
 fn every(period_s: f64) -> String {
     let period = milliseconds(1.0, period_s);
     if period == 1.0 {
@@ -124,9 +124,10 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
             100.0 * planned.duty,
             planned.steady_value,
             match planned.cycle_s {
-                None => "replanned, the valve comes to rest or the model diverges".to_owned(),
+                None => "with a receding horizon the valve stops switching or the model diverges".to_owned(),
                 Some(cycle_s) => format!(
-                    "replanned, it ends in a cycle of {:.0} ms ({:.0} % of it irregular), which was tried with the others",
+                    "a receding-horizon law ends in a limit cycle of {:.0} ms ({:.0} % of it irregular), \
+                    which was evaluated with the other pulse trains",
                     1000.0 * cycle_s,
                     100.0 * planned.irregular
                 ),
@@ -168,7 +169,7 @@ impl Words for Margin {
     }
 }
 
-/// How likely a case is, in a few letters.
+/// The label of a trial's likelihood.
 fn likelihood(case: &Case) -> String {
     match (case.group, case.p_value) {
         (CaseGroup::Model, _) => "model".to_owned(),
@@ -184,7 +185,7 @@ fn case_table(proof: &Proof) -> String {
         .map(|n| 1e-3 * milliseconds(span(n, period_s) as f64, period_s));
     let mut text = format!(
         "{:<44} {:>7} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>7} {:>6}  attachment",
-        format!("in the loop, from {from} s to {until} s"),
+        format!("closed loop, from {from} s to {until} s"),
         "likely",
         "mean",
         "rms",

@@ -72,7 +72,7 @@ fn ladder_table(ladder: &[Rung]) -> String {
     aligned(&head, &ladder_rows(ladder), 1)
 }
 
-/// `name value unit (low … high)`, or that the records do not identify it: its interval spans its whole range, or a
+/// `name value unit (low … high)`, or that it is not identifiable: its interval spans its whole range, or a
 /// factor of more than a hundred.
 fn estimate_words(effect: &str, name: &str, p: &ParameterEstimate) -> String {
     const FACTOR: f64 = 100.0;
@@ -102,7 +102,7 @@ fn percent(value: f64) -> String {
     format!("{sign}{:.1} %", rounded.abs())
 }
 
-/// What became of a candidate, with the reason.
+/// The outcome of a candidate, with the reason.
 fn outcome(r: &Ranked, diagnosis: &Diagnosis) -> String {
     if diagnosis.missing.contains(&r.effect) {
         return "named".to_owned();
@@ -129,10 +129,11 @@ fn outcome(r: &Ranked, diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// The candidates, the named ones first: effect, outcome, fall of the error, what chance alone reaches, p, parameters.
+/// The candidates, the named ones first: effect, outcome, error reduction, 5 % level of noise alone, p,
+/// parameters.
 pub(crate) fn ranking_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     let row = |r: &Ranked| {
-        // Parameters of a candidate that does nothing say nothing.
+        // Parameters of a candidate without a gain are meaningless.
         let telling = r.significant || diagnosis.missing.contains(&r.effect);
         let parameters: Vec<String> = r
             .parameters
@@ -156,7 +157,7 @@ pub(crate) fn ranking_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     named_first(diagnosis).into_iter().map(row).collect()
 }
 
-/// The ranking with the named effects first, then the surrogates, then the rest, each in their order.
+/// The ranking with the named effects first, then the surrogates, then the others, each in their order.
 pub(crate) fn named_first(diagnosis: &Diagnosis) -> Vec<&Ranked> {
     let mut all: Vec<&Ranked> = diagnosis.ranking.iter().collect();
     all.sort_by_key(|r| {
@@ -183,7 +184,7 @@ fn ranking_table(diagnosis: &Diagnosis) -> String {
     aligned_last_left(&head, &ranking_rows(diagnosis))
 }
 
-/// As [`aligned`], with words in the last column.
+/// As [`aligned`], with the last column left-aligned.
 fn aligned_last_left(head: &[&str], rows: &[Vec<String>]) -> String {
     let cut = head.len().saturating_sub(1);
     let numbers: Vec<Vec<String>> = rows

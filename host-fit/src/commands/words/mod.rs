@@ -23,13 +23,13 @@ use host_fit::steps::{
 
 use model_core::effect::Unit;
 
-/// A result that can be told.
+/// A result with a text form.
 pub(crate) trait Words {
-    /// It in lines of text.
+    /// The result as lines of text.
     fn words(&self) -> String;
 }
 
-/// Pieces of text one below the other.
+/// Joins non-empty texts by line ends.
 fn lines(pieces: impl IntoIterator<Item = String>) -> String {
     pieces.into_iter().collect::<Vec<_>>().join("\n")
 }
@@ -103,7 +103,7 @@ impl Words for AverageSummary {
         }
         if self.left_over_samples > 0 {
             text.push_str(&format!(
-                "\n  {} samples at the end are no whole period",
+                "\n  {} samples at the end are not a whole period",
                 self.left_over_samples
             ));
         }
@@ -138,7 +138,7 @@ impl Words for Identification {
     }
 }
 
-/// The baselines, and which samples were scored.
+/// The baselines, and the samples that were scored.
 fn beside_words(beside: &Beside) -> Vec<String> {
     let mut told = beside.words.clone();
     if beside.scored_samples < beside.samples {
@@ -255,7 +255,7 @@ fn parameter_table(parameters: &BTreeMap<String, ParameterEstimate>) -> String {
     aligned(&["parameter", "unit", "value", "95 % interval"], &rows, 2)
 }
 
-/// RMSE before → after → noise level, record by record and together.
+/// RMSE before → after → noise level, per record and in total.
 fn changes(before: Option<&Scores>, after: &Scores) -> String {
     let row = |name: &str, before: Option<&Indicators>, after: &Indicators| {
         vec![
@@ -333,7 +333,7 @@ impl Words for BoardConstants {
     }
 }
 
-/// The effects in a few words each.
+/// The effects with their summaries.
 pub(crate) fn effect_table(effects: &[EffectEntry]) -> String {
     let row = |e: &EffectEntry| [e.name, e.place, e.summary].map(str::to_owned).to_vec();
     let rows: Vec<Vec<String>> = effects.iter().map(row).collect();
@@ -410,7 +410,7 @@ pub(crate) fn role_name(role: Use) -> &'static str {
     }
 }
 
-/// The model in a few words: its structure, delays and effects.
+/// The model in short: structure, delays and effects.
 pub(crate) fn describe(model: &Model) -> String {
     let delay = match &model.delay {
         Delay::Fixed { delays } => format!("fixed delay {delays:?} samples"),
@@ -457,7 +457,7 @@ const HEAD: [&str; 8] = [
 ];
 
 fn row(i: &Indicators) -> [String; 8] {
-    // A free run that diverged has no numbers.
+    // A diverged free run has no indicators.
     let number = |value: f64, digits: usize| {
         if value.is_finite() {
             format!("{value:.digits$}")
@@ -479,7 +479,7 @@ fn row(i: &Indicators) -> [String; 8] {
     ]
 }
 
-/// The indicators, record by record and together.
+/// The indicators, per record and in total.
 pub(crate) fn score_rows(scores: &Scores) -> Vec<[String; 8]> {
     let mut all: Vec<[String; 8]> = scores.records.iter().map(row).collect();
     for together in [&scores.identify, &scores.validate].into_iter().flatten() {

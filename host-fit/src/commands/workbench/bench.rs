@@ -1,4 +1,4 @@
-//! What the page sees of the project, and how models get into it.
+//! The state of the project as the page shows it, and the ways in which models enter it.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use super::request::Line;
 use crate::commands::words::{describe, score_rows};
 use crate::commands::{page, paragraph};
 
-/// A project, the data set, and the models that are made of it.
+/// A project with its data set and models.
 pub(super) struct ModelBench {
     pub(super) folder: PathBuf,
     pub(super) project: Mutex<Project>,
@@ -26,37 +26,37 @@ pub(super) struct ModelBench {
     data: Mutex<Option<Arc<Data>>>,
     /// Free runs and failures by model.
     compared: Mutex<HashMap<u32, Arc<Compared>>>,
-    /// The free run of what a search has found so far: after so many evaluations, per record.
+    /// The free run of the best model of a running search: number of evaluations, and y per record.
     best: Mutex<Option<(usize, Vec<Vec<f64>>)>>,
 }
 
-/// A model with its free runs, or with what is said where they diverge.
+/// A model with its free runs, or with the error message if they diverge.
 pub(super) struct Compared {
     pub(super) model: Model,
     pub(super) run: Result<Comparison, String>,
 }
 
-/// A step with the model that it made.
+/// A step with its resulting model.
 pub(super) struct Made<'a> {
     pub(super) model: &'a Model,
     /// The model that it was made from.
     pub(super) from: Option<u32>,
-    /// In a few words.
+    /// The step in a few words.
     pub(super) step: String,
-    /// As a command.
+    /// The step as a command.
     pub(super) command: String,
 }
 
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // A panic in between leaves whole values: each is replaced at once.
+    // A panic cannot leave partial values: each is replaced in one assignment.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What the page makes of the project: the script fills the places in.
+/// The body of the page; the script fills it.
 const BODY: &str = include_str!("page.html");
 
 impl ModelBench {
-    /// Opens the project in `folder` on a data set; without one, on the one that was imported into the project, if any.
+    /// Opens the project in `folder` with a data set, or with the one imported into the project, if any.
     pub(super) fn open(dataset: Option<&Path>, folder: &Path) -> anyhow::Result<Self> {
         let imported = beneath(folder, Path::new(super::IMPORTED))?;
         let path = match dataset {
@@ -76,7 +76,7 @@ impl ModelBench {
         })
     }
 
-    /// Takes a model that the user has into the project, unless it is there already.
+    /// Takes a model that the user has into the project, unless it exists already.
     pub(super) fn bring(&self, path: &Path) -> anyhow::Result<()> {
         let model = Model::load(path)?;
         let known = {
@@ -109,9 +109,9 @@ impl ModelBench {
         lock(&self.data).clone().ok_or_else(none)
     }
 
-    /// Takes an imported data set onto the bench.
+    /// Makes an imported data set the project's.
     pub(super) fn take(&self, found: &ImportedSet, command: &str) -> Result<(), Refusal> {
-        // Models of another data set are in the way; that is to be known before anything is written.
+        // Fails if there are models of another data set; checked before anything is written.
         lock(&self.project).set_data(&found.hash)?;
         let folder = beneath(&self.folder, Path::new(super::IMPORTED))?;
         found.imported.save(&folder)?;
@@ -120,7 +120,7 @@ impl ModelBench {
         Ok(lock(&self.project).note(command)?)
     }
 
-    /// Writes a model into the project and makes it the current one. Its number.
+    /// Writes a model into the project and makes it the current one; returns its number.
     pub(super) fn keep(&self, made: &Made<'_>) -> Result<u32, Refusal> {
         let run = steps::compare(made.model, &self.data()?.set);
         let held_out = run.as_ref().ok().and_then(|run| run.scores.held_out());
@@ -148,21 +148,21 @@ impl ModelBench {
         Ok(id)
     }
 
-    /// Lets the page see what a search has found so far.
+    /// Stores the best model of a running search for the page.
     pub(super) fn show_best(&self, model: &Model, evaluations: usize) {
         let Ok(data) = self.data() else { return };
-        // Models on the way may well diverge.
+        // Intermediate models may diverge.
         if let Ok((_, runs)) = score(model, &model.targets(&data.set.records)) {
             *lock(&self.best) = Some((evaluations, runs));
         }
     }
 
-    /// Another search begins.
+    /// Clears it for the next search.
     pub(super) fn forget_best(&self) {
         *lock(&self.best) = None;
     }
 
-    /// The free run of what a search has found so far, if it is another than that after so many evaluations.
+    /// The free run of the best model so far, if it is newer than `seen`.
     fn best_since(&self, seen: &str) -> Value {
         match lock(&self.best).as_ref() {
             Some((evaluations, runs)) if evaluations.to_string() != seen => json!({
@@ -173,7 +173,7 @@ impl ModelBench {
         }
     }
 
-    /// Where a model's file lies.
+    /// Path of a model's file.
     pub(super) fn path(&self, id: u32) -> Result<PathBuf, Refusal> {
         let project = lock(&self.project);
         Ok(project.path(project.node(id)?)?)
@@ -191,13 +191,13 @@ impl ModelBench {
         Ok(found)
     }
 
-    /// A file beside a model: what came of a step on it.
+    /// Path of a result file of a step on a model.
     pub(super) fn beside(&self, what: &str, id: u32, ending: &str) -> Result<PathBuf, Refusal> {
         let name = format!("{what}-{id}.{ending}");
         Ok(beneath(&self.folder, Path::new(&name))?)
     }
 
-    /// What was kept of a step on a model; none where it was not done.
+    /// Stored result of a step on a model; none if the step was not done.
     fn kept(&self, what: &str, id: Option<u32>) -> Value {
         let read = id.and_then(|id| std::fs::read(self.beside(what, id, "json").ok()?).ok());
         let read = read.and_then(|text| serde_json::from_slice(&text).ok());
@@ -303,7 +303,7 @@ impl Bench for ModelBench {
             .iter()
             .filter_map(|(name, c)| Some((name.as_str(), c.run.as_ref().ok()?.runs.as_slice())))
             .collect();
-        // The last one is worked on: its bars are on the page.
+        // The last model is the current one: its bars are shown.
         let Some((_, last)) = compared.last() else {
             return Ok(page::living(&data.set.records, &[], None).json());
         };

@@ -1,4 +1,4 @@
-//! The data set on the bench, and the files that one is made of.
+//! The data set of the project, and the uploaded files from which it is imported.
 
 use std::path::{Path, PathBuf};
 
@@ -11,9 +11,9 @@ use workbench::{Refusal, beneath};
 
 use crate::commands::words::role_name;
 
-/// A data set, and what its commands can tell at all.
+/// A data set with its excitation check.
 pub(super) struct Data {
-    /// As the user named it, for commands.
+    /// The path as the user gave it, for commands.
     pub(super) path: PathBuf,
     pub(super) set: DataSet,
     remarks: Vec<String>,
@@ -48,7 +48,7 @@ impl Data {
 /// The files that were uploaded into a project.
 pub(super) struct Uploads(PathBuf);
 
-/// Their folder in the project.
+/// Name of their folder in the project.
 const UPLOADS: &str = "uploads";
 
 impl Uploads {
@@ -66,7 +66,7 @@ impl Uploads {
         super::names_in(&self.0, "")
     }
 
-    /// Where a file lies that was uploaded.
+    /// Path of an uploaded file.
     pub(super) fn path(&self, name: &str) -> Result<PathBuf, Refusal> {
         match self.names().iter().any(|known| known == name) {
             true => Ok(self.0.join(name)),
@@ -76,7 +76,8 @@ impl Uploads {
         }
     }
 
-    /// Keeps a file and tells what is in it; one that cannot be read is not kept, and leaves the one of its name alone.
+    /// Stores an upload and returns its contents. An unreadable file is not stored and leaves an existing one
+    /// unchanged.
     pub(super) fn keep(&self, name: &str, bytes: &[u8]) -> Result<Value, Refusal> {
         let plain = |c: char| c.is_alphanumeric() || "-_. +()".contains(c);
         if name.is_empty() || name.len() > 120 || name.starts_with('.') || !name.chars().all(plain)
@@ -97,7 +98,7 @@ impl Uploads {
     }
 }
 
-/// What is in a file.
+/// Description of a file's contents.
 fn told(name: &str, source: &Source) -> Value {
     let variables = source.variables.iter();
     let told =

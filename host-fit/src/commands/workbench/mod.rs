@@ -1,4 +1,4 @@
-//! `host-fit workbench`: the whole way on a local page.
+//! `host-fit workbench`: the complete workflow on a local page.
 
 mod bench;
 mod data;
@@ -12,13 +12,13 @@ use std::process::{Command, Stdio};
 use super::{Console, threads};
 use bench::ModelBench;
 
-/// Serve a page on this machine: import recordings, see them, identify, compare, diagnose, extend, design a law.
+/// Serve a local page: import recordings, view them, identify, compare, diagnose, extend, design a law.
 ///
-/// The page is served on 127.0.0.1 alone, to whoever has the address that is printed. Whatever is done there is kept in
-/// the project folder: models that every other command reads, the tree of how they came about, the log of commands.
+/// The page is served on 127.0.0.1 only, to clients that have the printed address. All results are kept in
+/// the project folder: models that every other command reads, the tree of their origins, the log of commands.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// Folder with dataset.toml, or one CSV file; without it, files are imported on the page, or were before.
+    /// Folder with dataset.toml, or one CSV file; without it, files are imported on the page.
     #[arg(value_name = "DATASET")]
     dataset: Option<PathBuf>,
     /// A model to start from.
@@ -57,7 +57,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
                 project.display()
             )),
         };
-        // A reader that has gone away is no reason not to serve.
+        // A closed pipe does not stop the server.
         drop(told);
         if !args.no_open {
             open(address);
@@ -77,11 +77,11 @@ fn named_by(dataset: &Path) -> anyhow::Result<PathBuf> {
     Ok(PathBuf::from(format!("{name}.workbench")))
 }
 
-/// The data set within a project that was imported into it.
+/// Folder of an imported data set within a project.
 const IMPORTED: &str = "data";
 
-/// The files of a folder whose names end so, sorted; none where there is no folder. Links are none: they may lead
-/// out of the project.
+/// Names of the files with this ending in a folder, sorted; empty without the folder. Symbolic links are
+/// ignored, because they may lead out of the project.
 fn names_in(folder: &Path, ending: &str) -> Vec<String> {
     let is_link = std::fs::symlink_metadata(folder).is_ok_and(|found| found.is_symlink());
     let entries = (!is_link).then(|| std::fs::read_dir(folder));
@@ -93,7 +93,7 @@ fn names_in(folder: &Path, ending: &str) -> Vec<String> {
     names
 }
 
-/// Opens the browser where the system knows how; the address is printed anyway.
+/// Opens the browser if the system provides a command for it; the address is printed in any case.
 fn open(address: &str) {
     let (program, arguments): (&str, &[&str]) = match std::env::consts::OS {
         "macos" => ("open", &[]),
@@ -107,6 +107,6 @@ fn open(address: &str) {
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn();
-    // Not there: the user opens it.
+    // Without a browser the user opens the address.
     drop(quiet);
 }

@@ -1,4 +1,4 @@
-//! The user's own effects: files in the project folder, and what is wrong with a text that is to be one.
+//! The user's own effects: files in the project folder, with a check of their text.
 
 use std::path::{Path, PathBuf};
 
@@ -38,7 +38,7 @@ impl OwnEffects {
         self.files().into_iter().filter_map(read).collect()
     }
 
-    /// What a text is: the effect's name, or what is wrong with it and where.
+    /// The effect's name, or the error in the text with its position.
     pub(super) fn check(text: &str) -> Value {
         match Definition::check(text, "the effect") {
             Ok(source) => json!({"name": source.name, "summary": source.summary}),
@@ -49,7 +49,7 @@ impl OwnEffects {
         }
     }
 
-    /// Keeps a text as the file of its effect.
+    /// Stores a text as the file of its effect.
     pub(super) fn keep(&self, text: &str) -> Result<Value, Refusal> {
         let name = Definition::check(text, "the effect")?.name;
         let project = self.0.parent().unwrap_or(&self.0);
@@ -59,7 +59,7 @@ impl OwnEffects {
         Ok(json!({"name": name}))
     }
 
-    /// Takes the file of an effect away. Models that have the effect keep it.
+    /// Deletes the file of an effect. Models that contain the effect keep it.
     pub(super) fn forget(&self, name: &str) -> Result<Value, Refusal> {
         let known = super::names_in(&self.0, ".toml");
         if !known.contains(&format!("{name}.toml")) {

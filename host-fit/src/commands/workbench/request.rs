@@ -1,7 +1,8 @@
-//! What the page may ask for as work: a command of the program with its options.
+//! Requests of the page: a command of the program with its options.
 //!
-//! A request is read by the parser of the command line, so the page has the same options with the same limits and the same
-//! messages, and what it shows as a command is what was run. The files are the bench's to name: no option that names one is let in.
+//! A request is parsed by the command line's parser, so that options, limits and messages are the same and
+//! the command shown is the one that runs. File names are chosen by the server: options that name files are
+//! rejected.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -36,7 +37,7 @@ impl Command {
         }
     }
 
-    /// Its options that name no file.
+    /// Its options without those that name files.
     fn options(self) -> &'static [&'static str] {
         match self {
             Self::Identify => &[
@@ -176,7 +177,7 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// `files` come first and are no options, whatever they look like.
+    /// `files` come first and are never taken for options.
     pub(super) fn new(command: Command, files: &[PathBuf], rest: Vec<String>) -> Self {
         let file = |path: &PathBuf| match path.to_string_lossy() {
             text if text.starts_with('-') => format!("./{text}"),
@@ -199,14 +200,14 @@ impl Line {
         format!("host-fit compare {} --report=report.html", words.join(" "))
     }
 
-    /// As the user could write it.
+    /// The line as a user would type it.
     pub(super) fn text(&self) -> String {
         let words = self.words.iter().map(|word| quoted(word));
         let all = ["host-fit".to_owned(), self.command.name().to_owned()];
         all.into_iter().chain(words).collect::<Vec<_>>().join(" ")
     }
 
-    /// What the command line's parser makes of it.
+    /// The line parsed as arguments `A`.
     pub(super) fn parse<A: clap::Args>(&self) -> Result<A, Refusal> {
         let parser = clap::Command::new(self.command.name())
             .no_binary_name(true)
@@ -287,7 +288,7 @@ mod tests {
         ] {
             assert!(Request::read(&wrong).is_err(), "{wrong}");
         }
-        // A value stays one, whatever it looks like.
+        // A value that looks like an option remains a value.
         let asked = json!({"command": "identify", "options": {"effect": ["--output=/etc/passwd"]}});
         let asked = line(asked).unwrap();
         assert!(

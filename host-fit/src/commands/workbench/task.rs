@@ -1,4 +1,4 @@
-//! A piece of work: what was asked for, as the command that it is, and what it leaves in the project.
+//! A task: a request with its command and its results in the project.
 
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -19,10 +19,10 @@ use crate::commands::paragraph;
 use crate::commands::words::{Words, ranking_rows};
 use crate::commands::{design, diagnose, discover, drawings, extend, identify, import, page};
 
-/// A piece of work that can be begun.
+/// A task that can be started.
 pub(super) struct Task {
     pub(super) line: Line,
-    /// The model that it starts from; 0 where it starts from none.
+    /// The model that it starts from; 0 for none.
     from: u32,
     asked: Asked,
 }
@@ -36,19 +36,19 @@ enum Asked {
     Import(Box<import::Args>),
 }
 
-/// The page, listening to a step.
+/// Reports progress to the page.
 struct Page<'a> {
     work: &'a Work,
     bench: &'a ModelBench,
     glimpse: Mutex<Glimpse>,
 }
 
-/// When the model that is best so far is looked at: it costs the search time.
+/// Schedule for showing the best model so far, because building it takes time from the search.
 struct Glimpse {
-    /// Not before this.
+    /// Earliest next time.
     due: Instant,
     evaluations: usize,
-    /// The best value there is, and the one whose model was looked at.
+    /// The best value so far, and the value of the model shown last.
     best: f64,
     seen: f64,
 }
@@ -59,7 +59,7 @@ impl<'a> Page<'a> {
             work,
             bench,
             glimpse: Mutex::new(Glimpse {
-                // The first guesses are none worth looking at.
+                // The first models of a search are not worth showing.
                 due: Instant::now() + Duration::from_millis(300),
                 evaluations: 0,
                 best: f64::INFINITY,
@@ -82,7 +82,7 @@ impl Onlooker for Page<'_> {
         (glimpse.evaluations, glimpse.best) = (snapshot.evaluations, snapshot.best);
     }
     fn finds(&self, best: &dyn Fn() -> Option<Model>) {
-        /// Share of the search's time that looking may take: one part in so many.
+        /// Largest share of the search's time for showing models, as one part in so many.
         const SHARE: u32 = 50;
         let mut glimpse = lock(&self.glimpse);
         let started = Instant::now();
@@ -109,7 +109,7 @@ fn told(error: anyhow::Error) -> Refusal {
 }
 
 impl ModelBench {
-    /// Reads a request: whether it can be begun, and as which command.
+    /// Checks a request and returns its task.
     pub(super) fn prepare(&self, request: &Value) -> Result<Task, Refusal> {
         let request = Request::read(request).map_err(Refusal)?;
         let command = request.command;
@@ -146,7 +146,7 @@ impl ModelBench {
                 (line, Asked::Identify(asked))
             }
             Command::Diagnose => {
-                // What the model has is not tried again.
+                // Effects of the model are not tried again.
                 let model = Model::load(&self.path(from)?)?;
                 let line = self.offer(line, |name| {
                     model.effect_names().iter().all(|own| own != name)
@@ -187,7 +187,7 @@ impl ModelBench {
     }
 }
 
-/// The CSV of the loop, beside the model that has the law.
+/// Path of the closed loop's CSV, beside the model with the law.
 fn loop_of(model: &Path) -> PathBuf {
     let stem = model.file_stem().unwrap_or_default().to_string_lossy();
     model.with_file_name(format!("{}.csv", stem.replace("model", "loop")))
@@ -198,7 +198,7 @@ fn write(path: &Path, text: &str) -> Result<(), Refusal> {
 }
 
 impl Task {
-    /// Does it.
+    /// Runs the task.
     pub(super) fn run(&self, bench: &ModelBench, work: &Work) -> Result<(), Refusal> {
         let page = Page::new(bench, work);
         bench.forget_best();
@@ -274,7 +274,7 @@ impl Task {
         Ok(bench.compared(self.from)?.model.clone())
     }
 
-    /// Keeps the model that was made.
+    /// Stores the resulting model.
     fn made(
         &self,
         bench: &ModelBench,

@@ -1,24 +1,24 @@
-//! What is tried: published flows and effects in turn, from a seed.
+//! The cases: published flows and effects in turn, from a seed.
 
 use std::fmt;
 
 use firmware_sim::literature::{Hidden, LiteraturePlan, PUBLISHED, UnknownName};
 
-/// A published flow, what is hidden on its rig, and its seed.
+/// A published flow with its hidden effect and seed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
     /// Name of the published model.
     pub model: &'static str,
-    /// Effect that is hidden; none: the null case.
+    /// The hidden effect; none for the null case.
     pub hidden: Option<&'static str>,
-    /// Converter, dead time and zero of a real rig, or white noise alone.
+    /// Whether there are realistic instruments (converter, dead time, changing offset), or white noise only.
     pub real_instruments: bool,
     /// Seed of the rig.
     pub seed: u64,
 }
 
 impl Case {
-    /// Name of what is hidden, or `nothing`.
+    /// Name of the hidden effect, or `nothing`.
     #[must_use]
     pub fn label(&self) -> &'static str {
         self.hidden.unwrap_or("nothing")
@@ -47,12 +47,12 @@ impl fmt::Display for Case {
     }
 }
 
-/// The first `count` cases of a campaign. Models take turns, a third of the cases hide nothing, and effects take
-/// turns over the others, so that the first cases are a sample of all.
+/// The first `count` cases of a campaign. Models alternate, a third of the cases hides nothing, and effects
+/// alternate over the others, so that any first part is a sample of all.
 #[must_use]
 pub fn cases(count: usize, real_instruments: bool, seed: u64) -> Vec<Case> {
     let effects = Hidden::names();
-    // Where the turn of the effects begins is the seed's.
+    // The seed selects the first effect.
     let mut next = seed as usize % effects.len();
     let one = |index: usize| {
         let (turn, model) = (index / PUBLISHED.len(), index % PUBLISHED.len());

@@ -1,5 +1,5 @@
-//! The campaign on published flows: what the diagnosis says of flows that nobody here made up, with an effect
-//! hidden in front of them or behind them, or with nothing hidden.
+//! The campaign on flows from the literature: the diagnosis of published flows with one hidden effect or
+//! none.
 
 mod case;
 mod row;

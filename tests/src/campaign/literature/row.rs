@@ -1,4 +1,4 @@
-//! What came of a case, and how it counts.
+//! The result of a case, and how it is counted.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -7,36 +7,36 @@ use super::case::Case;
 use crate::campaign::ledger::Entry;
 use crate::campaign::program::Spent;
 
-/// What came of a case.
+/// The result of a case.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// The case.
+    /// Key of the case.
     pub key: String,
     /// The published model.
     pub model: String,
-    /// What is hidden; empty for a null.
+    /// The hidden effect; empty for a null case.
     pub hidden: Vec<String>,
     /// Effects that are part of the published physics.
     pub also_right: Vec<String>,
-    /// The verdict; `failed` where there is none.
+    /// The verdict; `failed` without one.
     pub verdict: String,
     /// Why there is no verdict.
     pub failure: Option<String>,
     /// Names that are claimed.
     pub missing: Vec<String>,
-    /// Names that are certified beside something unexplained.
+    /// Certified names in an unexplained verdict.
     pub certified: Vec<String>,
-    /// Of each of `missing`, what the records cannot tell from it.
+    /// Equivalence set of each of `missing`.
     pub sets: Vec<Vec<String>>,
-    /// Names that describe and are not claimed.
+    /// Names of surrogates.
     pub surrogates: Vec<String>,
-    /// Error of the given model over the noise.
+    /// Error of the given model over the noise level.
     pub given_over_noise: Option<f64>,
-    /// Error of the best model over the noise.
+    /// Error of the best model over the noise level.
     pub over_noise: Option<f64>,
-    /// Of `identify`.
+    /// Duration of `identify`.
     pub identify: Spent,
-    /// Of `diagnose`.
+    /// Duration of `diagnose`.
     pub diagnose: Spent,
 }
 
@@ -47,7 +47,7 @@ impl Entry for Row {
 }
 
 impl Row {
-    /// Of a case that nobody has looked at.
+    /// An empty result for a case.
     #[must_use]
     pub fn of(case: &Case) -> Self {
         Self {
@@ -59,7 +59,7 @@ impl Row {
         }
     }
 
-    /// What `diagnose --json` says.
+    /// Reads a document of `diagnose --json`.
     ///
     /// # Errors
     /// A document without a verdict.
@@ -109,7 +109,8 @@ impl Row {
             && self.surrogates.first() == self.hidden.first()
     }
 
-    /// Whether a name is claimed that is neither hidden nor part of the published physics, nor is either in its set.
+    /// Whether a claimed name is neither hidden nor part of the published physics, and its set contains no
+    /// such name.
     #[must_use]
     pub fn has_wrong_name(&self) -> bool {
         let right = |name: &String| self.hidden.contains(name) || self.also_right.contains(name);
@@ -132,7 +133,7 @@ impl Row {
         Some((1.0 - excess(self.over_noise?) / before).max(0.0))
     }
 
-    /// What is said, in a few words.
+    /// The verdict in short.
     #[must_use]
     pub fn said(&self) -> String {
         if let Some(failure) = &self.failure {

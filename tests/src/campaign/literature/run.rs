@@ -7,7 +7,7 @@ use super::case::Case;
 use super::row::Row;
 use crate::campaign::program::Program;
 
-/// Runs a case. What goes wrong is a row too.
+/// Runs a case. A failure gives a result too.
 #[must_use]
 pub fn run(case: &Case, program: &Program) -> Row {
     let mut row = Row::of(case);
@@ -28,7 +28,7 @@ fn fill(row: &mut Row, case: &Case, program: &Program, folder: &Path) -> Result<
     row.also_right = also_right.map(|name| (*name).to_owned()).collect();
     let inside = |name: &str| folder.join(name).to_string_lossy().into_owned();
     let [data, given, found] = ["set", "given.toml", "found.toml"].map(&inside);
-    // Of an earlier run.
+    // Left over from an earlier run.
     let _ = fs::remove_dir_all(&data);
     let _ = fs::remove_file(&found);
     fs::create_dir_all(folder).map_err(|e| e.to_string())?;

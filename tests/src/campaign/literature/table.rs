@@ -6,10 +6,10 @@ use std::fmt::Write as _;
 use super::row::Row;
 use crate::campaign::counts::{bounded, share};
 
-/// An error over the noise up to which a model is at the noise level.
+/// A model counts as at the noise level up to this ratio.
 const AT_THE_NOISE: f64 = 1.05;
 
-/// Everything that was counted, by published model.
+/// The results by published model.
 #[must_use]
 pub fn table(rows: &[Row]) -> String {
     let mut models: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();

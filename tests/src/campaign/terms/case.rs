@@ -1,4 +1,4 @@
-//! What is tried: the cases of a campaign, from a seed.
+//! The cases of a campaign, drawn from a seed.
 
 use firmware_sim::family::{Family, NoiseKind};
 use firmware_sim::plant::Beyond;
@@ -9,24 +9,24 @@ use rand_chacha::ChaCha8Rng;
 use super::spot::Truth;
 use crate::campaign::case::{Case, Group, Seeds, nothing};
 
-/// How many of each group.
+/// Number of cases per group.
 #[derive(Clone, Copy, Debug)]
 pub struct Sizes {
     /// Rigs for each physics and family.
     pub draws: u64,
-    /// Rigs for each effect that is taken out of the catalogue; the families take turns.
+    /// Rigs for each effect that is removed from the catalogue, cycling through the families.
     pub without: u64,
     /// Rigs with nothing missing, over all families, noises and nuisances.
     pub nulls: u64,
 }
 
-/// A place, and the coordinates that are right there.
+/// A place with its correct coordinates.
 type Curve = (&'static str, &'static [&'static str]);
-/// An effect, and the curves that it is.
+/// An effect with the equivalent curves.
 type Known = (&'static str, &'static [Curve]);
 
-/// Effects of the catalogue that are a curve over one coordinate, and what a search that has never heard of
-/// them should say. Lags, echoes, friction and hysteresis are none.
+/// Effects of the catalogue that equal a curve over one coordinate, with the correct findings. Lags, echoes,
+/// friction and hysteresis are not of this kind.
 const CURVES: &[Known] = &[
     ("state-dependent-delay", &[("delay", &["mean y (0.25 s)"])]),
     (
@@ -34,12 +34,12 @@ const CURVES: &[Known] = &[
         &[("jet", &["memory of u", "blowing in the last"])],
     ),
     ("free-stream-variation", &[("jet", &["u_inf"])]),
-    // It adds to the jet while that is there: both are the same time.
+    // It acts during the jet only, where both coordinates are equal.
     (
         "starting-vortex",
         &[("jet", &["since rising edge", "pulse length"])],
     ),
-    // There is no jet to be changed when it acts: the flow feels it.
+    // It acts after the jet has ended: the place is the flow.
     ("stopping-vortex", &[("flow", &["since falling edge"])]),
     ("amplitude-saturation", &[("flow", &["y"])]),
     ("hot-film-nonlinearity", &[("sensor", &["reading", "y"])]),
@@ -47,7 +47,7 @@ const CURVES: &[Known] = &[
     ("thermal-drift", &[("sensor", &["time in record"])]),
 ];
 
-/// What would be right for an effect that was taken out of the catalogue.
+/// The correct findings for an effect removed from the catalogue.
 pub(super) fn of_the_catalogue(name: &str) -> Vec<Truth> {
     let own = CURVES.iter().find(|(effect, _)| *effect == name);
     let spots = own.map_or(&[][..], |(_, spots)| spots);

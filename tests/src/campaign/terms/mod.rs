@@ -1,5 +1,5 @@
-//! The hidden-terms campaign: what the search for unknown terms finds in rigs with physics that the catalogue
-//! lacks, with effects that were taken out of it, and in rigs with nothing missing.
+//! The campaign of the search for unknown terms: rigs with physics outside the catalogue, with effects
+//! removed from it, and without a missing effect.
 
 mod case;
 mod region;

@@ -1,4 +1,4 @@
-//! Whether a curve shows where physics breaks that is as modelled everywhere else.
+//! Whether a curve shows the region in which the physics deviates.
 
 use firmware_sim::recording::Recorded;
 use host_fit::data::Record;
@@ -42,7 +42,7 @@ pub(super) fn f1(set: &Recorded, coordinate: &str, above: f64, curve: &[(f64, f6
     2.0 * both as f64 / (told + true_).max(1) as f64
 }
 
-/// A rest that began before the record is this long (s).
+/// Assumed rest before the record (s).
 const LONG_AGO_S: f64 = 10.0;
 
 /// Length of the rest before the last pulse (s), from the first pulse on.
@@ -62,7 +62,7 @@ fn rests(record: &Record) -> Vec<f64> {
     all
 }
 
-/// The curve's value, straight between its points and level beyond them.
+/// The curve's value, linear between its points and constant outside.
 fn at(curve: &[(f64, f64)], x: f64) -> f64 {
     let after = curve.partition_point(|(own, _)| *own <= x);
     match (after.checked_sub(1).map(|i| curve[i]), curve.get(after)) {
@@ -92,7 +92,7 @@ mod tests {
     fn the_side_with_fewer_samples_is_the_broken_one() {
         let step = |at: f64| [(0.0, 0.1), (at - 1e-9, 0.1), (at, -0.2), (1.0, -0.2)];
         assert_eq!(f1(&set(), "y", 0.795, &step(0.795)), 1.0);
-        // Ten of twenty samples found, and no other.
+        // Ten of twenty samples found, and no wrong one.
         assert!((f1(&set(), "y", 0.795, &step(0.895)) - 2.0 * 10.0 / 30.0).abs() < 1e-12);
         assert_eq!(f1(&set(), "y", 0.795, &[(0.0, 0.1), (1.0, 0.1)]), 0.0);
     }
@@ -100,7 +100,7 @@ mod tests {
     #[test]
     fn rests_are_those_of_the_command() {
         let curve = [(0.0, 0.0), (0.02, 0.0), (0.03, 1.0)];
-        // The first pulse follows a rest for ever, the last one of 30 ms.
+        // The first pulse follows an infinitely long rest, the last one a rest of 30 ms.
         let rests = rests(&set().data.records[0]);
         assert_eq!(rests.len(), 95);
         let close = |a: f64, b: f64| (a - b).abs() < 1e-9;

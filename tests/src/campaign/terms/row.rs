@@ -1,4 +1,4 @@
-//! What came of a case: one line of JSON.
+//! The result of a case: one line of JSON.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,19 +7,19 @@ use crate::campaign::case::Group;
 use crate::campaign::ledger::Entry;
 use crate::campaign::program::Spent;
 
-/// A term as the program tells it.
+/// A reported term.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Told {
-    /// Where, and by what.
+    /// Its place and coordinate.
     #[serde(flatten)]
     pub spot: Spot,
-    /// What else it could be.
+    /// Its equivalence set.
     pub alike: Vec<Spot>,
-    /// What it is said to take of the excess as a curve, %.
+    /// Share of the unexplained variance that its curve explains, %.
     pub excess_taken_percent: f64,
     /// p-value.
     pub p_value: f64,
-    /// Effects of the catalogue that it is said to resemble.
+    /// Similar effects of the catalogue.
     pub resembles: Vec<String>,
     /// Its formula.
     pub formula: String,
@@ -34,12 +34,12 @@ impl Told {
     }
 }
 
-/// What came of a case.
+/// The result of a case.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// The case's key.
+    /// Key of the case.
     pub key: String,
-    /// What it is counted under; none before the case was looked at.
+    /// Its group; none before it was run.
     pub group: Option<Group>,
     /// Name of the family.
     pub family: String,
@@ -47,41 +47,41 @@ pub struct Row {
     pub label: String,
     /// Noise, and nuisances where there are any.
     pub circumstances: String,
-    /// How much what is hidden matters; none where nothing is.
+    /// Weight of the hidden effect; none without one.
     pub weight: Option<f64>,
-    /// What should be found.
+    /// The correct findings.
     pub truths: Vec<Truth>,
-    /// What is true of the rig though nobody hid it.
+    /// Further correct findings.
     pub also_true: Vec<Truth>,
-    /// Whether it acts in one region only.
+    /// Whether the physics deviates in one region only.
     pub regional: bool,
-    /// Why there is no outcome.
+    /// Why there is no result.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
-    /// The terms in the order told.
+    /// The reported terms, in order.
     pub terms: Vec<Told>,
-    /// Held-out error over the noise floor: of the model as given …
+    /// Validation error of the given model over the noise level.
     pub given_over_floor: Option<f64>,
-    /// … of the best base without a new term …
+    /// Validation error of the best base without a new term, over the noise level.
     pub base_over_floor: Option<f64>,
-    /// … and of the last model.
+    /// Validation error of the final model over the noise level.
     pub over_floor: Option<f64>,
-    /// Share of the excess of the held-out error of the best base that is gone with the curve …
+    /// Share of the unexplained variance of the best base that the curve explains.
     pub curve_taken: Option<f64>,
-    /// … and as it is handed over.
+    /// The same for the reported formula or curve.
     pub formula_taken: Option<f64>,
-    /// Share of the squared distance to the noise-free held-out readings, which only the rig knows, that is
-    /// gone from the model as given to the one handed over.
+    /// Reduction of the squared distance to the noise-free validation readings from the given to the final
+    /// model; these are known only in the simulation.
     pub truly_taken: Option<f64>,
-    /// Where it acts in one region only: F1 of the samples that the curve puts there.
+    /// For physics in one region: F1 of the samples that the curve puts there.
     pub region_f1: Option<f64>,
-    /// Where that can be told, on flows of one time constant each way with one lag: the larger of the relative
-    /// errors of the two in the model handed over.
+    /// For first-order flows with one lag: the larger relative error of the two time constants in the final
+    /// model.
     #[serde(default)]
     pub base_bias: Option<f64>,
-    /// How long the identification took.
+    /// Duration of the identification.
     pub identify: Spent,
-    /// How long the search took.
+    /// Duration of the search.
     pub discover: Spent,
 }
 
@@ -91,11 +91,11 @@ impl Entry for Row {
     }
 }
 
-/// What has to be taken of the excess for a curve to be the right one.
+/// Share of the unexplained variance that a correct curve must explain.
 pub(super) const ENOUGH: f64 = 0.6;
 
 impl Row {
-    /// The first term that is not true of the rig anyway.
+    /// The first term that is not a property of the rig itself.
     #[must_use]
     pub fn first(&self) -> Option<&Told> {
         let known = |told: &&Told| {
@@ -106,7 +106,7 @@ impl Row {
         self.terms.iter().find(|told| !known(told))
     }
 
-    /// Told though nothing of the kind is there.
+    /// A term that the rig does not have.
     #[must_use]
     pub fn is_needless(&self) -> bool {
         self.truths.is_empty() && self.first().is_some()
@@ -117,37 +117,37 @@ impl Row {
         first.is_some_and(|told| self.truths.iter().any(|truth| test(truth, told)))
     }
 
-    /// Whether the place is right.
+    /// Whether the place is correct.
     #[must_use]
     pub fn has_place(&self) -> bool {
         self.one(|truth, told| truth.is_at(&told.spot))
     }
 
-    /// Whether the place is right, or among what is said to be alike.
+    /// Whether the place is correct, or that of a member of the equivalence set.
     #[must_use]
     pub fn has_place_in_set(&self) -> bool {
         self.one(|truth, told| told.spots().any(|spot| truth.is_at(spot)))
     }
 
-    /// Whether place and coordinate are right.
+    /// Whether place and coordinate are correct.
     #[must_use]
     pub fn has_coordinate(&self) -> bool {
         self.one(|truth, told| truth.is(&told.spot))
     }
 
-    /// Whether place and coordinate are right, or among what is said to be alike.
+    /// Whether place and coordinate are correct, or those of a member of the equivalence set.
     #[must_use]
     pub fn has_coordinate_in_set(&self) -> bool {
         self.one(|truth, told| told.spots().any(|spot| truth.is(spot)))
     }
 
-    /// Whether the curve takes enough of the excess.
+    /// Whether the curve explains enough of the unexplained variance.
     #[must_use]
     pub fn takes_enough(&self) -> bool {
         self.curve_taken.is_some_and(|taken| taken >= ENOUGH)
     }
 
-    /// Whether all is as it should be.
+    /// Whether the result is correct in every respect.
     #[must_use]
     pub fn is_right(&self) -> bool {
         self.failure.is_none()
@@ -158,7 +158,7 @@ impl Row {
             }
     }
 
-    /// What was told, in short.
+    /// The finding in short.
     #[must_use]
     pub fn said(&self) -> String {
         if let Some(failure) = &self.failure {

@@ -18,7 +18,7 @@ use crate::campaign::case::{Case, Group};
 use crate::campaign::program::Program;
 use crate::campaign::run::structure;
 
-/// Runs a case; at most `terms` are asked for. What goes wrong is a row too.
+/// Runs a case with at most `terms` terms. A failure gives a result too.
 #[must_use]
 pub fn run(case: &Case, program: &Program, terms: u32) -> Row {
     let mut row = Row::of(case);
@@ -33,7 +33,7 @@ pub fn run(case: &Case, program: &Program, terms: u32) -> Row {
     if row.is_right()
         && let Some(folder) = &kept
     {
-        // What stays is looked at by people; a folder too many does no harm.
+        // Failures to remove a folder are harmless.
         let _ = fs::remove_dir_all(folder);
     }
     row
@@ -51,7 +51,7 @@ fn fill(
     row.expect(&plan);
     let inside = |name: &str| folder.join(name).to_string_lossy().into_owned();
     let [data, given, found, own] = ["set", "given.toml", "found.toml", "own.toml"].map(&inside);
-    // Of an earlier run.
+    // Left over from an earlier run.
     let _ = fs::remove_dir_all(folder.join("set"));
     let _ = fs::remove_file(&found);
     let _ = fs::remove_file(&own);
@@ -84,7 +84,7 @@ fn fill(
 }
 
 impl Row {
-    /// Of a case that nobody has looked at.
+    /// An empty result for a case.
     #[must_use]
     pub fn of(case: &Case) -> Self {
         let nuisances = case.nuisances.iter().map(|n| n.name());
@@ -99,7 +99,7 @@ impl Row {
         }
     }
 
-    /// What should be found in its rig.
+    /// Sets the correct findings for its rig.
     pub fn expect(&mut self, plan: &RigPlan) {
         let beyond = plan.truths();
         self.weight = plan.weight.is_finite().then_some(plan.weight);
@@ -111,7 +111,7 @@ impl Row {
         self.also_true = plan.also_true().into_iter().map(Truth::from).collect();
     }
 
-    /// What `discover --json` says.
+    /// Reads a document of `discover --json`.
     ///
     /// # Errors
     /// A document without terms.
@@ -122,7 +122,7 @@ impl Row {
     }
 }
 
-/// F1 of the region that is told; 0 where the term is another.
+/// F1 of the region of the reported term; 0 if the term is wrong.
 fn region(row: &Row, truth: &plant::Truth, set: &Recorded) -> f64 {
     let told = row.first().filter(|_| row.has_coordinate());
     let above = truth.region.map(|region| region.above);
@@ -147,7 +147,7 @@ fn bias(plan: &RigPlan, model: &Model) -> Option<f64> {
     largest.is_finite().then_some(largest)
 }
 
-/// Mean square over the held-out records of what the model's free run is away from the noise-free readings.
+/// Mean square difference of the model's free run and the noise-free readings over the validation records.
 fn distance(model: &Model, set: &Recorded) -> Result<f64, String> {
     let (mut sum, mut samples) = (0.0, 0_usize);
     for (record, truth) in set.data.records.iter().zip(&set.noise_free) {
@@ -185,8 +185,8 @@ fn read(document: &Value) -> Result<Vec<Told>, String> {
     Ok(each.collect())
 }
 
-/// What the ladder says of the held-out errors: the best base is its last rung without a term, the curves are
-/// its first with all terms, and its last is what is handed over.
+/// Validation errors from the ladder: the best base is the last step without a term, the curves are the first
+/// step with all terms, and the last step is the final model.
 fn errors(row: &mut Row, document: &Value) {
     let Some(ladder) = document["ladder"].as_array() else {
         return;

@@ -1,23 +1,23 @@
-//! Place and coordinate of a term: as the rig has it, and as it is told.
+//! Place and coordinate of a term, true and reported.
 
 use firmware_sim::plant;
 use serde::{Deserialize, Serialize};
 
-/// Place and coordinate as the program tells them.
+/// Reported place and coordinate.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Spot {
     /// jet, delay, flow or sensor.
     pub place: String,
-    /// On what it depends.
+    /// The coordinate.
     pub coordinate: String,
 }
 
-/// What would be right.
+/// A correct finding.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Truth {
     /// The place.
     pub place: String,
-    /// Any of these coordinates.
+    /// Equivalent coordinates.
     pub coordinates: Vec<String>,
 }
 
@@ -30,8 +30,8 @@ impl From<plant::Truth> for Truth {
     }
 }
 
-/// Times of memories and windows are right within this factor: neighbours of the grid that is searched lie
-/// three apart, and what is between two is within the root of that of one.
+/// Times of memories and windows count as correct within this factor: neighbours of the search grid are a
+/// factor of three apart.
 const TIMES: f64 = 2.0;
 
 impl Truth {

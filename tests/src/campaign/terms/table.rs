@@ -9,7 +9,7 @@ use super::row::{ENOUGH, Row};
 use crate::campaign::case::Group;
 use crate::campaign::counts::{bounded, seconds, share};
 
-/// Everything that was counted.
+/// All results.
 #[must_use]
 pub fn table(rows: &[Row]) -> String {
     let of = |group: Group| -> Vec<&Row> {
@@ -50,13 +50,13 @@ pub fn table(rows: &[Row]) -> String {
     text
 }
 
-/// Of what is not there, nothing is taken: a rig where nothing was found counts with 0.
+/// A rig without a finding counts with 0.
 fn taken(rows: &[&Row], of: impl Fn(&Row) -> Option<f64>) -> Option<[f64; 2]> {
     let done = rows.iter().filter(|row| row.failure.is_none());
     let mut all: Vec<f64> = done.map(|row| of(row).unwrap_or(0.0)).collect();
     all.sort_by(f64::total_cmp);
     let last = all.len().checked_sub(1)?;
-    // The tenth from below: nine of ten are at least as good.
+    // The 10 % quantile: nine of ten are at least as good.
     let at = |share: f64| all[(share * last as f64).round() as usize];
     Some([at(0.5), at(0.1)])
 }

@@ -1,4 +1,4 @@
-//! Answers that are made up, right and wrong.
+//! Made-up output, correct and wrong.
 
 use super::*;
 use host_fit::data::Use;
@@ -14,7 +14,7 @@ fn answer(command: &str, document: Value) -> Answer {
     }
 }
 
-/// What `compare` says of a model of one record of 100 samples.
+/// A document of `compare` for a model of one record of 100 samples.
 fn compared(rmse: f64, fit: f64, scored: usize) -> Value {
     let row = json!({"name": "run", "use": "identify", "samples": scored, "rmse": rmse, "fit_percent": fit});
     json!({"records": [row], "identify": row, "validate": null})
@@ -26,7 +26,7 @@ fn identified(rmse: f64, fit: f64, scored: usize, delays: Value) -> Value {
     document
 }
 
-/// Everything right: one lag of each kind, delay 15.
+/// A correct answer: one lag of each kind, delay 15.
 fn heard() -> Heard {
     let y = (0..100).map(f64::from).collect();
     let record = Record::new("run", Use::Identify, 1.0, vec![0.5; 100], y);

@@ -166,11 +166,12 @@ pub fn says_little(records: &[Record]) -> Option<String> {
     too_few(changes(&learning), on_off)
 }
 
-/// Whether the records identify no more than a delay and time constants: little excitation, and no other
-/// measured input.
+/// Whether the records identify no more than a delay and time constants: little excitation, no other measured input, and
+/// no validation record that would show over-fitting.
 #[must_use]
 pub fn bears_little(records: &[Record]) -> bool {
-    says_little(records).is_some() && records.iter().all(|record| record.channels.is_empty())
+    let alone = |record: &Record| record.channels.is_empty() && record.role == Use::Identify;
+    says_little(records).is_some() && records.iter().all(alone)
 }
 
 impl Excitation {

@@ -151,9 +151,9 @@ mod tests {
             assert_eq!(check_period(&at(period)), Ok(()), "{period}");
         }
         for (period, said) in [
-            (1e-4, "every 0.1 ms"),
-            (0.25, "every 250 ms"),
-            (60.0, "every 60000 ms"),
+            (1e-4, "has 0.1 ms"),
+            (0.25, "has 250 ms"),
+            (60.0, "has 60000 ms"),
         ] {
             let error = check_period(&at(period)).unwrap_err().to_string();
             for word in ["`sample_period_s`", "0.2 to 100 ms", said, "identify"] {

@@ -91,7 +91,7 @@ mod tests {
         assert_eq!(least.value, Value::Number(residual::RULES.least_excess));
         assert_eq!(
             least.meaning,
-            "… and is at least this share of the noise energy: `y_sd` is not known better."
+            "The error is above the noise only if the unexplained variance is at least this share of the noise variance, the uncertainty of `y_sd`."
         );
     }
 }

@@ -231,7 +231,8 @@ fn plain_enough(found: &Found) -> Option<Hypothesis> {
     let plain = plain.min_by(|a, b| a.score().total_cmp(&b.score()))?;
     let best = &found.best;
     let told = p_value(&plain.judged.held_out, &best.judged.held_out) <= RULES.level;
-    (!told && !is_plain(&best)).then(|| plain.clone())
+    let near = plain.score() < best.score() + RULES.linear_better;
+    (near && !told && !is_plain(&best)).then(|| plain.clone())
 }
 
 /// The model with a constant delay where its law is no more than that over the levels of the records: a law has to vary

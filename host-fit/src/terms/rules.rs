@@ -65,7 +65,8 @@ rules! {
     lag_step: usize = 8, "samples", "half a step off, a lag explains 90 % of what the right one does";
 
     /// A linear model whose inputs cancel each other is used as a starting point if its error is smaller than
-    /// the best structure's by this.
+    /// the best structure's by this; a first or second order whose error is larger by no more than this is preferred
+    /// where no test tells the two apart.
     linear_better: f64 = 0.03, "share of the rms error", "judgement: an inverse response has a larger error";
     /// Most evaluations of the mesh adaptive direct search for the delays of a chosen structure.
     settling: usize = 300, "", "judgement: each is a brief fit; a structure of five delays needs 60 to 150";

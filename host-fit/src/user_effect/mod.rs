@@ -596,7 +596,7 @@ update = "reading"
                 "a number is needed here, this is a condition",
             ),
             ("if u > 0.5 { gain } else { 0.0 } * y", 1, "in parentheses"),
-            ("let y = gain; y", 5, "has a meaning already"),
+            ("let y = gain; y", 5, "is already defined"),
             ("let a = gain;", 1, "there must be a value"),
             ("gain * 2.0f32", 8, "without `f32`"),
             ("gain * 1e300", 8, "single precision"),
@@ -632,13 +632,13 @@ update = "reading"
     fn faults_of_keys_are_named() {
         for (from, to, expected) in [
             ("own-pickup", "Own Pickup", "key `name`"),
-            ("own-pickup", "valve-lag", "in the catalogue already"),
+            ("own-pickup", "valve-lag", "already in the catalogue"),
             ("low = -0.5", "low = 0.5", "key `parameter.gain`"),
             ("starts = [0.05]", "starts = [0.7]", "`starts`"),
             ("starts = [0.05]", "starts = []", "`starts`"),
             ("low = -0.5", "low = nan", "`low` and `high`"),
-            ("name = \"gain\"", "name = \"u\"", "has a meaning already"),
-            ("name = \"gain\"", "name = \"fn\"", "is no name"),
+            ("name = \"gain\"", "name = \"u\"", "is already defined"),
+            ("name = \"gain\"", "name = \"fn\"", "is not a valid name"),
             (
                 "place = \"sensor\"",
                 "place = \"delay\"",

@@ -234,7 +234,7 @@ fn imports_replace_nothing_unasked_and_are_named_where_they_are_needed() {
     for part in [
         "sampling period 1 s",
         "ON is 1, OFF is 0",
-        "Nothing is held out",
+        "There is no validation record",
     ] {
         assert!(stdout.contains(part), "no `{part}` in {stdout}");
     }

@@ -441,7 +441,7 @@ fn the_held_out_end_has_the_whole_record_before_it() {
     let content = format!("t,u,y\n{rows}");
     let all = parsed(&content);
     assert!(
-        all.remarks[0].contains("Nothing is held out")
+        all.remarks[0].contains("There is no validation record")
             && all.remarks[0].contains("--hold-out-from 70"),
         "{:?}",
         all.remarks

@@ -10,10 +10,10 @@ const SHARE: f64 = 0.05;
 /// The longest such share.
 const LONGEST: f64 = 0.25;
 
-/// Free responses of a process over a record: what different initial states differ by. The state itself is estimated
-/// from the beginning alone: the first twentieth of the record, at least 20 samples, and longer, up to a quarter, where
-/// the process has no time constant as short as half of that. Of a record that begins in mid-run the beginning is what free runs follow,
-/// from where commands before the record are answered.
+/// Free responses of a process to its initial state. The initial state is estimated from the start of the record: its
+/// first twentieth, at least 20 samples, and up to a quarter of the record where the shortest time constant is longer
+/// than half of that. In a record that begins in mid-run the estimate leaves out the first dead time, in which y answers
+/// commands that were not recorded.
 #[derive(Clone, Debug)]
 pub(super) struct InitialState {
     /// Free responses, orthonormal over the start of the record.
@@ -36,7 +36,7 @@ impl InitialState {
         Self::between(free, samples, fastest, 0..0)
     }
 
-    /// The same from the first of the samples `known` on, and through all of them.
+    /// The same, estimated from sample `known.start` on and at least up to `known.end`.
     pub(super) fn between(
         free: Vec<Vec<f64>>,
         samples: usize,

@@ -137,7 +137,7 @@ fn chosen(
         return Ok(diagnosis);
     }
     if bears_little(records) {
-        // An effect is how the response depends on something, and so are further lags.
+        // These records cannot identify how the response depends on y or u, so effects and further lags are not tried.
         let given_alone = Hypothesis::new(judge.refitted(&given_inside)?);
         let second = session.rung(&given_alone.judged, &[], "refitted");
         let rungs = [first, second];

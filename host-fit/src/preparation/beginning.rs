@@ -157,11 +157,11 @@ impl Beginning {
             && !known_edge
             && record.u_before.is_none()
             && answer.left < RULES.answer * relaxes_early.left
-            // An answer that comes sooner is that of an edge before the record; in doubt the run follows the measurement.
+            // An earlier response is that of an edge before the record; in doubt the record begins in mid-run.
             && *at >= 0.5 * (1.0 + RULES.surely_before) * dead_time
         {
             let rest = ((RULES.surely_before * at).floor() as usize).max(1);
-            // What still moves before that answer does not rest.
+            // y must not move before that response.
             let trend = Shape::of(&y[..rest.min(window)], |k| k as f64);
             let noise = trend.left / (rest as f64 - 2.0).max(1.0);
             if rest < RULES.fewest_at_rest || trend.motion <= RULES.motion_over_noise * noise {

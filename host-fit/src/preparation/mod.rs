@@ -114,9 +114,9 @@ impl Preparation {
     }
 }
 
-/// Fills in what free runs take over where records begin in mid-run: a second order with dead time that begins as they
-/// do, and what is left of y beside it, smoothed. Single samples do not show how fast y moves, and a smoothed y alone
-/// lags behind its own turns.
+/// Sets the output from which free runs start in records that begin in mid-run: the response of a second order with dead
+/// time whose initial state is fitted to the start of the record, plus the smoothed residual of y against that response
+/// (theory 1.5). Single samples are too noisy to give the slope of y, and smoothing y itself would be biased after edges.
 fn follow(records: &mut [Record], beginnings: &[Beginning]) {
     if beginnings.iter().all(|own| own.follow == 0) {
         return;
@@ -132,11 +132,11 @@ fn follow(records: &mut [Record], beginnings: &[Beginning]) {
         let run = second.and_then(|second| second.simulate(record));
         let run = run.unwrap_or_else(|| vec![0.0; record.len()]);
         let left: Vec<f64> = record.y.iter().zip(&run).map(|(y, run)| y - run).collect();
-        // Until commands before the record are answered the run knows nothing of y.
+        // During the first dead time y answers commands that were not recorded, so the response is not valid there.
         let answered = second.map_or(0.0, |second| second.dead_time_s / record.sample_period_s);
         let from = (answered.ceil() as usize + 1).min(follow / 2);
         let half = half_width(&left[from..], 0..follow - from).min((follow - from) / 2);
-        // What is taken over at the last sample comes from as many after it, which are not scored either.
+        // The smoothed value of the last followed sample uses `half` samples after it; those are not scored either.
         let follow = follow - half;
         let answered = (from..follow).map(|k| run[k] + smoothed(&left[from..], k - from, half));
         record.followed.truncate(from);

@@ -49,9 +49,8 @@ pub(super) fn smoothed(y: &[f64], at: usize, half: usize) -> f64 {
     parabola.map_or(own, |parabola| parabola.value)
 }
 
-/// The widest half-width with which the samples `range` of `y` are foretold by their neighbours (leave-one-out) as well
-/// as with any other, within one standard error of the difference; 0 where there are too few. At most as long as the
-/// range.
+/// Half-width, samples, by leave-one-out cross-validation over the samples `range` of `y`: the widest whose error is
+/// within one standard error of the smallest. At most the length of the range; 0 if `y` is too short.
 pub(super) fn half_width(y: &[f64], range: Range<usize>) -> usize {
     let errors = |half: usize| -> Option<Vec<f64>> {
         let each = range.clone().map(|at| {

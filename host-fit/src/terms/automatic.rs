@@ -131,13 +131,13 @@ pub fn base_model(
     else {
         return refused.map(Err);
     };
-    // A law that says no more than a constant delay is no place to set out from.
+    // The search starts from a delay law only if it is significantly better than a constant delay.
     let root = Hypothesis::new(without_needless_law(&judge, root.judged.clone(), laws));
     progress("the same of second order");
     let second = second_order(&judge, &root, may_be_constant);
     let mut found = search.run(root, || second);
-    // Inputs of which one takes back what another does are no first or second order: where they do better than the best
-    // structure so far is where to set out from.
+    // Input coefficients of both signs (a zero, as of an inverse response) are outside first and second order: the search
+    // starts again from such a model if it is clearly better than the best structure so far.
     let lead = |hypothesis: &&Hypothesis| {
         let b = &hypothesis.judged.model().b;
         b.iter().any(|b| *b > 0.0) && b.iter().any(|b| *b < 0.0)
@@ -220,8 +220,8 @@ pub fn base_model(
     }))
 }
 
-/// The best first or second order among what was fitted, where no test tells the best structure from it: lags further
-/// back and terms in the path of the jets imitate a second lag and move the delay with it.
+/// The best first or second order among the fitted structures, if its score is nearly that of the best structure and the
+/// difference is not significant. Longer lags and dispersed delays imitate a second time constant and bias the delay.
 fn plain_enough(found: &Found) -> Option<Hypothesis> {
     let is_plain = |hypothesis: &&Hypothesis| {
         let mut terms = hypothesis.terms.iter();

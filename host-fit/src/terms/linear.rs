@@ -1,4 +1,4 @@
-//! The baselines as models of ours: a base that such a simple model beats is not handed over.
+//! First order, second order and ARX(2,2) as models of this crate, and the second order from which a search starts.
 
 use super::judge::{Judge, size};
 use super::search::Hypothesis;

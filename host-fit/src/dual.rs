@@ -3,6 +3,11 @@
 //! Running `model-core` in [`Dual`] gives exact sensitivities of a free run
 //! from the very code that runs on the board.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over indices are compiled into vector instructions wherever they are called from"
+)]
+
 use model_core::Real;
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -11,7 +16,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 ///
 /// Ordering looks at the value alone; equality at everything, so that a zero
 /// that still depends on a parameter is not taken for nothing.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Dual<const P: usize> {
     /// The value.
     pub value: f64,
@@ -21,6 +26,7 @@ pub struct Dual<const P: usize> {
 
 impl<const P: usize> Dual<P> {
     /// A number that depends on nothing.
+    #[inline(always)]
     #[must_use]
     pub const fn constant(value: f64) -> Self {
         Self {
@@ -50,6 +56,17 @@ impl<const P: usize> Dual<P> {
     }
 }
 
+impl<const P: usize> PartialEq for Dual<P> {
+    #[inline(always)]
+    fn eq(&self, other: &Self) -> bool {
+        let mut equal = self.value == other.value;
+        for i in 0..P {
+            equal &= self.partials[i] == other.partials[i];
+        }
+        equal
+    }
+}
+
 impl<const P: usize> PartialOrd for Dual<P> {
     #[inline(always)]
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
@@ -62,8 +79,8 @@ impl<const P: usize> Add for Dual<P> {
     #[inline(always)]
     fn add(mut self, other: Self) -> Self {
         self.value += other.value;
-        for (partial, theirs) in self.partials.iter_mut().zip(other.partials) {
-            *partial += theirs;
+        for i in 0..P {
+            self.partials[i] += other.partials[i];
         }
         self
     }
@@ -74,8 +91,8 @@ impl<const P: usize> Sub for Dual<P> {
     #[inline(always)]
     fn sub(mut self, other: Self) -> Self {
         self.value -= other.value;
-        for (partial, theirs) in self.partials.iter_mut().zip(other.partials) {
-            *partial -= theirs;
+        for i in 0..P {
+            self.partials[i] -= other.partials[i];
         }
         self
     }
@@ -86,9 +103,8 @@ impl<const P: usize> Mul for Dual<P> {
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         let mut partials = [0.0; P];
-        for ((partial, mine), theirs) in partials.iter_mut().zip(self.partials).zip(other.partials)
-        {
-            *partial = mine * other.value + theirs * self.value;
+        for (i, partial) in partials.iter_mut().enumerate() {
+            *partial = self.partials[i] * other.value + other.partials[i] * self.value;
         }
         Self {
             value: self.value * other.value,
@@ -103,9 +119,8 @@ impl<const P: usize> Div for Dual<P> {
     fn div(self, other: Self) -> Self {
         let value = self.value / other.value;
         let mut partials = [0.0; P];
-        for ((partial, mine), theirs) in partials.iter_mut().zip(self.partials).zip(other.partials)
-        {
-            *partial = (mine - theirs * value) / other.value;
+        for (i, partial) in partials.iter_mut().enumerate() {
+            *partial = (self.partials[i] - other.partials[i] * value) / other.value;
         }
         Self { value, partials }
     }
@@ -122,30 +137,38 @@ impl<const P: usize> Neg for Dual<P> {
 impl<const P: usize> Real for Dual<P> {
     const ZERO: Self = Self::constant(0.0);
     const ONE: Self = Self::constant(1.0);
+    #[inline(always)]
     fn from_f64(value: f64) -> Self {
         Self::constant(value)
     }
+    #[inline(always)]
     fn from_count(count: u32) -> Self {
         Self::constant(f64::from(count))
     }
+    #[inline(always)]
     fn value(self) -> f64 {
         self.value
     }
+    #[inline]
     fn exp(self) -> Self {
         let value = Real::exp(self.value);
         self.chain(value, value)
     }
+    #[inline]
     fn sin(self) -> Self {
         self.chain(Real::sin(self.value), Real::cos(self.value))
     }
+    #[inline]
     fn cos(self) -> Self {
         self.chain(Real::cos(self.value), -Real::sin(self.value))
     }
+    #[inline]
     fn sqrt(self) -> Self {
         let value = Real::sqrt(self.value);
         // At 0 the slope is infinite; 0 keeps a search from running away.
         self.chain(value, if value > 0.0 { 0.5 / value } else { 0.0 })
     }
+    #[inline]
     fn cbrt(self) -> Self {
         let value = Real::cbrt(self.value);
         let slope = if value == 0.0 {
@@ -161,9 +184,11 @@ impl<const P: usize> Real for Dual<P> {
         let (_, error) = self.value.two_sum(term.value);
         (self + term, Self::constant(error))
     }
+    #[inline(always)]
     fn round(self) -> i32 {
         Real::round(self.value)
     }
+    #[inline(always)]
     fn floor(self) -> i32 {
         Real::floor(self.value)
     }

@@ -8,7 +8,7 @@ use model_core::effect::Spec;
 use model_core::effects::{LAGGING_DRIVE, SLOW_WAKE};
 use model_core::history::Memory as _;
 use model_core::model::{StateOf, observe};
-use model_core::{Input, Output, Parts, Real, State};
+use model_core::{Input, Output, Parts, Real, State, pairs};
 use std::borrow::Cow;
 use std::ops::ControlFlow;
 use thiserror::Error;
@@ -258,7 +258,7 @@ impl<T: Real> Simulator<T> {
         k: usize,
         u: f64,
     ) -> Output<T> {
-        for (now, series) in channels.iter_mut().zip(&signals.channels) {
+        for (now, series) in pairs(&mut *channels, &signals.channels) {
             *now = series.get(k).map_or(T::ZERO, |value| T::from_f64(*value));
         }
         let input = Input {

@@ -24,6 +24,7 @@ pub mod effects;
 pub mod frozen;
 pub mod history;
 pub mod model;
+pub mod pairs;
 #[cfg(test)]
 mod paper;
 pub mod real;
@@ -32,4 +33,5 @@ pub mod self_test;
 
 pub use effect::Effect;
 pub use model::{Input, Output, Parts, State, step};
+pub use pairs::pairs;
 pub use real::Real;

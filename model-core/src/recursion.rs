@@ -1,6 +1,7 @@
 //! The bilinear recursion, eqs. (3), (4), (14) and (15).
 
 use crate::history::Past;
+use crate::pairs::pairs;
 use crate::real::Real;
 
 /// Meaning of a printed lag τ.
@@ -137,13 +138,13 @@ impl<T: Real> Bilinear<'_, T> {
     #[inline(always)]
     pub fn known(&self, y: &impl Past<T>, horizon: usize, ahead: usize) -> Known<T> {
         let mut known = Known::NOTHING;
-        for (a, lag) in self.a.iter().zip(self.state_lags) {
+        for (a, lag) in pairs(self.a, self.state_lags) {
             let lag = self.convention.behind_newest(*lag);
             if lag >= horizon {
                 known.free = known.free + *a * y.back(lag - ahead);
             }
         }
-        for (c, lag) in self.column(0).iter().zip(self.product_lags) {
+        for (c, lag) in pairs(self.column(0), self.product_lags) {
             let lag = self.convention.behind_newest(*lag);
             if lag >= horizon {
                 known.gain = known.gain + *c * y.back(lag - ahead);
@@ -175,7 +176,7 @@ impl<T: Real> Bilinear<'_, T> {
             return self.graded(*drive, known, horizon, y, arriving(0));
         }
         let mut next = self.constant + known.free;
-        for (a, lag) in self.a.iter().zip(self.state_lags) {
+        for (a, lag) in pairs(self.a, self.state_lags) {
             let lag = self.convention.behind_newest(*lag);
             if lag < horizon {
                 next = next + *a * y.back(lag);
@@ -210,7 +211,7 @@ impl<T: Real> Bilinear<'_, T> {
         } else {
             (start, usize::MAX)
         };
-        for (c, lag) in self.column(l).iter().zip(self.product_lags) {
+        for (c, lag) in pairs(self.column(l), self.product_lags) {
             let lag = self.convention.behind_newest(*lag);
             if lag < horizon {
                 gain = gain + *c * y.back(lag);
@@ -226,7 +227,7 @@ impl<T: Real> Bilinear<'_, T> {
         let share = self.grading.share(jet);
         // Precomputed terms belong to the past.
         let (mut free, mut past) = (self.constant, known.free);
-        for (a, lag) in self.a.iter().zip(self.state_lags) {
+        for (a, lag) in pairs(self.a, self.state_lags) {
             let lag = self.convention.behind_newest(*lag);
             let sum = if lag < limit { &mut free } else { &mut past };
             if lag < horizon {
@@ -234,7 +235,7 @@ impl<T: Real> Bilinear<'_, T> {
             }
         }
         let (mut gain, mut past_gain) = (T::ZERO, known.gain);
-        for (c, lag) in self.column(0).iter().zip(self.product_lags) {
+        for (c, lag) in pairs(self.column(0), self.product_lags) {
             let lag = self.convention.behind_newest(*lag);
             let sum = if lag < limit {
                 &mut gain

@@ -9,7 +9,7 @@
 use super::plant::{Plant, Switching};
 use super::spread::mean;
 use crate::data::Record;
-use crate::linalg::{dot, solve_symmetric};
+use crate::linalg::{dot, dots, solve_symmetric};
 
 /// Most samples for the grid search; longer records are decimated.
 const COARSE_SAMPLES: usize = 2_000;
@@ -387,7 +387,7 @@ pub(crate) fn refine(
         let flat: Vec<f64> = at.residuals.iter().flatten().copied().collect();
         let gram: Vec<f64> = columns
             .iter()
-            .flat_map(|a| columns.iter().map(|b| dot(a, b)))
+            .flat_map(|a| dots(a, columns.iter().map(Vec::as_slice)))
             .collect();
         let right: Vec<f64> = columns.iter().map(|c| dot(c, &flat)).collect();
         inverse = invert(&gram, size);

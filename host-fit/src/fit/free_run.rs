@@ -9,8 +9,8 @@ use crate::data::Record;
 use crate::dual::Dual;
 use crate::model::{Coordinate, Delay, Kind, Model, Rounding};
 use crate::simulate::{Signals, SimulateError, Simulator};
-use model_core::Output;
 use model_core::effect::Sign;
+use model_core::{Output, pairs};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
@@ -294,8 +294,8 @@ impl<'a> FreeRunProblem<'a> {
             #[inline(always)]
             |k, output: &Output<Dual<P>>| {
                 y.push(output.measured.value);
-                for (column, slope) in columns.iter_mut().zip(output.measured.partials) {
-                    column.push(if k < lead { 0.0 } else { slope });
+                for (column, slope) in pairs(&mut columns, &output.measured.partials) {
+                    column.push(if k < lead { 0.0 } else { *slope });
                 }
                 ControlFlow::Continue(())
             },
@@ -423,8 +423,8 @@ pub fn sensitivities(
         let simulator = Simulator::with_values(model, &duals, Rounding::None);
         let left = simulator.run(&signals, |_, output: &Output<Dual<FEW>>| {
             run.push(output.measured.value);
-            for (column, slope) in own.iter_mut().zip(output.measured.partials) {
-                column.push(slope);
+            for (column, slope) in pairs(&mut own, &output.measured.partials) {
+                column.push(*slope);
             }
             ControlFlow::Continue(())
         });

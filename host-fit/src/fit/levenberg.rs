@@ -5,7 +5,7 @@
 //! that parts run in parallel and a cost that is too high is abandoned early.
 
 use super::rules::RULES;
-use crate::linalg::{dot, solve_symmetric};
+use crate::linalg::{dots, solve_symmetric};
 
 // These constants change the number of iterations, not the minimum, and are therefore no rules.
 
@@ -190,14 +190,15 @@ fn normal_equations(parts: &[Part], n: usize) -> (Vec<f64>, Vec<f64>) {
     let mut gradient = vec![0.0; n];
     for part in parts {
         for i in 0..n {
-            for j in 0..=i {
-                let sum = dot(&part.jacobian[i], &part.jacobian[j]);
+            let columns = part.jacobian[..=i].iter().chain([&part.residual]);
+            let sums = dots(&part.jacobian[i], columns.map(Vec::as_slice));
+            for (j, sum) in sums[..=i].iter().enumerate() {
                 information[i * n + j] += sum;
                 if i != j {
                     information[j * n + i] += sum;
                 }
             }
-            gradient[i] += dot(&part.jacobian[i], &part.residual);
+            gradient[i] += sums[i + 1];
         }
     }
     (information, gradient)

@@ -8,7 +8,7 @@
 //! records.
 
 use super::arrival::Weights;
-use crate::linalg::{self, dot};
+use crate::linalg::{self, dot, dots};
 
 /// Regressor elements: 0 is the constant 1, 1 + i is y_{k+1−i} (1 is the target y_{k+1}).
 pub(crate) type Element = usize;
@@ -118,8 +118,10 @@ impl LaggedOutputs {
                 let from = self.padding() + start + 1;
                 let newest = &padded[from..self.padding() + end + 1];
                 first_sum += newest.iter().sum::<f64>();
-                for (p, entry) in first_row.iter_mut().enumerate() {
-                    *entry += dot(newest, &padded[from - p..][..newest.len()]);
+                let earlier = (0..shifts).map(|p| &padded[from - p..][..newest.len()]);
+                let products = dots(newest, earlier);
+                for (entry, product) in first_row.iter_mut().zip(products) {
+                    *entry += product;
                 }
                 ends.push((&padded[start..from], 1.0));
                 ends.push((&padded[end..][..=self.padding()], -1.0));

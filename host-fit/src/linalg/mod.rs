@@ -67,10 +67,58 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
             let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
             let mut sums = [0.0; 4];
             for (a, b) in a.iter().zip(b) {
-                sums = std::array::from_fn(|lane| sums[lane] + a[lane] * b[lane]);
+                for lane in 0..4 {
+                    sums[lane] += a[lane] * b[lane];
+                }
             }
             let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
             (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+        },
+    )
+}
+
+/// [`dot`] of `a` with each of `others`, four at a time: the processor then waits for no sum. The values are those of
+/// [`dot`].
+pub(crate) fn dots<'a>(a: &[f64], others: impl IntoIterator<Item = &'a [f64]>) -> Vec<f64> {
+    let mut products = Vec::new();
+    let mut others = others.into_iter();
+    loop {
+        let four: [Option<&[f64]>; 4] = std::array::from_fn(|_| others.next());
+        if let [Some(b), Some(c), Some(d), Some(e)] = four {
+            products.extend(four_dots(a, [b, c, d, e]));
+            continue;
+        }
+        products.extend(four.into_iter().flatten().map(|b| dot(a, b)));
+        return products;
+    }
+}
+
+fn four_dots(a: &[f64], others: [&[f64]; 4]) -> [f64; 4] {
+    let n = a.len();
+    if others.iter().any(|b| b.len() < n) {
+        return others.map(|b| dot(a, b));
+    }
+    pulp::Arch::new().dispatch(
+        #[inline(always)]
+        || {
+            let (a, a_rest) = a.as_chunks::<4>();
+            let [b, c, d, e] = others.map(|b| b[..n].as_chunks::<4>().0);
+            let mut sums = [[0.0; 4]; 4];
+            for ((((a, b), c), d), e) in a.iter().zip(b).zip(c).zip(d).zip(e) {
+                for lane in 0..4 {
+                    sums[0][lane] += a[lane] * b[lane];
+                    sums[1][lane] += a[lane] * c[lane];
+                    sums[2][lane] += a[lane] * d[lane];
+                    sums[3][lane] += a[lane] * e[lane];
+                }
+            }
+            let mut products = [0.0; 4];
+            for ((product, sum), b) in products.iter_mut().zip(sums).zip(others) {
+                let b_rest = &b[n - a_rest.len()..n];
+                let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+                *product = (sum[0] + sum[1]) + (sum[2] + sum[3]) + rest;
+            }
+            products
         },
     )
 }
@@ -283,6 +331,19 @@ mod tests {
         assert_eq!(unknown, [true, true, false]);
         assert!((inverse[8] * 1e-8 - 1.0).abs() < 1e-9, "{inverse:?}");
         assert_eq!(solve_symmetric(&a, &[1.0, 0.0, 0.0]), None);
+    }
+
+    #[test]
+    fn products_four_at_a_time_are_the_same() {
+        let series = |seed: u64| -> Vec<f64> {
+            let each = (0..23_u64).map(|i| ((seed * 31 + i) as f64 * 0.7).sin());
+            each.collect()
+        };
+        let others: Vec<Vec<f64>> = (1..8).map(series).collect();
+        let a = series(0);
+        let products = dots(&a, others.iter().map(Vec::as_slice));
+        let one_by_one: Vec<f64> = others.iter().map(|b| dot(&a, b)).collect();
+        assert_eq!(products, one_by_one);
     }
 
     #[test]

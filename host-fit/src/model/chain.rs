@@ -2,9 +2,9 @@
 
 use super::{Added, Model};
 use crate::user_effect::{UserEffect, UserState};
-use model_core::Real;
-use model_core::effect::{Effect, Flow, Instant, Setting};
+use model_core::effect::{Effect, Flow, Instant, Place, Setting};
 use model_core::effects::{AnyEffect, AnyState};
+use model_core::{Real, pairs};
 
 /// An effect of the catalogue or a user's own.
 #[derive(Clone, Debug)]
@@ -43,8 +43,13 @@ impl<T: Real> HostEffect<T> {
     }
 }
 
-impl<T: Real> Effect<T> for HostEffect<T> {
-    type State = HostState<T>;
+impl<T: Real> HostEffect<T> {
+    fn place(&self) -> Place {
+        match self {
+            Self::Catalogue(effect) => effect.place(),
+            Self::User(effect) => effect.place(),
+        }
+    }
     fn start(&self) -> HostState<T> {
         match self {
             Self::Catalogue(effect) => HostState::Catalogue(effect.start()),
@@ -57,13 +62,6 @@ impl<T: Real> Effect<T> for HostEffect<T> {
             (Self::Catalogue(effect), HostState::Catalogue(state)) => effect.jet(state, jet, at),
             (Self::User(effect), HostState::User(state)) => effect.jet(state, jet, at),
             _ => jet,
-        }
-    }
-    #[inline(always)]
-    fn drives(&self) -> bool {
-        match self {
-            Self::Catalogue(effect) => effect.drives(),
-            Self::User(effect) => effect.drives(),
         }
     }
     #[inline(always)]
@@ -86,51 +84,74 @@ impl<T: Real> Effect<T> for HostEffect<T> {
     }
 }
 
-/// Effects applied one after the other.
+/// Effects applied one after the other, each at its place only: a sample then calls every effect once.
 #[derive(Clone, Debug)]
 pub struct Chain<T: Real> {
-    effects: Vec<HostEffect<T>>,
-    drives: bool,
+    jet: Vec<HostEffect<T>>,
+    flow: Vec<HostEffect<T>>,
+    sensor: Vec<HostEffect<T>>,
+}
+
+/// The states of a [`Chain`].
+#[derive(Clone, Debug)]
+pub struct ChainState<T: Real> {
+    jet: Vec<HostState<T>>,
+    flow: Vec<HostState<T>>,
+    sensor: Vec<HostState<T>>,
 }
 
 impl<T: Real> Chain<T> {
     pub(super) fn new(effects: Vec<HostEffect<T>>) -> Self {
-        Self {
-            drives: effects.iter().any(Effect::drives),
-            effects,
+        let (mut jet, mut flow, mut sensor) = (Vec::new(), Vec::new(), Vec::new());
+        for effect in effects {
+            match effect.place() {
+                Place::Jet => jet.push(effect),
+                Place::Flow => flow.push(effect),
+                Place::Sensor => sensor.push(effect),
+                // A delay law is no effect of the chain.
+                Place::Delay => {}
+            }
         }
+        Self { jet, flow, sensor }
     }
 }
 
 impl<T: Real> Effect<T> for Chain<T> {
-    type State = Vec<HostState<T>>;
-    fn start(&self) -> Self::State {
-        self.effects.iter().map(Effect::start).collect()
+    type State = ChainState<T>;
+    fn start(&self) -> ChainState<T> {
+        let start = |effects: &[HostEffect<T>]| effects.iter().map(HostEffect::start).collect();
+        ChainState {
+            jet: start(&self.jet),
+            flow: start(&self.flow),
+            sensor: start(&self.sensor),
+        }
     }
     #[inline(always)]
-    fn jet(&self, states: &mut Self::State, mut jet: T, at: &Instant<'_, T>) -> T {
-        for (effect, state) in self.effects.iter().zip(states) {
+    fn jet(&self, states: &mut ChainState<T>, mut jet: T, at: &Instant<'_, T>) -> T {
+        for (effect, state) in pairs(&self.jet, &mut states.jet) {
             jet = effect.jet(state, jet, at);
         }
         jet
     }
     #[inline(always)]
     fn drives(&self) -> bool {
-        self.drives
+        !self.flow.is_empty()
     }
     #[inline(always)]
-    fn drive(&self, states: &mut Self::State, flow: &Flow<T>, at: &Instant<'_, T>) -> T {
-        let mut sum = T::ZERO;
-        for (effect, state) in self.effects.iter().zip(states) {
-            if effect.drives() {
-                sum = sum + effect.drive(state, &flow.driven_by(sum), at);
-            }
+    fn drive(&self, states: &mut ChainState<T>, flow: &Flow<T>, at: &Instant<'_, T>) -> T {
+        let mut all = pairs(&self.flow, &mut states.flow);
+        let Some((first, state)) = all.next() else {
+            return T::ZERO;
+        };
+        let mut sum = first.drive(state, flow, at);
+        for (effect, state) in all {
+            sum = sum + effect.drive(state, &flow.driven_by(sum), at);
         }
         sum
     }
     #[inline(always)]
-    fn sense(&self, states: &mut Self::State, mut signal: T, at: &Instant<'_, T>) -> T {
-        for (effect, state) in self.effects.iter().zip(states) {
+    fn sense(&self, states: &mut ChainState<T>, mut signal: T, at: &Instant<'_, T>) -> T {
+        for (effect, state) in pairs(&self.sensor, &mut states.sensor) {
             signal = effect.sense(state, signal, at);
         }
         signal

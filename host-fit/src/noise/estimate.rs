@@ -1,7 +1,8 @@
 //! The noise model of given errors, by maximum likelihood.
 
-use super::{Colour, EFFECTS, NoiseModel, Series, random_effects, woodbury_of};
-use crate::linalg::dot;
+use super::colour::Deviations;
+use super::{Colour, EFFECTS, NoiseModel, Series, offset_and_drift, woodbury_of};
+use crate::linalg::{dot, dots};
 use rayon::prelude::*;
 
 /// Grid of shares of coloured noise.
@@ -12,6 +13,14 @@ const MEMORIES: [f64; 7] = [2.0, 5.0, 12.0, 30.0, 80.0, 200.0, 500.0];
 const FINEST: f64 = 0.05;
 /// Most EM iterations for the variances; the gains decrease.
 const ROUNDS: usize = 60;
+
+/// One record as all colours see it.
+struct Error<'a> {
+    series: &'a Series,
+    deviations: Deviations,
+    offset: Vec<f64>,
+    drift: Vec<f64>,
+}
 
 /// Sufficient statistics of one record under one colour.
 struct Summary {
@@ -67,6 +76,8 @@ impl NoiseModel {
     fn estimated(errors: &[Series], measured: bool, price: Price) -> Self {
         let least = if measured { 1.0 } else { 0.0 };
         let white = Colour::WHITE;
+        let errors: Vec<Error<'_>> = errors.iter().map(Error::of).collect();
+        let errors = errors.as_slice();
         let (mut colour, mut best) = (white, likelihood(errors, white, least, price));
         let coloured = coloured(errors, least, price);
         if coloured.1.log_likelihood > best.log_likelihood + price.colour {
@@ -84,7 +95,7 @@ impl NoiseModel {
 }
 
 /// The best colour by grid search with refinement.
-fn coloured(errors: &[Series], least: f64, price: Price) -> (Colour, Best) {
+fn coloured(errors: &[Error<'_>], least: f64, price: Price) -> (Colour, Best) {
     // Equal steps in the logit of the share and in ln of the correlation time.
     let colour = |[share, memory]: [f64; 2]| Colour {
         share: 1.0 / (1.0 + (-share).exp()),
@@ -123,7 +134,7 @@ fn coloured(errors: &[Series], least: f64, price: Price) -> (Colour, Best) {
 
 /// The log-likelihood under a colour, maximised over the scale and the variances of the random effects.
 /// Variances that gain less than half of ln(number of records) are set to 0.
-fn likelihood(errors: &[Series], colour: Colour, least: f64, price: Price) -> Best {
+fn likelihood(errors: &[Error<'_>], colour: Colour, least: f64, price: Price) -> Best {
     let summaries: Vec<Summary> = errors.iter().map(|e| Summary::of(e, colour)).collect();
     let mut kept = [false; EFFECTS];
     let mut best = maximised(&summaries, kept, least);
@@ -184,17 +195,37 @@ fn maximised(summaries: &[Summary], kept: [bool; EFFECTS], least: f64) -> Best {
     }
 }
 
+impl<'a> Error<'a> {
+    fn of(series: &'a Series) -> Self {
+        let [offset, drift] = offset_and_drift(series.run.len());
+        Self {
+            deviations: Deviations::of(&series.variance),
+            series,
+            offset,
+            drift,
+        }
+    }
+}
+
 impl Summary {
-    fn of(error: &Series, colour: Colour) -> Self {
-        let filter = colour.filter(&error.variance);
-        let effects = random_effects(&filter, &error.run);
-        let whitened = filter.whiten(&error.residual);
+    fn of(error: &Error<'_>, colour: Colour) -> Self {
+        let filter = colour.filter_of(&error.deviations);
+        let series = [
+            &error.offset,
+            &error.drift,
+            &error.series.run,
+            &error.series.residual,
+        ];
+        let [offset, drift, level, whitened] = filter.whiten_all(series.map(Vec::as_slice));
+        let columns = [&offset, &drift, &level, &whitened];
+        let rows = [&offset, &drift, &level];
+        let rows = rows.map(|row| dots(row, columns.map(Vec::as_slice)));
         Self {
             samples: whitened.len() as f64,
             log_determinant: filter.log_determinant(),
             square: dot(&whitened, &whitened),
-            products: std::array::from_fn(|i| dot(&effects[i], &whitened)),
-            gram: std::array::from_fn(|i| std::array::from_fn(|j| dot(&effects[i], &effects[j]))),
+            products: std::array::from_fn(|i| rows[i][EFFECTS]),
+            gram: std::array::from_fn(|i| std::array::from_fn(|j| rows[i][j])),
         }
     }
 
@@ -212,6 +243,7 @@ impl Summary {
 
     /// Posterior mean and variance of the record's random effects, and the expected sum of squares of the
     /// whitened ε.
+    #[allow(clippy::needless_range_loop, reason = "indices as in the equations")]
     fn posterior(
         &self,
         scale: f64,
@@ -219,19 +251,21 @@ impl Summary {
     ) -> ([f64; EFFECTS], [f64; EFFECTS], f64) {
         // Posterior covariance scale·L·Lᵀ of the effects.
         let (factor, _) = woodbury_of(&self.gram, variances.map(|v| v / scale));
-        let cell = |i: usize, j: usize| {
-            (0..EFFECTS)
-                .map(|k| factor[i][k] * factor[j][k])
-                .sum::<f64>()
-        };
-        let mean: [f64; EFFECTS] =
-            std::array::from_fn(|i| (0..EFFECTS).map(|j| cell(i, j) * self.products[j]).sum());
-        let spread = std::array::from_fn(|i| scale * cell(i, i));
+        let (mut cell, mut mean) = ([[0.0; EFFECTS]; EFFECTS], [0.0; EFFECTS]);
+        for i in 0..EFFECTS {
+            for j in 0..EFFECTS {
+                for k in 0..EFFECTS {
+                    cell[i][j] += factor[i][k] * factor[j][k];
+                }
+                mean[i] += cell[i][j] * self.products[j];
+            }
+        }
+        let spread = [scale * cell[0][0], scale * cell[1][1], scale * cell[2][2]];
         let mut rest = self.square;
         for i in 0..EFFECTS {
             rest -= 2.0 * mean[i] * self.products[i];
             for j in 0..EFFECTS {
-                rest += self.gram[i][j] * (mean[i] * mean[j] + scale * cell(i, j));
+                rest += self.gram[i][j] * (mean[i] * mean[j] + scale * cell[i][j]);
             }
         }
         (mean, spread, rest)

@@ -52,7 +52,8 @@ impl NoiseModel {
     #[must_use]
     pub fn metric(&self, variance: &[f64], run: &[f64]) -> Metric {
         let filter = self.colour.filter(variance);
-        let effects = random_effects(&filter, run);
+        let [offset, drift] = offset_and_drift(run.len());
+        let effects = filter.whiten_all([&offset, &drift, run]);
         let variances = [self.offset, self.drift, self.level].map(|v| v / self.scale);
         let (factor, log_determinant) = woodbury(&effects, variances);
         let samples = variance.len() as f64;
@@ -76,15 +77,12 @@ impl NoiseModel {
     }
 }
 
-/// Offset, drift and level as whitened columns.
-fn random_effects(filter: &Filter, run: &[f64]) -> [Vec<f64>; EFFECTS] {
-    let n = run.len();
+/// Offset and drift of a record of `n` samples.
+fn offset_and_drift(n: usize) -> [Vec<f64>; 2] {
     let last = n.saturating_sub(1).max(1) as f64;
-    let ramp: Vec<f64> = (0..n).map(|k| k as f64 / last - 0.5).collect();
     [
-        filter.whiten(&vec![1.0; n]),
-        filter.whiten(&ramp),
-        filter.whiten(run),
+        vec![1.0; n],
+        (0..n).map(|k| k as f64 / last - 0.5).collect(),
     ]
 }
 
@@ -99,36 +97,44 @@ fn woodbury(
 }
 
 /// The same from ZᵀZ, column by column: with C·Cᵀ = 1 + D^½ ZᵀZ D^½, L = D^½ C⁻ᵀ.
+#[allow(clippy::needless_range_loop, reason = "indices as in the equations")]
 fn woodbury_of(
     gram: &[[f64; EFFECTS]; EFFECTS],
     variances: [f64; EFFECTS],
 ) -> ([[f64; EFFECTS]; EFFECTS], f64) {
     let deviation = variances.map(|v| v.max(0.0).sqrt());
     let mut lower = [[0.0; EFFECTS]; EFFECTS];
+    let mut log_determinant = 0.0;
     for i in 0..EFFECTS {
         for j in 0..=i {
             let unit = if i == j { 1.0 } else { 0.0 };
-            let own = unit + deviation[i] * gram[i][j] * deviation[j];
-            let met: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
+            let mut rest = unit + deviation[i] * gram[i][j] * deviation[j];
+            for k in 0..j {
+                rest -= lower[i][k] * lower[j][k];
+            }
             lower[i][j] = if i == j {
-                (own - met).max(f64::MIN_POSITIVE).sqrt()
+                rest.max(f64::MIN_POSITIVE).sqrt()
             } else {
-                (own - met) / lower[j][j]
+                rest / lower[j][j]
             };
         }
+        log_determinant += 2.0 * lower[i][i].ln();
     }
-    let log_determinant = (0..EFFECTS).map(|i| 2.0 * lower[i][i].ln()).sum();
     // The columns of C⁻¹; L = D^½ C⁻ᵀ is the scaled transpose.
-    let columns: [[f64; EFFECTS]; EFFECTS] = std::array::from_fn(|column| {
-        let mut solved = [0.0; EFFECTS];
+    let mut factor = [[0.0; EFFECTS]; EFFECTS];
+    for column in 0..EFFECTS {
+        let solved = &mut factor[column];
         for i in column..EFFECTS {
-            let unit = if i == column { 1.0 } else { 0.0 };
-            let met = dot(&lower[i][column..i], &solved[column..i]);
-            solved[i] = (unit - met) / lower[i][i];
+            let mut rest = if i == column { 1.0 } else { 0.0 };
+            for k in column..i {
+                rest -= lower[i][k] * solved[k];
+            }
+            solved[i] = rest / lower[i][i];
         }
-        solved
-    });
-    let factor = std::array::from_fn(|i| columns[i].map(|x| deviation[i] * x));
+        for value in solved {
+            *value *= deviation[column];
+        }
+    }
     (factor, log_determinant)
 }
 

@@ -1,5 +1,6 @@
 //! Design of a control law and its trials in closed loop.
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::prepared::prepared;
@@ -333,7 +334,7 @@ pub fn passing_targets(
             reason,
         }
     };
-    (1..steps).map(verdict).collect()
+    (1..steps).into_par_iter().map(verdict).collect()
 }
 
 /// Placeholder type for runs without stress trials.

@@ -284,6 +284,13 @@ impl<T: Real> UserEffect<T> {
     }
 }
 
+impl<T: Real> UserEffect<T> {
+    /// Where it acts.
+    pub(crate) fn place(&self) -> Place {
+        self.place
+    }
+}
+
 impl<T: Real> Effect<T> for UserEffect<T> {
     type State = UserState<T>;
 

@@ -116,6 +116,46 @@ fn effects() -> impl Iterator<Item = &'static Spec> {
     SPECS.iter().filter(|spec| spec.place != Place::Delay)
 }
 
+/// A chain on the host calls an effect at the place on its card only.
+#[test]
+fn an_effect_acts_at_the_place_on_its_card_only() {
+    let flow = Flow {
+        now: 0.4,
+        before: 0.3,
+        next: 0.6,
+        relaxation: 0.02,
+        separated: 0.5,
+        released: 0.1,
+    };
+    let bases = super::NUISANCES.into_iter();
+    for spec in effects().chain(bases) {
+        let effect = AnyEffect::<f64>::new(spec.name, &middle(spec), &setting(0.001));
+        let effect = effect.expect("an effect of the catalogue");
+        assert_eq!(effect.place(), spec.place);
+        assert_eq!(
+            Effect::<f64>::drives(&effect),
+            spec.place == Place::Flow,
+            "{}",
+            spec.name
+        );
+        let mut state = effect.start();
+        for k in 0..500 {
+            let jet = f64::from(k / 100 % 2);
+            let at = instant(jet, &[11.0]);
+            let (shaped, drive, read) = (
+                effect.jet(&mut state, jet, &at),
+                effect.drive(&mut state, &flow, &at),
+                effect.sense(&mut state, 0.4, &at),
+            );
+            let acts = [shaped != jet, drive != 0.0, read != 0.4];
+            let places = [Place::Jet, Place::Flow, Place::Sensor];
+            for (acts, place) in acts.into_iter().zip(places) {
+                assert!(!acts || place == spec.place, "{}: {place:?}", spec.name);
+            }
+        }
+    }
+}
+
 #[test]
 fn single_precision_follows_double() {
     for spec in effects() {

@@ -139,6 +139,14 @@ macro_rules! catalogue {
                 })+
                 None
             }
+
+            /// The place on its card: it leaves the signals of the others unchanged.
+            #[must_use]
+            pub const fn place(&self) -> Place {
+                match self {
+                    $(Self::$effect(_) => <$type as Physics<T>>::SPEC.place,)+
+                }
+            }
         }
 
         impl<T: Real> Effect<T> for AnyEffect<T> {

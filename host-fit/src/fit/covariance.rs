@@ -10,7 +10,7 @@
 
 use super::levenberg::Part;
 use super::rules::RULES;
-use crate::linalg::{dot, inverse_where_known};
+use crate::linalg::{dot, dots, inverse_where_known};
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use std::ops::Range;
 
@@ -75,13 +75,16 @@ fn jackknife(parts: &[Part], information: &[f64], n: usize) -> Vec<f64> {
         .collect();
     let mut sums = vec![0.0; n];
     for (part, piece) in &groups {
-        let own = |cell: usize| {
-            let [i, j] = [cell / n, cell % n].map(|i| &part.jacobian[i][piece.clone()]);
-            dot(i, j)
-        };
-        let others: Vec<f64> = (0..n * n)
-            .map(|cell| information[cell] - own(cell))
-            .collect();
+        let mut others = information.to_vec();
+        for (i, column) in part.jacobian.iter().enumerate() {
+            let columns = part.jacobian[..=i].iter().map(|j| &j[piece.clone()]);
+            for (j, own) in dots(&column[piece.clone()], columns).iter().enumerate() {
+                others[i * n + j] -= own;
+                if i != j {
+                    others[j * n + i] -= own;
+                }
+            }
+        }
         let Some((inverse, unknown)) = inverse_where_known(&others, n) else {
             return vec![f64::NAN; n];
         };
@@ -102,11 +105,11 @@ fn jackknife(parts: &[Part], information: &[f64], n: usize) -> Vec<f64> {
 
 /// J·r summed over a piece.
 fn score(part: &Part, piece: &Range<usize>) -> Vec<f64> {
-    let residual = &part.residual[piece.clone()];
     let columns = part.jacobian.iter();
-    columns
-        .map(|column| dot(&column[piece.clone()], residual))
-        .collect()
+    dots(
+        &part.residual[piece.clone()],
+        columns.map(|column| &column[piece.clone()]),
+    )
 }
 
 /// About `count` equal pieces of `samples` samples.

@@ -287,7 +287,10 @@ impl<'a> FreeRunProblem<'a> {
             }
         }
         let mut y = Vec::with_capacity(signals.u.len());
-        let mut columns = vec![Vec::with_capacity(signals.u.len()); axes.len()];
+        // A clone of an empty vector has no room.
+        let mut columns: Vec<Vec<f64>> = (0..axes.len())
+            .map(|_| Vec::with_capacity(signals.u.len()))
+            .collect();
         let simulator = Simulator::with_values(self.model, &duals, self.rounding);
         let left = simulator.run(
             signals,
@@ -418,7 +421,10 @@ pub fn sensitivities(
         for (slot, index) in chunk.iter().enumerate() {
             duals[*index] = Dual::parameter(values[*index], slot);
         }
-        let mut own = vec![Vec::with_capacity(record.len()); chunk.len()];
+        // A clone of an empty vector has no room.
+        let mut own: Vec<Vec<f64>> = (0..chunk.len())
+            .map(|_| Vec::with_capacity(record.len()))
+            .collect();
         run.clear();
         let simulator = Simulator::with_values(model, &duals, Rounding::None);
         let left = simulator.run(&signals, |_, output: &Output<Dual<FEW>>| {

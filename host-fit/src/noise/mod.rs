@@ -12,7 +12,7 @@ mod estimate;
 
 pub use colour::{Colour, Filter};
 
-use crate::linalg::dot;
+use crate::linalg::{dot, dots};
 
 /// Random effects of a record: offset, drift, level.
 const EFFECTS: usize = 3;
@@ -194,8 +194,19 @@ impl Whitened {
     /// The inner product xᵀ Σ⁻¹ y.
     #[must_use]
     pub fn dot(&self, other: &Self) -> f64 {
-        let along: f64 = (0..EFFECTS).map(|i| self.along[i] * other.along[i]).sum();
-        dot(&self.series, &other.series) - along
+        dot(&self.series, &other.series) - self.along(other)
+    }
+
+    /// [`dot`](Self::dot) with each of `others`.
+    pub(crate) fn dots(&self, others: &[Self]) -> Vec<f64> {
+        let products = dots(&self.series, others.iter().map(|other| &*other.series));
+        let each = products.into_iter().zip(others);
+        each.map(|(product, other)| product - self.along(other))
+            .collect()
+    }
+
+    fn along(&self, other: &Self) -> f64 {
+        (0..EFFECTS).map(|i| self.along[i] * other.along[i]).sum()
     }
 }
 

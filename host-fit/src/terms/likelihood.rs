@@ -129,13 +129,19 @@ pub(super) fn normal_equations(
         let (run, columns) = sensitivities(model, record, free)?;
         let whitened = columns.iter().map(|c| metric.whiten(scored(record, c)));
         let columns: Vec<Whitened> = whitened.collect();
-        let information = (0..n * n).map(|at| columns[at / n].dot(&columns[at % n]));
+        let mut information = vec![0.0; n * n];
+        for (i, column) in columns.iter().enumerate() {
+            for (j, product) in column.dots(&columns[..=i]).into_iter().enumerate() {
+                information[i * n + j] = product;
+                information[j * n + i] = product;
+            }
+        }
         let residual = residual(record, &run);
         let own = metric.whiten(&residual);
         Some(NormalEquations {
             log_likelihood: metric.log_likelihood(&residual),
-            gradient: columns.iter().map(|column| column.dot(&own)).collect(),
-            information: information.collect(),
+            gradient: own.dots(&columns),
+            information,
         })
     });
     let each: Vec<NormalEquations> = each.collect::<Option<_>>()?;

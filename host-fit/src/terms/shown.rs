@@ -4,7 +4,7 @@ use super::screen::Screen;
 use super::table::Table;
 use super::term::Term;
 use crate::fit::Known;
-use crate::linalg::dot;
+use crate::linalg::{dot, dots};
 use crate::model::Model;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -54,17 +54,16 @@ impl Unnamed {
         while let Some(path) = paths.pop() {
             columns.remove(path);
         }
-        let product =
-            |i: usize, j: usize| dot(&columns[i][..screen.learned], &columns[j][..screen.learned]);
-        let all = 0..columns.len();
-        let products = all
-            .clone()
-            .into_par_iter()
-            .map(|i| all.clone().map(|j| product(i, j)).collect());
-        Self {
-            products: products.collect(),
-            columns,
+        let learned = |i: usize| &columns[i][..screen.learned];
+        let lower = (0..columns.len()).into_par_iter();
+        let mut products: Vec<Vec<f64>> = lower
+            .map(|i| dots(learned(i), (0..=i).map(learned)))
+            .collect();
+        for i in 0..products.len() {
+            let upper: Vec<f64> = products[i + 1..].iter().map(|row| row[i]).collect();
+            products[i].extend(upper);
         }
+        Self { products, columns }
     }
 }
 

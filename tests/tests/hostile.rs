@@ -367,16 +367,19 @@ fn ctrl_c_ends_every_command() {
     ];
     for command in commands {
         for after in [0.1, 1.0] {
+            let said = fs::File::create(room.path("said.json")).expect("a file");
             // Behind a `&` of a shell the signal is ignored until the program asks for it, and one before that is lost.
             let child = Command::new("env")
                 .arg("--default-signal=INT")
                 .arg(program())
                 .args(command)
-                .stdout(Stdio::null())
+                .arg("--json")
+                .stdout(said)
                 .stderr(Stdio::null())
                 .spawn();
             let mut child = child.expect("the program starts");
             std::thread::sleep(Duration::from_secs_f64(after));
+            let works = child.try_wait().expect("a child").is_none();
             // It may have ended by itself.
             let _ = Command::new("kill")
                 .args(["-INT", &child.id().to_string()])
@@ -389,6 +392,11 @@ fn ctrl_c_ends_every_command() {
                     panic!("{command:?} goes on after {after} s");
                 }
                 std::thread::sleep(Duration::from_millis(10));
+            }
+            // What it has found so far may be a result, and says so.
+            if works && child.wait().expect("a child").success() {
+                let said = fs::read_to_string(room.path("said.json")).expect("an answer");
+                assert!(said.contains("interrupted"), "{command:?} after {after} s");
             }
             let names = fs::read_dir(room.0.path()).expect("a folder").flatten();
             let names: Vec<String> = names

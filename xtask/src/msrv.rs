@@ -7,7 +7,7 @@ use crate::shell::{command, root, run, target};
 
 pub(crate) const TASK: Task = Task {
     name: "msrv",
-    does: "checks the workspace with the compiler of `rust-version`, where rustup can get it",
+    does: "checks what is published with the compiler of `rust-version`, where rustup can get it",
     run: |_| msrv(),
 };
 

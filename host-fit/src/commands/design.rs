@@ -276,10 +276,7 @@ impl Args {
         let proof = steps::try_out(&design, &possible, &stress, self.seed);
         let lost = proof.lost();
         let targets = match (&request, &design.outcome) {
-            // Who forces a law has chosen the target.
-            (DesignRequest::Track(request), DesignOutcome::Track(track))
-                if !lost.is_empty() && !self.force =>
-            {
+            (DesignRequest::Track(request), DesignOutcome::Track(track)) if !lost.is_empty() => {
                 steps::passing_targets(model, request, track.reachable, &possible, self.seed)
             }
             _ => Vec::new(),

@@ -9,7 +9,7 @@
 use super::plant::{Plant, Switching};
 use super::spread::mean;
 use crate::data::Record;
-use crate::linalg::{dot, dots, solve_symmetric};
+use crate::linalg::{dot, dots, gram, solve_symmetric};
 
 /// Most samples for the grid search; longer records are decimated.
 const COARSE_SAMPLES: usize = 2_000;
@@ -385,18 +385,16 @@ pub(crate) fn refine(
             );
         }
         let flat: Vec<f64> = at.residuals.iter().flatten().copied().collect();
-        let gram: Vec<f64> = columns
-            .iter()
-            .flat_map(|a| dots(a, columns.iter().map(Vec::as_slice)))
-            .collect();
-        let right: Vec<f64> = columns.iter().map(|c| dot(c, &flat)).collect();
-        inverse = invert(&gram, size);
+        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        let right = dots(&flat, columns.iter().copied());
+        let products = gram(&columns);
+        inverse = invert(&products, size);
         if step + 1 == STEPS {
             break;
         }
         let mut improved = false;
         for _ in 0..8 {
-            let mut damped = gram.clone();
+            let mut damped = products.clone();
             damped
                 .iter_mut()
                 .step_by(size + 1)

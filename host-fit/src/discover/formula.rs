@@ -1,6 +1,6 @@
 //! Standard functions to replace a fitted curve.
 
-use crate::linalg::{dot, solve_symmetric};
+use crate::linalg::{dot, gram, solve_symmetric};
 
 /// Dimension of a parameter of a form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -297,9 +297,7 @@ impl Form {
         }
         let target: Vec<f64> = g.iter().zip(weights).map(|(g, w)| g * w).collect();
         let n = columns.len();
-        let mut products: Vec<f64> = (0..n * n)
-            .map(|cell| dot(&columns[cell / n], &columns[cell % n]))
-            .collect();
+        let mut products = gram(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>());
         (0..n).for_each(|i| products[i * n + i] *= 1.0 + 1e-9);
         let right: Vec<f64> = columns.iter().map(|column| dot(column, &target)).collect();
         let scale = solve_symmetric(&products, &right)?;

@@ -10,7 +10,7 @@
 
 use super::levenberg::Part;
 use super::rules::RULES;
-use crate::linalg::{dot, dots, inverse_where_known};
+use crate::linalg::{dot, dots, gram, inverse_where_known};
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use std::ops::Range;
 
@@ -75,16 +75,9 @@ fn jackknife(parts: &[Part], information: &[f64], n: usize) -> Vec<f64> {
         .collect();
     let mut sums = vec![0.0; n];
     for (part, piece) in &groups {
-        let mut others = information.to_vec();
-        for (i, column) in part.jacobian.iter().enumerate() {
-            let columns = part.jacobian[..=i].iter().map(|j| &j[piece.clone()]);
-            for (j, own) in dots(&column[piece.clone()], columns).iter().enumerate() {
-                others[i * n + j] -= own;
-                if i != j {
-                    others[j * n + i] -= own;
-                }
-            }
-        }
+        let columns = part.jacobian.iter().map(|column| &column[piece.clone()]);
+        let own = gram(&columns.collect::<Vec<_>>());
+        let others: Vec<f64> = information.iter().zip(own).map(|(a, b)| a - b).collect();
         let Some((inverse, unknown)) = inverse_where_known(&others, n) else {
             return vec![f64::NAN; n];
         };

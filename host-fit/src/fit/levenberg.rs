@@ -5,7 +5,7 @@
 //! that parts run in parallel and a cost that is too high is abandoned early.
 
 use super::rules::RULES;
-use crate::linalg::{dots, solve_symmetric};
+use crate::linalg::{dots, gram, solve_symmetric};
 
 // These constants change the number of iterations, not the minimum, and are therefore no rules.
 
@@ -189,17 +189,12 @@ fn normal_equations(parts: &[Part], n: usize) -> (Vec<f64>, Vec<f64>) {
     let mut information = vec![0.0; n * n];
     let mut gradient = vec![0.0; n];
     for part in parts {
-        for i in 0..n {
-            let columns = part.jacobian[..=i].iter().chain([&part.residual]);
-            let sums = dots(&part.jacobian[i], columns.map(Vec::as_slice));
-            for (j, sum) in sums[..=i].iter().enumerate() {
-                information[i * n + j] += sum;
-                if i != j {
-                    information[j * n + i] += sum;
-                }
-            }
-            gradient[i] += sums[i + 1];
-        }
+        let columns: Vec<&[f64]> = part.jacobian.iter().map(Vec::as_slice).collect();
+        let add = |sum: &mut [f64], own: Vec<f64>| {
+            sum.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+        };
+        add(&mut information, gram(&columns));
+        add(&mut gradient, dots(&part.residual, columns));
     }
     (information, gradient)
 }

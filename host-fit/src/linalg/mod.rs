@@ -93,6 +93,22 @@ pub(crate) fn dots<'a>(a: &[f64], others: impl IntoIterator<Item = &'a [f64]>) -
     }
 }
 
+/// AᵀA from the columns of A, row-major, with the values of [`dot`].
+pub(crate) fn gram(columns: &[&[f64]]) -> Vec<f64> {
+    let n = columns.len();
+    let mut gram = vec![0.0; n * n];
+    for (i, column) in columns.iter().enumerate() {
+        for (j, product) in dots(column, columns[..=i].iter().copied())
+            .into_iter()
+            .enumerate()
+        {
+            gram[i * n + j] = product;
+            gram[j * n + i] = product;
+        }
+    }
+    gram
+}
+
 fn four_dots(a: &[f64], others: [&[f64]; 4]) -> [f64; 4] {
     let n = a.len();
     if others.iter().any(|b| b.len() < n) {
@@ -344,6 +360,10 @@ mod tests {
         let products = dots(&a, others.iter().map(Vec::as_slice));
         let one_by_one: Vec<f64> = others.iter().map(|b| dot(&a, b)).collect();
         assert_eq!(products, one_by_one);
+        let columns: Vec<&[f64]> = others.iter().map(Vec::as_slice).collect();
+        for (cell, product) in gram(&columns).into_iter().enumerate() {
+            assert_eq!(product, dot(columns[cell / 7], columns[cell % 7]));
+        }
     }
 
     #[test]

@@ -41,9 +41,7 @@ impl<T: Real> HostEffect<T> {
         }
         AnyEffect::new(&added.name, parameters, setting).map(Self::Catalogue)
     }
-}
 
-impl<T: Real> HostEffect<T> {
     fn place(&self) -> Place {
         match self {
             Self::Catalogue(effect) => effect.place(),

@@ -15,7 +15,7 @@ mod prepared;
 mod rules;
 mod seed;
 
-pub use chain::{Chain, HostEffect, HostState};
+pub use chain::{Chain, ChainState, HostEffect, HostState};
 pub use command::CommandRange;
 pub use delay::{Delay, TransportLaw};
 pub use file::{FORMAT_VERSION, ModelError};

@@ -15,7 +15,7 @@ const FINEST: f64 = 0.05;
 const ROUNDS: usize = 60;
 
 /// One record as all colours see it.
-struct Error<'a> {
+struct Prepared<'a> {
     series: &'a Series,
     deviations: Deviations,
     offset: Vec<f64>,
@@ -76,7 +76,7 @@ impl NoiseModel {
     fn estimated(errors: &[Series], measured: bool, price: Price) -> Self {
         let least = if measured { 1.0 } else { 0.0 };
         let white = Colour::WHITE;
-        let errors: Vec<Error<'_>> = errors.iter().map(Error::of).collect();
+        let errors: Vec<Prepared<'_>> = errors.iter().map(Prepared::of).collect();
         let errors = errors.as_slice();
         let (mut colour, mut best) = (white, likelihood(errors, white, least, price));
         let coloured = coloured(errors, least, price);
@@ -95,7 +95,7 @@ impl NoiseModel {
 }
 
 /// The best colour by grid search with refinement.
-fn coloured(errors: &[Error<'_>], least: f64, price: Price) -> (Colour, Best) {
+fn coloured(errors: &[Prepared<'_>], least: f64, price: Price) -> (Colour, Best) {
     // Equal steps in the logit of the share and in ln of the correlation time.
     let colour = |[share, memory]: [f64; 2]| Colour {
         share: 1.0 / (1.0 + (-share).exp()),
@@ -134,7 +134,7 @@ fn coloured(errors: &[Error<'_>], least: f64, price: Price) -> (Colour, Best) {
 
 /// The log-likelihood under a colour, maximised over the scale and the variances of the random effects.
 /// Variances that gain less than half of ln(number of records) are set to 0.
-fn likelihood(errors: &[Error<'_>], colour: Colour, least: f64, price: Price) -> Best {
+fn likelihood(errors: &[Prepared<'_>], colour: Colour, least: f64, price: Price) -> Best {
     let summaries: Vec<Summary> = errors.iter().map(|e| Summary::of(e, colour)).collect();
     let mut kept = [false; EFFECTS];
     let mut best = maximised(&summaries, kept, least);
@@ -195,7 +195,7 @@ fn maximised(summaries: &[Summary], kept: [bool; EFFECTS], least: f64) -> Best {
     }
 }
 
-impl<'a> Error<'a> {
+impl<'a> Prepared<'a> {
     fn of(series: &'a Series) -> Self {
         let [offset, drift] = offset_and_drift(series.run.len());
         Self {
@@ -208,7 +208,7 @@ impl<'a> Error<'a> {
 }
 
 impl Summary {
-    fn of(error: &Error<'_>, colour: Colour) -> Self {
+    fn of(error: &Prepared<'_>, colour: Colour) -> Self {
         let filter = colour.filter_of(&error.deviations);
         let series = [
             &error.offset,

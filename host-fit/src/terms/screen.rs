@@ -15,7 +15,7 @@ use super::judge::Judge;
 use super::term::Term;
 use crate::data::Record;
 use crate::fit::{channel_reference, sensitivities};
-use crate::linalg::{dot, dots, solve_symmetric};
+use crate::linalg::{dot, gram, solve_symmetric};
 use crate::model::{Delay, Model};
 use model_core::effect::Spec;
 use rayon::prelude::*;
@@ -291,9 +291,8 @@ impl<'a> Screen<'a> {
     /// Gram matrix of columns over the estimation samples, with a ridge as a share of their mean square.
     pub(super) fn square(&self, columns: &[&[f64]], ridge: f64) -> Vec<f64> {
         let n = columns.len();
-        let learned = |i: usize| &columns[i][..self.learned];
-        let rows = (0..n).flat_map(|i| dots(learned(i), (0..n).map(learned)));
-        let mut products: Vec<f64> = rows.collect();
+        let learned: Vec<&[f64]> = columns.iter().map(|c| &c[..self.learned]).collect();
+        let mut products = gram(&learned);
         let mean = (0..n).map(|i| products[i * n + i]).sum::<f64>() / n.max(1) as f64;
         for i in 0..n {
             products[i * n + i] *= 1.0 + 1e-9;

@@ -186,9 +186,9 @@ impl Beginning {
     }
 
     /// Takes rests that are too short to be sure of for what they are: where records rest at different levels under the
-    /// same command, something is still on its way. Those that show less than a motion takes begin in mid-run then,
-    /// unless three of them, and more than half of all, rest at their level as far as noise lets it be known: two may
-    /// agree by chance.
+    /// same command, or one rests elsewhere than the response to its command ends, something is still on its way. Those
+    /// that show less than a motion takes begin in mid-run then, unless three of them, and more than half of all, rest at
+    /// their level as far as noise lets it be known: two may agree by chance.
     pub(super) fn reconcile(beginnings: &mut [Self], records: &[Record], reference: &FirstOrder) {
         let rests: Vec<Option<(f64, Rest)>> = records
             .iter()
@@ -213,7 +213,11 @@ impl Beginning {
             let alike = same.iter().filter(|other| rest.is_at_level_of(other));
             let alike = alike.count();
             let with_most = alike >= 3 && 2 * alike > same.len();
-            if (own.rest as f64) < enough && highest - lowest > apart && !with_most {
+            // Three times the rms that the reference leaves: it describes no flow exactly.
+            let from_end = (rest.level - reference.at_rest(*command)).abs();
+            let is_elsewhere = from_end > apart + 3.0 * reference.left_rms;
+            let on_its_way = highest - lowest > apart || is_elsewhere;
+            if (own.rest as f64) < enough && on_its_way && !with_most {
                 let (dead_time, time) = (reference.dead_time, reference.time_constant);
                 *own = Self::in_mid_run(record, own.command, dead_time, time);
             }
@@ -280,4 +284,45 @@ impl Beginning {
 pub(super) fn range_of_y(records: &[Record]) -> f64 {
     let all = || records.iter().flat_map(|r| r.y.iter().copied());
     all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Use;
+
+    /// The response of a first order with a dead time of 10 and a time constant of 30 samples to `u`, which was 0 before.
+    fn response(u: &[f64]) -> Vec<f64> {
+        let mut y = vec![0.0; u.len()];
+        for k in 1..u.len() {
+            let now = if k > 10 { u[k - 11] } else { 0.0 };
+            y[k] = y[k - 1] + (now - y[k - 1]) / 30.0;
+        }
+        y
+    }
+
+    #[test]
+    fn what_falls_and_rises_again_does_not_rest() {
+        let mut command: Vec<f64> = (0..900)
+            .map(|k| f64::from(u8::from(k % 150 > 60)))
+            .collect();
+        // A pause of 12 samples ends 5 samples before the cut: y falls for six samples more, then rises.
+        command[400..412].fill(0.0);
+        command[300..400].fill(1.0);
+        command[412..432].fill(1.0);
+        let y = response(&command);
+        let part = |from: usize, to: usize| {
+            let (u, y) = (command[from..to].to_vec(), y[from..to].to_vec());
+            Record::new("part", Use::Identify, 0.001, u, y)
+        };
+        let records = [part(0, 417), part(417, 900)];
+        let reference = FirstOrder::fitted(&records).unwrap();
+        let mut beginnings: Vec<Beginning> = records
+            .iter()
+            .map(|record| Beginning::of(record, &records, Some(&reference)))
+            .collect();
+        Beginning::reconcile(&mut beginnings, &records, &reference);
+        assert!(beginnings[0].rests_at(0.0), "{beginnings:?}");
+        assert!(beginnings[1].follow > 0, "{beginnings:?}");
+    }
 }

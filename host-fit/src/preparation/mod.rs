@@ -20,7 +20,7 @@ use crate::baseline::Baselines;
 use crate::data::{Record, Use};
 use crate::model::CommandRange;
 use beginning::Beginning;
-use smoothing::{half_width, smoothed};
+use smoothing::{Slow, slow_part, smoothed};
 use std::fmt::Write as _;
 
 /// Records made ready, and what that found.
@@ -115,8 +115,8 @@ impl Preparation {
 }
 
 /// Sets the output from which free runs start in records that begin in mid-run: the response of a second order with dead
-/// time whose initial state is fitted to the start of the record, plus the smoothed residual of y against that response
-/// (theory 1.5). Single samples are too noisy to give the slope of y, and smoothing y itself would be biased after edges.
+/// time whose initial state is fitted to the start of the record, plus the slow part of the residual of y against that
+/// response, where it has one (theory 1.5). Single samples are too noisy to give the slope of y, and smoothing y itself would be biased after edges.
 fn follow(records: &mut [Record], beginnings: &[Beginning]) {
     if beginnings.iter().all(|own| own.follow == 0) {
         return;
@@ -135,10 +135,17 @@ fn follow(records: &mut [Record], beginnings: &[Beginning]) {
         // During the first dead time y answers commands that were not recorded, so the response is not valid there.
         let answered = second.map_or(0.0, |second| second.dead_time_s / record.sample_period_s);
         let from = (answered.ceil() as usize + 1).min(follow / 2);
-        let half = half_width(&left[from..], 0..follow - from).min((follow - from) / 2);
+        let slow = slow_part(&left[from..], 0..follow - from);
+        let half = match slow {
+            Slow::Nothing => 0,
+            Slow::Parabola(half) => half.min((follow - from) / 2),
+        };
         // The smoothed value of the last followed sample uses `half` samples after it; those are not scored either.
         let follow = follow - half;
-        let answered = (from..follow).map(|k| run[k] + smoothed(&left[from..], k - from, half));
+        let answered = (from..follow).map(|k| match slow {
+            Slow::Nothing => run[k],
+            Slow::Parabola(_) => run[k] + smoothed(&left[from..], k - from, half),
+        });
         record.followed.truncate(from);
         record.followed.extend(answered);
         record.lead = record.lead.max(follow + half);

@@ -49,9 +49,18 @@ pub(super) fn smoothed(y: &[f64], at: usize, half: usize) -> f64 {
     parabola.map_or(own, |parabola| parabola.value)
 }
 
-/// Half-width, samples, by leave-one-out cross-validation over the samples `range` of `y`: the widest whose error is
-/// within one standard error of the smallest. At most the length of the range; 0 if `y` is too short.
-pub(super) fn half_width(y: &[f64], range: Range<usize>) -> usize {
+/// What describes the slow part of a residual best.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Slow {
+    /// It is noise: 0.
+    Nothing,
+    /// A parabola over so many samples on both sides; 0 is the residual itself.
+    Parabola(usize),
+}
+
+/// The slow part of `y`, by leave-one-out cross-validation over the samples `range`: nothing, or the widest parabola whose
+/// error is within one standard error of the smallest. Half-widths are at most the length of the range.
+pub(super) fn slow_part(y: &[f64], range: Range<usize>) -> Slow {
     let errors = |half: usize| -> Option<Vec<f64>> {
         let each = range.clone().map(|at| {
             let parabola = Parabola::of(y, at, half)?;
@@ -60,20 +69,24 @@ pub(super) fn half_width(y: &[f64], range: Range<usize>) -> usize {
         each.collect()
     };
     let tried = HALVES.into_iter().filter(|half| *half <= range.len());
-    let tried: Vec<(usize, Vec<f64>)> = tried
-        .filter_map(|half| Some((half, errors(half)?)))
-        .collect();
+    let parabolas = tried.filter_map(|half| Some((Slow::Parabola(half), errors(half)?)));
+    let mut tried: Vec<(Slow, Vec<f64>)> = parabolas.collect();
+    if tried.is_empty() {
+        return Slow::Parabola(0);
+    }
+    let alone = y.iter().take(range.end).skip(range.start);
+    tried.push((Slow::Nothing, alone.map(|y| y * y).collect()));
     let sum = |errors: &[f64]| errors.iter().sum::<f64>();
     let Some((_, least)) = tried.iter().min_by(|a, b| sum(&a.1).total_cmp(&sum(&b.1))) else {
-        return 0;
+        return Slow::Parabola(0);
     };
     let as_good = |errors: &[f64]| {
         let more = errors.iter().zip(least).map(|(own, least)| own - least);
         let square: f64 = more.clone().map(|more| more * more).sum();
         more.sum::<f64>() <= square.sqrt()
     };
-    let widest = tried.iter().rev().find(|(_, errors)| as_good(errors));
-    widest.map_or(0, |(half, _)| *half)
+    let simplest = tried.iter().rev().find(|(_, errors)| as_good(errors));
+    simplest.map_or(Slow::Parabola(0), |(slow, _)| *slow)
 }
 
 #[cfg(test)]
@@ -104,8 +117,10 @@ mod tests {
     #[test]
     fn the_slope_of_a_slow_signal_is_known_better_than_from_two_samples() {
         let y: Vec<f64> = (0..200).map(|k| 0.01 * k as f64 + noise(k)).collect();
-        let half = half_width(&y, 0..60);
-        assert!(half >= 16, "{half}");
+        let found = slow_part(&y, 0..60);
+        let Slow::Parabola(half @ 16..) = found else {
+            panic!("{found:?}");
+        };
         let slope = |half: usize| smoothed(&y, 60, half) - smoothed(&y, 59, half);
         assert!((slope(half) - 0.01).abs() < 0.02, "{}", slope(half));
         assert!((slope(0) - 0.01).abs() > 0.1);
@@ -116,8 +131,15 @@ mod tests {
         let y: Vec<f64> = (0..200)
             .map(|k| (0.4 * k as f64).sin() + 0.01 * noise(k))
             .collect();
-        assert!(half_width(&y, 0..60) <= 4);
-        assert_eq!(half_width(&y[..4], 0..4), 0);
-        assert_eq!(half_width(&y, 0..1), 0);
+        let found = slow_part(&y, 0..60);
+        assert!(matches!(found, Slow::Parabola(..=4)), "{found:?}");
+        assert_eq!(slow_part(&y[..4], 0..4), Slow::Parabola(0));
+        assert_eq!(slow_part(&y, 0..1), Slow::Parabola(0));
+    }
+
+    #[test]
+    fn noise_has_no_slow_part() {
+        let y: Vec<f64> = (0..200).map(noise).collect();
+        assert_eq!(slow_part(&y, 0..60), Slow::Nothing);
     }
 }

@@ -230,7 +230,7 @@ fn plain_enough(found: &Found) -> Option<Hypothesis> {
     let plain = found.all.iter().filter(is_plain);
     let plain = plain.min_by(|a, b| a.score().total_cmp(&b.score()))?;
     let best = &found.best;
-    let told = p_value(&plain.judged.held_out, &best.judged.held_out) <= RULES.level;
+    let told = p_value(&plain.judged.held_out, &best.judged.held_out) <= RULES.law_level;
     let near = plain.score() < best.score() + RULES.linear_better;
     (near && !told && !is_plain(&best)).then(|| plain.clone())
 }

@@ -80,7 +80,8 @@ rules! {
     settling_frame: f64 = 0.25, "share of each variable's range", "judgement: the start is near";
     /// A delay law whose delay varies by less than this over the levels of the records is a constant delay.
     least_rise: f64 = 1.0, "samples", "what rounding to samples hides";
-    /// A delay law is also a constant delay if the test at this level does not distinguish them.
+    /// A delay law is also a constant delay, and longer lags a first or second order, if the test at this level does not
+    /// distinguish them.
     law_level: f64 = 0.01, "p-value", "convention: 1 % of constant delays get a law";
 
     /// Grid points along the range of a parameter if one, two, or more parameters of the effect are free.

@@ -188,7 +188,7 @@ impl Beginning {
     /// Takes rests that are too short to be sure of for what they are: where records rest at different levels under the
     /// same command, or one rests elsewhere than the response to its command ends, something is still on its way. Those
     /// that show less than a motion takes begin in mid-run then, unless three of them, and more than half of all, rest at
-    /// their level as far as noise lets it be known: two may agree by chance.
+    /// the level of their middle one as far as noise lets it be known: two may agree by chance.
     pub(super) fn reconcile(beginnings: &mut [Self], records: &[Record], reference: &FirstOrder) {
         let rests: Vec<Option<(f64, Rest)>> = records
             .iter()
@@ -206,17 +206,20 @@ impl Beginning {
             };
             let same = rests.iter().flatten();
             let same = same.filter(|(other, _)| other == command);
-            let same: Vec<&Rest> = same.map(|(_, rest)| rest).collect();
-            let levels = || same.iter().map(|rest| rest.level);
-            let highest = levels().fold(f64::NEG_INFINITY, f64::max);
-            let lowest = levels().fold(f64::INFINITY, f64::min);
-            let alike = same.iter().filter(|other| rest.is_at_level_of(other));
+            let mut same: Vec<&Rest> = same.map(|(_, rest)| rest).collect();
+            same.sort_by(|a, b| a.level.total_cmp(&b.level));
+            let (Some(lowest), Some(highest)) = (same.first(), same.last()) else {
+                continue;
+            };
+            // Pairs would differ by chance the more often the more records there are; few differ from their middle one.
+            let middle = same[(same.len() - 1) / 2];
+            let alike = same.iter().filter(|other| other.is_at_level_of(middle));
             let alike = alike.count();
-            let with_most = alike >= 3 && 2 * alike > same.len();
+            let with_most = rest.is_at_level_of(middle) && alike >= 3 && 2 * alike > same.len();
             // Three times the rms that the reference leaves: it describes no flow exactly.
             let from_end = (rest.level - reference.at_rest(*command)).abs();
             let is_elsewhere = from_end > apart + 3.0 * reference.left_rms;
-            let on_its_way = highest - lowest > apart || is_elsewhere;
+            let on_its_way = highest.level - lowest.level > apart || is_elsewhere;
             if (own.rest as f64) < enough && on_its_way && !with_most {
                 let (dead_time, time) = (reference.dead_time, reference.time_constant);
                 *own = Self::in_mid_run(record, own.command, dead_time, time);

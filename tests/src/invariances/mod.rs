@@ -6,12 +6,15 @@
 //! | y → a·y + b, \|b\| up to 100 × the range | the same, errors times \|a\| |
 //! | u → α·u + β, also inverted | the same |
 //! | t → c·t, 0.1 ms to 60 s a sample | the same in samples |
-//! | rest added in front | the same within the scatter |
-//! | records cut anywhere, or joined | the same within the scatter |
+//! | rest added in front | the same within the scatter, or a near tie |
+//! | records cut anywhere, or joined | the same within the scatter, or a near tie |
 //! | records reordered, or renamed | the same to the last digit |
 //!
 //! The answer is verdict and names of `diagnose`, structure and delay of the model, FIT, error and poles, and the delays
 //! that `delay` measures.
+//!
+//! A near tie are two models of different structure of which each describes the other's records as well as the other does,
+//! within 2 % of the error: records with other samples may prefer either. Near ties are counted beside what is broken.
 
 mod change;
 mod records;
@@ -21,8 +24,9 @@ pub use change::Change;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use said::{Said, broken};
+use said::{Said, broken, is_near_tie};
 use serde::Serialize;
+use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -72,26 +76,31 @@ pub struct Outcome {
     pub tried: Vec<(Change, u64)>,
     /// Those that made a difference, in the order of seeds.
     pub broken: Vec<Broken>,
+    /// Those after which another structure describes all records equally well.
+    pub near_ties: Vec<Broken>,
 }
 
 impl Outcome {
-    /// A line for each change: how often it held, and each that broke below it.
+    /// A line for each change: how often it broke and ended in a near tie; each of these below it.
     #[must_use]
     pub fn table(&self) -> String {
-        let mut text = String::from("| change | broken |\n|---|---|\n");
+        let mut text = String::from("| change | broken | near ties |\n|---|---|---|\n");
         for (change, cases) in &self.tried {
-            let count = self.broken.iter().filter(|b| b.change == *change).count();
-            text += &format!("| {} | {count} of {cases} |\n", change.words());
+            let count = |list: &[Broken]| list.iter().filter(|b| b.change == *change).count();
+            let (broken, ties) = (count(&self.broken), count(&self.near_ties));
+            text += &format!("| {} | {broken} of {cases} | {ties} |\n", change.words());
         }
-        for broken in &self.broken {
-            let Broken {
-                change,
-                seed,
-                rig,
-                differs,
-            } = broken;
-            let differs = differs.join("; ");
-            text += &format!("- {}, seed {seed}, {rig}: {differs}\n", change.words());
+        for (words, list) in [("broken", &self.broken), ("near tie", &self.near_ties)] {
+            for found in list {
+                let Broken {
+                    change,
+                    seed,
+                    rig,
+                    differs,
+                } = found;
+                let (change, differs) = (change.words(), differs.join("; "));
+                text += &format!("- {words}: {change}, seed {seed}, {rig}: {differs}\n");
+            }
         }
         text
     }
@@ -123,10 +132,12 @@ pub fn run(options: &Options, tell: impl Fn(&Broken) + Sync) -> std::io::Result<
                     let seed = options.seed + index;
                     let every = options.diagnose_every;
                     let diagnose = every > 0 && index.is_multiple_of(every);
-                    let broken = rig(seed, strangers, diagnose, options, folder.path());
-                    broken.iter().for_each(tell);
+                    let found = rig(seed, strangers, diagnose, options, folder.path());
+                    let (ties, broken): (Vec<_>, Vec<_>) = found.into_iter().partition(|f| f.1);
+                    let [ties, broken] = [ties, broken].map(|list| list.into_iter().map(|f| f.0));
                     if let Ok(mut outcome) = outcome.lock() {
-                        outcome.broken.extend(broken);
+                        outcome.broken.extend(broken.inspect(tell));
+                        outcome.near_ties.extend(ties);
                     }
                 }
             });
@@ -134,26 +145,32 @@ pub fn run(options: &Options, tell: impl Fn(&Broken) + Sync) -> std::io::Result<
     });
     let mut outcome = outcome.into_inner().unwrap_or_default();
     outcome.broken.sort_by_key(|broken| broken.seed);
+    outcome.near_ties.sort_by_key(|tie| tie.seed);
     let tried = Change::ALL.into_iter().filter(|c| options.tries(*c));
     outcome.tried = tried.map(|change| (change, options.cases)).collect();
     Ok(outcome)
 }
 
-/// The changes of one rig that made a difference.
+/// The changes of one rig that made a difference, and whether that is a near tie.
 fn rig(
     seed: u64,
     strangers: &[records::Base],
     diagnose: bool,
     options: &Options,
-    scratch: &std::path::Path,
-) -> Vec<Broken> {
+    scratch: &Path,
+) -> Vec<(Broken, bool)> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let base = match strangers.len() as u64 {
         0 => records::draw(&mut random),
         count => strangers[(seed % count) as usize].clone(),
     };
-    let ask = |records: &[records::Part]| Said::of(records, diagnose, scratch, options.limit);
-    let before = ask(&base.parts);
+    let folders = ["before", "after"].map(|name| scratch.join(name));
+    let ask = |records: &[records::Part], folder: &Path| {
+        // Without the folder every command fails, which is told.
+        let _ = std::fs::create_dir_all(folder);
+        Said::of(records, diagnose, folder, options.limit)
+    };
+    let before = ask(&base.parts, &folders[0]);
     let mut found = Vec::new();
     for change in Change::ALL {
         // Drawn for every change, so that each is the same with and without the others.
@@ -161,14 +178,20 @@ fn rig(
         if !options.tries(change) {
             continue;
         }
-        let differs = broken(change, factor, &before, &ask(&changed));
+        let differs = broken(change, factor, &before, &ask(&changed, &folders[1]));
+        let tie = change.changes_samples()
+            && differs.of_answer.is_empty()
+            && !differs.of_model.is_empty()
+            && is_near_tie(&folders[0], &folders[1], options.limit);
+        let differs = differs.all();
         if !differs.is_empty() {
-            found.push(Broken {
+            let broken = Broken {
                 change,
                 seed,
                 rig: format!("{}, {words}", base.words),
                 differs,
-            });
+            };
+            found.push((broken, tie));
         }
     }
     found

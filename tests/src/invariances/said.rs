@@ -33,7 +33,7 @@ pub(super) struct Said {
 }
 
 impl Said {
-    /// Asks `identify`, `compare`, `delay` and perhaps `diagnose`.
+    /// Asks `identify`, `compare`, `delay` and perhaps `diagnose`; data set and model stay in `scratch`.
     pub(super) fn of(records: &[Part], diagnose: bool, scratch: &Path, limit: Duration) -> Self {
         let data = scratch.join("data");
         if let Err(reason) = write(records, &data) {
@@ -60,10 +60,7 @@ impl Said {
             .flatten()
             .find(|answer| answer.exit != Some(0));
         let failed = failed.map(|answer| format!("{}: {}", answer.command, answer.complaint()));
-        let judged = match &compared.document["validate"] {
-            Value::Null => &compared.document["identify"],
-            some => some,
-        };
+        let judged = judged(&compared);
         let numbers = |value: &Value| -> Vec<f64> {
             let list = value.as_array().into_iter().flatten();
             list.filter_map(Value::as_f64).collect()
@@ -87,6 +84,33 @@ impl Said {
             finding: diagnosed.as_ref().map(finding),
         }
     }
+}
+
+/// What `compare` says of the validation records or, without any, of the others.
+fn judged(compared: &Answer) -> &Value {
+    match &compared.document["validate"] {
+        Value::Null => &compared.document["identify"],
+        some => some,
+    }
+}
+
+/// Whether each of two models describes the other's records as well as the other does: then the records do not tell one
+/// structure from the other. Their data sets and models lie in `before` and `after`.
+pub(super) fn is_near_tie(before: &Path, after: &Path, limit: Duration) -> bool {
+    let error = |model: &Path, data: &Path| {
+        let [model, data] = [model.join("model.toml"), data.join("data")]
+            .map(|path| path.to_string_lossy().into_owned());
+        let compared = ask(
+            "compare",
+            &["compare".to_owned(), model, data],
+            after,
+            limit,
+        );
+        judged(&compared)["rmse"].as_f64().unwrap_or(f64::NAN)
+    };
+    [(before, after), (after, before)]
+        .into_iter()
+        .all(|(own, other)| error(other, own) <= (1.0 + SAME) * error(own, own))
 }
 
 fn finding(answer: &Answer) -> String {
@@ -119,23 +143,43 @@ fn write(records: &[Part], folder: &Path) -> Result<(), String> {
     set.save(folder).map_err(|error| error.to_string())
 }
 
+/// Differences between two answers.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Differences {
+    /// In structure, delays and poles of the model.
+    pub(super) of_model: Vec<String>,
+    /// In all else: verdict, errors, measured delays.
+    pub(super) of_answer: Vec<String>,
+}
+
+impl Differences {
+    /// All of them.
+    pub(super) fn all(self) -> Vec<String> {
+        self.of_model.into_iter().chain(self.of_answer).collect()
+    }
+}
+
 /// What differs between the answers before and after a change that multiplies errors by `factor`.
-pub(super) fn broken(change: Change, factor: f64, before: &Said, after: &Said) -> Vec<String> {
-    let mut differs = Vec::new();
+pub(super) fn broken(change: Change, factor: f64, before: &Said, after: &Said) -> Differences {
+    let mut found = Differences::default();
     if before.failed.is_some() || after.failed.is_some() {
         let words = |said: &Said| said.failed.clone().unwrap_or_else(|| "done".to_owned());
         // A failure of both alike is no difference between them, but no answer either.
-        return vec![format!("{} → {}", words(before), words(after))];
+        found.of_answer = vec![format!("{} → {}", words(before), words(after))];
+        return found;
     }
-    let mut same = |what: &str, one: String, two: String| {
+    let same = |list: &mut Vec<String>, what: &str, one: &str, two: &str| {
         if one != two {
-            differs.push(format!("{what} {one} → {two}"));
+            list.push(format!("{what} {one} → {two}"));
         }
     };
-    same("", before.structure.clone(), after.structure.clone());
-    same("law", before.has_law.to_string(), after.has_law.to_string());
+    let of_model = &mut found.of_model;
+    same(of_model, "", &before.structure, &after.structure);
+    let law = |said: &Said| said.has_law.to_string();
+    same(of_model, "law", &law(before), &law(after));
     let finding = |said: &Said| said.finding.clone().unwrap_or_default();
-    same("verdict", finding(before), finding(after));
+    let of_answer = &mut found.of_answer;
+    same(of_answer, "verdict", &finding(before), &finding(after));
     let (share, samples, points) = match change.changes_samples() {
         true => (SCATTER, 1.0, 1.0),
         false => (SAME, 0.5, 0.1),
@@ -146,21 +190,21 @@ pub(super) fn broken(change: Change, factor: f64, before: &Said, after: &Said) -
         pairs.all(|(one, two)| near(*one, *two, samples))
     };
     if !delays_agree {
-        differs.push(format!("delay {:?} → {:?}", before.delays, after.delays));
+        of_model.push(format!("delay {:?} → {:?}", before.delays, after.delays));
     }
     // FIT is relative to the scatter of y, which rest makes smaller.
     if change != Change::Rest && !near(before.fit_percent, after.fit_percent, points) {
         let (one, two) = (before.fit_percent, after.fit_percent);
-        differs.push(format!("FIT {one:.2} % → {two:.2} %"));
+        of_answer.push(format!("FIT {one:.2} % → {two:.2} %"));
     }
     let expected = factor * before.rmse;
     if !near(expected, after.rmse, share * expected) {
-        differs.push(format!("error {expected:.5} expected → {:.5}", after.rmse));
+        of_answer.push(format!("error {expected:.5} expected → {:.5}", after.rmse));
     }
     // The poles are those at u = 0 and u = 1.
     let has_poles = !matches!(change, Change::Command);
     if has_poles && !near(before.decay, after.decay, share * before.decay.abs()) {
-        differs.push(format!(
+        of_model.push(format!(
             "slowest decay {:.5} → {:.5}",
             before.decay, after.decay
         ));
@@ -168,15 +212,15 @@ pub(super) fn broken(change: Change, factor: f64, before: &Said, after: &Said) -
     if before.no_edges.is_none()
         && let Some(words) = &after.no_edges
     {
-        differs.push(format!("delay: {words}"));
-        return differs;
+        of_answer.push(format!("delay: {words}"));
+        return found;
     }
     match (before.edges, after.edges) {
         (Some(one), Some(two)) if near(one, two, samples) => {}
         (None, None) => {}
-        (one, two) => differs.push(format!("measured delay {one:?} → {two:?}")),
+        (one, two) => of_answer.push(format!("measured delay {one:?} → {two:?}")),
     }
-    differs
+    found
 }
 
 #[cfg(test)]
@@ -200,12 +244,13 @@ mod tests {
     fn answers_that_are_the_same_are_not_broken() {
         let mut after = said();
         after.rmse = 0.25;
-        assert!(broken(Change::Output, 25.0, &said(), &after).is_empty());
+        let differs = |change, factor, after: &Said| broken(change, factor, &said(), after).all();
+        assert!(differs(Change::Output, 25.0, &after).is_empty());
         after.rmse = 0.01;
         after.delays = vec![16.0];
-        assert!(broken(Change::Cut, 1.0, &said(), &after).is_empty());
+        assert!(differs(Change::Cut, 1.0, &after).is_empty());
         assert_eq!(
-            broken(Change::Clock, 1.0, &said(), &after),
+            differs(Change::Clock, 1.0, &after),
             ["delay [15.0] → [16.0]"]
         );
     }
@@ -223,13 +268,14 @@ mod tests {
             finding: None,
             ..Said::default()
         };
-        assert_eq!(broken(Change::Cut, 1.0, &said(), &after).len(), 8);
+        let differs = broken(Change::Cut, 1.0, &said(), &after);
+        assert_eq!((differs.of_model.len(), differs.of_answer.len()), (4, 4));
         let failed = Said {
             failed: Some("delay: no message".to_owned()),
             ..said()
         };
         assert_eq!(
-            broken(Change::Rest, 1.0, &said(), &failed),
+            broken(Change::Rest, 1.0, &said(), &failed).all(),
             ["done → delay: no message"]
         );
     }

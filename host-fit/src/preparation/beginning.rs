@@ -131,11 +131,9 @@ impl Beginning {
             return in_mid_run(dead_time, time);
         };
         let (answers, answers_early) = (answering(y), answering(early));
-        let range = range_of_y(set);
         let moves = |shape: &Shape| {
             let noise = shape.left / (window as f64 - 3.0).max(1.0);
-            let least =
-                (RULES.motion_at_rest * range).max(RULES.motion_unexplained * reference.left_rms);
+            let least = RULES.motion_unexplained * reference.left_rms;
             let visible = least.powi(2) * window as f64;
             shape.motion > visible && shape.motion > RULES.motion_over_noise * noise
         };

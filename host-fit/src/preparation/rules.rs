@@ -21,14 +21,13 @@ rules! {
     times_of_rest: f64 = 3.0, "time constants", "5 % are left of a motion";
     /// Fewer samples do not tell rest from motion.
     fewest_at_rest: usize = 5, "samples", "judgement";
-    /// y moves if its motion under a constant command is more than this …
-    motion_at_rest: f64 = 0.015, "share of the range of y, rms", "judgement";
-    /// … more than this part of what the reference response leaves, as an unsteady flow moves by itself …
+    /// y moves if its motion under a constant command is more than this part of what the reference response leaves, as an
+    /// unsteady flow moves by itself …
     motion_unexplained: f64 = 0.5, "times its rms", "the flow simulation moves at rest";
     /// … and more than so many times the variance that is left.
     motion_over_noise: f64 = 40.0, "times", "judgement: noise with 10 samples of memory stays below";
     /// Short rests under one command that are further apart than this are no rests.
-    rests_apart: f64 = 0.03, "share of the range of y", "twice what counts as a motion";
+    rests_apart: f64 = 0.03, "share of the range of y", "judgement: more than noise makes of the mean of a few samples";
     /// Whether it answers an edge at the first sample is looked at for so long: …
     early: f64 = 2.5, "dead times", "what comes later looks alike";
     /// … it does if that leaves no more than this of what a relaxation leaves.

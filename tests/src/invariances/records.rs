@@ -160,10 +160,11 @@ pub(super) fn strangers() -> Vec<Base> {
             }
         }
         let y = &parts.first()?.y;
-        let mut steps: Vec<f64> = y.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
-        steps.sort_by(f64::total_cmp);
-        // The median of a difference of two normal numbers is 0.954 of one's standard deviation.
-        let noise = steps.get(steps.len() / 2)? / 0.954;
+        let bends = y.windows(3).map(|y| (y[0] - 2.0 * y[1] + y[2]).abs());
+        let mut bends: Vec<f64> = bends.collect();
+        bends.sort_by(f64::total_cmp);
+        // A slope has no part in it; of normal numbers the standard deviation is √6 times theirs, the median 0.674 of it.
+        let noise = bends.get(bends.len() / 2)? / (0.674 * 6f64.sqrt());
         Some(Base {
             words: format!("{} {}", case.set, case.name),
             noise,

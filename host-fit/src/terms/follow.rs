@@ -107,35 +107,72 @@ impl Search<'_> {
     /// Completes a fit: moves lags and fixed delays to the least error, fits and scores all folds. Effects at
     /// a bound of their range are left out, since the other terms may still be right. `None` if fewer than
     /// `least` terms remain.
-    pub(crate) fn finish(
-        &self,
-        mut terms: Vec<Term>,
-        brief: Fit,
-        least: usize,
-    ) -> Option<Hypothesis> {
-        let learning = self.judge.learning(0);
-        let options = self.judge.options_for(&brief.model);
-        let fitted = fit(&brief.model, &learning, &options).ok()?;
-        let fitted = self.settle_lags(fitted, &mut terms);
-        let fitted = settle_fixed_delay(fitted, &learning, &options).ok()?;
-        let end = &fitted.model;
-        let (bent, kept): (Vec<Term>, Vec<Term>) =
-            terms.into_iter().partition(|term| at_a_bound(end, term));
+    pub(crate) fn finish(&self, terms: Vec<Term>, brief: Fit, least: usize) -> Option<Hypothesis> {
+        let (fitted, bent, kept) = self.settled_fit(terms, &brief)?;
         if kept.len() < least {
             return None;
         }
         if !bent.is_empty() {
-            let rest = bent
-                .iter()
-                .fold(end.clone(), |m, term| term.taken_from(&m, end));
-            let options = self.judge.options_for(&rest);
-            return self.finish(kept, fit(&rest, &learning, &options).ok()?, least);
+            let rest = self.without_bent(&fitted, &bent)?;
+            return self.finish(kept, rest, least);
         }
         let judged = self.judge.judged_from(fitted).ok()?;
         Some(Hypothesis {
             terms: kept,
             ..Hypothesis::new(judged)
         })
+    }
+
+    /// The same and, where an effect is at a bound, also the hypothesis with it: beside a base that is too narrow the
+    /// right effect may go to a bound, and come back when a further term is there.
+    pub(super) fn finish_with_bent(
+        &self,
+        terms: Vec<Term>,
+        brief: Fit,
+        least: usize,
+    ) -> Vec<Hypothesis> {
+        let Some((fitted, bent, kept)) = self.settled_fit(terms.clone(), &brief) else {
+            return Vec::new();
+        };
+        let rest = match bent.is_empty() || kept.len() < least {
+            true => None,
+            false => self.without_bent(&fitted, &bent),
+        };
+        let rest = rest.and_then(|rest| self.finish(kept, rest, least));
+        let whole = self.judge.judged_from(fitted).ok();
+        let whole = whole.map(|judged| Hypothesis {
+            terms,
+            bent: !bent.is_empty(),
+            ..Hypothesis::new(judged)
+        });
+        whole.into_iter().chain(rest).collect()
+    }
+
+    /// The fit with its lags and delays at the least error; terms at a bound of their range, and the others.
+    fn settled_fit(
+        &self,
+        mut terms: Vec<Term>,
+        brief: &Fit,
+    ) -> Option<(Fit, Vec<Term>, Vec<Term>)> {
+        let learning = self.judge.learning(0);
+        let options = self.judge.options_for(&brief.model);
+        let fitted = fit(&brief.model, &learning, &options).ok()?;
+        let fitted = self.settle_lags(fitted, &mut terms);
+        let fitted = settle_fixed_delay(fitted, &learning, &options).ok()?;
+        let (bent, kept) = terms
+            .into_iter()
+            .partition(|term| at_a_bound(&fitted.model, term));
+        Some((fitted, bent, kept))
+    }
+
+    /// A fit without the terms at a bound.
+    fn without_bent(&self, fitted: &Fit, bent: &[Term]) -> Option<Fit> {
+        let end = &fitted.model;
+        let rest = bent
+            .iter()
+            .fold(end.clone(), |m, term| term.taken_from(&m, end));
+        let options = self.judge.options_for(&rest);
+        fit(&rest, &self.judge.learning(0), &options).ok()
     }
 
     /// Moves all lags to the least error by Gauss–Newton steps in lags and parameters together; the

@@ -28,6 +28,8 @@ pub struct Hypothesis {
     pub(super) expanded: bool,
     /// Whether it descends from the given structure rather than from the lowest-order model.
     pub(super) from_given: bool,
+    /// Whether an effect is at a bound of its range: further terms are screened on it, but it is no result.
+    pub(super) bent: bool,
 }
 
 impl Hypothesis {
@@ -39,6 +41,7 @@ impl Hypothesis {
             judged,
             expanded: false,
             from_given: false,
+            bent: false,
         }
     }
 
@@ -253,15 +256,17 @@ impl Search<'_> {
             if chosen.is_empty() || self.interrupted() {
                 break;
             }
-            let before = all[end].score();
+            let before = (all[end].score(), lowest_bent(&all));
             let refitted = self.advance(round, &chosen, width, &mut all, &mut tried);
-            let gained = all[best(&all, |_| true)].score() <= before - RULES.price;
+            let gained = all[best(&all, |_| true)].score() <= before.0 - RULES.price
+                || lowest_bent(&all) <= before.1 - RULES.price;
             stalled = match (refitted, gained) {
                 (false, _) => RULES.patience,
                 (true, true) => 0,
                 (true, false) => stalled + 1,
             };
         }
+        all.retain(|hypothesis| !hypothesis.bent);
         (self.progress)("leaving out what is not needed");
         let root = all[0].clone();
         let end = best(&all, |_| true);
@@ -311,7 +316,13 @@ impl Search<'_> {
         }
         let mut finished = self.refitted(all, &pool, width);
         finished.extend(self.regraded(&finished));
+        let (bent, finished): (Vec<_>, Vec<_>) = finished.into_iter().partition(|h| h.bent);
         for hypothesis in finished {
+            keep(all, hypothesis);
+        }
+        // Only where they err less than every result.
+        let least = all[best(all, |_| true)].score() - RULES.price;
+        for hypothesis in bent.into_iter().filter(|bent| bent.score() < least) {
             keep(all, hypothesis);
         }
         true
@@ -362,6 +373,11 @@ impl Search<'_> {
         }
         if !bare_is_done && !chosen.iter().any(|(index, _)| *index == bare) {
             chosen.push((bare, false));
+        }
+        let bent = least_of(all, |i| all[*i].bent);
+        let errs_less = |i: &usize| open(i) && all[*i].score() < all[end].score() - RULES.price;
+        if let Some(bent) = bent.filter(errs_less) {
+            chosen.push((bent, self.effects));
         }
         chosen
     }
@@ -477,26 +493,24 @@ impl Search<'_> {
                 leading.push((at, fit));
             }
         }
-        let finished: Vec<Option<Hypothesis>> = leading
-            .into_par_iter()
-            .map(|(at, fit)| {
-                let (index, proposal) = &pool[at];
-                let terms = [all[*index].terms.clone(), proposal.terms.clone()].concat();
-                let from_given = all[*index].from_given;
-                let finished = self.finish(terms, fit, all[*index].terms.len() + 1)?;
-                Some(Hypothesis {
-                    from_given,
-                    ..finished
-                })
-            })
-            .collect();
-        finished.into_iter().flatten().collect()
+        let finished = leading.into_par_iter().map(|(at, fit)| {
+            let (index, proposal) = &pool[at];
+            let terms = [all[*index].terms.clone(), proposal.terms.clone()].concat();
+            let from_given = all[*index].from_given;
+            let finished = self.finish_with_bent(terms, fit, all[*index].terms.len() + 1);
+            let finished = finished.into_iter().map(|finished| Hypothesis {
+                from_given,
+                ..finished
+            });
+            finished.collect::<Vec<_>>()
+        });
+        finished.collect::<Vec<_>>().concat()
     }
 
     /// The best of `finished` with another response to jets of part strength, if that lowers the error. Only
     /// models with effects that cause part strengths are tried.
     fn regraded(&self, finished: &[Hypothesis]) -> Option<Hypothesis> {
-        let leader = finished.get(best(finished, |_| true))?;
+        let leader = &finished[leading(finished, |_| true)?];
         let model = leader.judged.model();
         let part = !self.judge.on_off || has_jet_effect(model);
         if !part || self.over(leader) <= RULES.near_the_floor || self.interrupted() {
@@ -578,6 +592,7 @@ impl Search<'_> {
             judged: self.judge.refitted(model).ok()?,
             expanded: true,
             from_given: hypothesis.from_given,
+            bent: false,
         })
     }
 }
@@ -589,7 +604,12 @@ fn keep(all: &mut Vec<Hypothesis>, mut hypothesis: Hypothesis) {
         all.push(hypothesis);
         return;
     };
-    if hypothesis.score() < other.score() {
+    let better = match (hypothesis.bent, other.bent) {
+        (true, false) => false,
+        (false, true) => true,
+        _ => hypothesis.score() < other.score(),
+    };
+    if better {
         // Candidates were screened on it already, unless its terms have changed.
         hypothesis.expanded = other.expanded && hypothesis.score() > other.score() - RULES.price;
         *other = hypothesis;
@@ -612,13 +632,23 @@ pub(super) fn count_effects(terms: &[Term]) -> usize {
     terms.iter().filter(|term| term.effect().is_some()).count()
 }
 
-/// The index of the best hypothesis that is `wanted`; the root is always wanted.
+/// The index of the best result that is `wanted`; the root is always wanted.
 fn best(all: &[Hypothesis], wanted: impl Fn(&Hypothesis) -> bool) -> usize {
     leading(all, |i| wanted(&all[*i])).unwrap_or(0)
 }
 
-/// The index of the best hypothesis among those that are `wanted` by their index.
+/// The index of the best result among those that are `wanted` by their index.
 fn leading(all: &[Hypothesis], wanted: impl Fn(&usize) -> bool) -> Option<usize> {
+    least_of(all, |i| !all[*i].bent && wanted(i))
+}
+
+/// The score of the best hypothesis with an effect at a bound; infinite without any.
+fn lowest_bent(all: &[Hypothesis]) -> f64 {
+    least_of(all, |i| all[*i].bent).map_or(f64::INFINITY, |i| all[i].score())
+}
+
+/// The index of the hypothesis with the least score among those that are `wanted` by their index.
+fn least_of(all: &[Hypothesis], wanted: impl Fn(&usize) -> bool) -> Option<usize> {
     (0..all.len())
         .filter(wanted)
         .min_by(|a, b| all[*a].score().total_cmp(&all[*b].score()))

@@ -523,7 +523,7 @@ fn stress_warns_and_refuses_nothing() {
     assert!(!text.contains("ATTACHMENT"), "{text}");
 }
 
-/// A valve that stays closed for a second lets the model's own flow go: no file, the targets that pass, and by force a
+/// A valve that stays closed for 0.6 s lets the model's own flow go: no file, the targets that pass, and by force a
 /// file and constants that say so.
 #[test]
 fn a_law_that_loses_its_own_model_is_refused_with_the_targets_that_pass() {
@@ -539,7 +539,7 @@ fn a_law_that_loses_its_own_model_is_refused_with_the_targets_that_pass() {
         p("--target"),
         p("0.5"),
         p("--min-off"),
-        p("0.8"),
+        p("0.6"),
     ];
     let output = run(&arguments);
     let error = String::from_utf8_lossy(&output.stderr);

@@ -13,5 +13,5 @@ pub(crate) const TASK: Task = Task {
 
 /// A short run of each target.
 pub(crate) fn brief() -> Result<()> {
-    run(scenario("fuzz").args(["--minutes", "3"]))
+    run(scenario("fuzz").args(["--minutes", "1.5"]))
 }

@@ -145,7 +145,7 @@ const STEPS: &[Step] = &[
         room: Some(Room::Host),
         run: crate::new_effect::proof,
     },
-    // 20 s a target.
+    // 10 s a target.
     Step {
         name: "fuzz",
         after: &[BUILD],

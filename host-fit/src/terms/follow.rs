@@ -108,7 +108,8 @@ impl Search<'_> {
     /// a bound of their range are left out, since the other terms may still be right. `None` if fewer than
     /// `least` terms remain.
     pub(crate) fn finish(&self, terms: Vec<Term>, brief: Fit, least: usize) -> Option<Hypothesis> {
-        let (fitted, bent, kept) = self.settled_fit(terms, &brief)?;
+        let (fitted, terms) = self.settled_fit(terms, &brief)?;
+        let (bent, kept) = bent_and_kept(&fitted, terms);
         if kept.len() < least {
             return None;
         }
@@ -131,9 +132,10 @@ impl Search<'_> {
         brief: Fit,
         least: usize,
     ) -> Vec<Hypothesis> {
-        let Some((fitted, bent, kept)) = self.settled_fit(terms.clone(), &brief) else {
+        let Some((fitted, terms)) = self.settled_fit(terms, &brief) else {
             return Vec::new();
         };
+        let (bent, kept) = bent_and_kept(&fitted, terms.clone());
         let rest = match bent.is_empty() || kept.len() < least {
             true => None,
             false => self.without_bent(&fitted, &bent),
@@ -148,21 +150,14 @@ impl Search<'_> {
         whole.into_iter().chain(rest).collect()
     }
 
-    /// The fit with its lags and delays at the least error; terms at a bound of their range, and the others.
-    fn settled_fit(
-        &self,
-        mut terms: Vec<Term>,
-        brief: &Fit,
-    ) -> Option<(Fit, Vec<Term>, Vec<Term>)> {
+    /// The fit with its lags and delays at the least error, and the terms with these lags.
+    fn settled_fit(&self, mut terms: Vec<Term>, brief: &Fit) -> Option<(Fit, Vec<Term>)> {
         let learning = self.judge.learning(0);
         let options = self.judge.options_for(&brief.model);
         let fitted = fit(&brief.model, &learning, &options).ok()?;
         let fitted = self.settle_lags(fitted, &mut terms);
         let fitted = settle_fixed_delay(fitted, &learning, &options).ok()?;
-        let (bent, kept) = terms
-            .into_iter()
-            .partition(|term| at_a_bound(&fitted.model, term));
-        Some((fitted, bent, kept))
+        Some((fitted, terms))
     }
 
     /// A fit without the terms at a bound.
@@ -233,6 +228,12 @@ fn moved(model: &Model, terms: &[Term], steps: &[i32], longest: u16) -> (Model, 
         }
     }
     (model, moved)
+}
+
+/// Terms at a bound of their range in a fit, and the others.
+fn bent_and_kept(fitted: &Fit, terms: Vec<Term>) -> (Vec<Term>, Vec<Term>) {
+    let is_bent = |term: &Term| at_a_bound(&fitted.model, term);
+    terms.into_iter().partition(is_bent)
 }
 
 /// Whether an effect is at a bound of its card's range: it is then a surrogate. Delay laws are exempt,

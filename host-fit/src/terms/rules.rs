@@ -19,7 +19,9 @@ rules! {
     /// An effect with a parameter this close to the end of its range is a surrogate.
     bound: f64 = 0.01, "share of the range", "otherwise vortex shedding with damping ratio 0.95 was named on a flow with a second lag";
     /// Number of rounds of screening and refitting.
-    rounds: usize = 6, "", "two effects and two memories need three; ending after two without a gain lost three of five effects of `hidden-effects --seed 880`";
+    rounds: usize = 6, "", "two effects and two memories need three";
+    /// The search ends after this many rounds without a gain.
+    patience: usize = 2, "rounds", "judgement: for the time it takes";
     /// If the error is at least this factor of the noise level when the search ends, the search is extended
     /// to less promising candidates.
     much: f64 = 1.25, "times the noise level", "what is named leaves less";

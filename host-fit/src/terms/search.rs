@@ -229,7 +229,7 @@ impl Search<'_> {
         let mut all = vec![root];
         let mut second = Some(second);
         let mut tried = Vec::new();
-        let (mut last, mut refitted, mut since) = (RULES.rounds, true, None);
+        let (mut last, mut stalled, mut since) = (RULES.rounds, 0, None);
         for round in 1.. {
             if round > 1
                 && self.over(&all[best(&all, |_| true)]) > RULES.at_the_floor
@@ -237,7 +237,7 @@ impl Search<'_> {
             {
                 all.extend(second());
             }
-            let ended = round > last || !refitted;
+            let ended = round > last || stalled >= RULES.patience;
             let mut chosen = if ended {
                 Vec::new()
             } else {
@@ -246,7 +246,7 @@ impl Search<'_> {
             let mut width = 1;
             let end = best(&all, |_| true);
             if chosen.is_empty() && since.is_none() && self.effects && self.leaves_much(&all[end]) {
-                (last, since) = (round + RULES.rounds_after, Some(all.len()));
+                (last, stalled, since) = (round + RULES.rounds_after, 0, Some(all.len()));
                 width = RULES.wider;
                 chosen = vec![(end, true)];
                 if end > 0 {
@@ -256,7 +256,15 @@ impl Search<'_> {
             if chosen.is_empty() || self.interrupted() {
                 break;
             }
-            refitted = self.advance(round, &chosen, width, &mut all, &mut tried);
+            let before = (all[end].score(), lowest_bent(&all));
+            let refitted = self.advance(round, &chosen, width, &mut all, &mut tried);
+            let gained = all[best(&all, |_| true)].score() <= before.0 - RULES.price
+                || lowest_bent(&all) < before.1 - RULES.price;
+            stalled = match (refitted, gained) {
+                (false, _) => RULES.patience,
+                (true, true) => 0,
+                (true, false) => stalled + 1,
+            };
         }
         all.retain(|hypothesis| !hypothesis.bent);
         (self.progress)("leaving out what is not needed");
@@ -632,6 +640,11 @@ fn best(all: &[Hypothesis], wanted: impl Fn(&Hypothesis) -> bool) -> usize {
 /// The index of the best result among those that are `wanted` by their index.
 fn leading(all: &[Hypothesis], wanted: impl Fn(&usize) -> bool) -> Option<usize> {
     least_of(all, |i| !all[*i].bent && wanted(i))
+}
+
+/// The score of the best hypothesis with an effect at a bound; infinite without any.
+fn lowest_bent(all: &[Hypothesis]) -> f64 {
+    least_of(all, |i| all[*i].bent).map_or(f64::INFINITY, |i| all[i].score())
 }
 
 /// The index of the hypothesis with the least score among those that are `wanted` by their index.

@@ -230,6 +230,7 @@ impl Search<'_> {
         let mut second = Some(second);
         let mut tried = Vec::new();
         let (mut last, mut stalled, mut since) = (RULES.rounds, 0, None);
+        let mut from_bound = 0;
         for round in 1.. {
             if round > 1
                 && self.over(&all[best(&all, |_| true)]) > RULES.at_the_floor
@@ -253,13 +254,22 @@ impl Search<'_> {
                     chosen.push((0, true));
                 }
             }
+            // At the end, and for a few rounds, what errs less with an effect at a bound: that may come back from there.
+            if chosen.is_empty()
+                && from_bound < RULES.rounds_after
+                && let Some(bent) = least_of(&all, |i| all[*i].bent && !all[*i].expanded)
+                && all[bent].score() < all[end].score() - RULES.price
+            {
+                (last, stalled) = (round + RULES.rounds_after, 0);
+                from_bound += 1;
+                chosen = vec![(bent, self.effects)];
+            }
             if chosen.is_empty() || self.interrupted() {
                 break;
             }
-            let before = (all[end].score(), lowest_bent(&all));
+            let before = all[end].score();
             let refitted = self.advance(round, &chosen, width, &mut all, &mut tried);
-            let gained = all[best(&all, |_| true)].score() <= before.0 - RULES.price
-                || lowest_bent(&all) < before.1 - RULES.price;
+            let gained = all[best(&all, |_| true)].score() <= before - RULES.price;
             stalled = match (refitted, gained) {
                 (false, _) => RULES.patience,
                 (true, true) => 0,
@@ -312,7 +322,7 @@ impl Search<'_> {
         }
         (self.progress)(&format!("round {round}: refitting {} models", pool.len()));
         for (index, proposal) in &pool {
-            tried.push(signature(&all[*index].terms, &proposal.terms));
+            tried.push(signature(&all[*index], &proposal.terms));
         }
         let mut finished = self.refitted(all, &pool, width);
         finished.extend(self.regraded(&finished));
@@ -374,11 +384,6 @@ impl Search<'_> {
         if !bare_is_done && !chosen.iter().any(|(index, _)| *index == bare) {
             chosen.push((bare, false));
         }
-        let bent = least_of(all, |i| all[*i].bent);
-        let errs_less = |i: &usize| open(i) && all[*i].score() < all[end].score() - RULES.price;
-        if let Some(bent) = bent.filter(errs_less) {
-            chosen.push((bent, self.effects));
-        }
         chosen
     }
 
@@ -409,7 +414,7 @@ impl Search<'_> {
                 without >= RULES.without_effects * width
                     || kept.iter().filter(again).count() >= RULES.of_one_kind
             };
-            let key = signature(&hypothesis.terms, &proposal.terms);
+            let key = signature(hypothesis, &proposal.terms);
             let too_many = present + added > self.most_effects;
             if enough || too_many || tried.contains(&key) || met.contains(&key) {
                 continue;
@@ -421,7 +426,7 @@ impl Search<'_> {
         if effects && hypothesis.is_bare() {
             let unseen = self.unseen(&screen);
             kept.extend(unseen.filter(|proposal| {
-                let key = signature(&hypothesis.terms, &proposal.terms);
+                let key = signature(hypothesis, &proposal.terms);
                 !tried.contains(&key) && !met.contains(&key)
             }));
         }
@@ -619,8 +624,10 @@ fn keep(all: &mut Vec<Hypothesis>, mut hypothesis: Hypothesis) {
 /// Key by which terms are compared.
 type TermKey = (String, Option<model_core::recursion::Grading>);
 
-fn signature(before: &[Term], added: &[Term]) -> Vec<TermKey> {
-    let mut keys: Vec<TermKey> = before.iter().chain(added).map(Term::key).collect();
+/// The key of a hypothesis with further terms. What was tried from a bound may still be tried from elsewhere.
+fn signature(before: &Hypothesis, added: &[Term]) -> Vec<TermKey> {
+    let mut keys: Vec<TermKey> = before.terms.iter().chain(added).map(Term::key).collect();
+    keys.extend(before.bent.then(|| ("at a bound".to_owned(), None)));
     keys.sort_by(|a, b| match a.0.cmp(&b.0) {
         Ordering::Equal => format!("{:?}", a.1).cmp(&format!("{:?}", b.1)),
         other => other,
@@ -640,11 +647,6 @@ fn best(all: &[Hypothesis], wanted: impl Fn(&Hypothesis) -> bool) -> usize {
 /// The index of the best result among those that are `wanted` by their index.
 fn leading(all: &[Hypothesis], wanted: impl Fn(&usize) -> bool) -> Option<usize> {
     least_of(all, |i| !all[*i].bent && wanted(i))
-}
-
-/// The score of the best hypothesis with an effect at a bound; infinite without any.
-fn lowest_bent(all: &[Hypothesis]) -> f64 {
-    least_of(all, |i| all[*i].bent).map_or(f64::INFINITY, |i| all[i].score())
 }
 
 /// The index of the hypothesis with the least score among those that are `wanted` by their index.

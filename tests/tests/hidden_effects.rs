@@ -124,6 +124,26 @@ fn what_was_added_with_a_stand_in_stays_without_it() {
     assert!(row.is_at_floor(), "{:?}", row.over_floor);
 }
 
+/// Beside a wake alone the best King's law has a ratio at the end of its range; the flow's rate depends on y as well.
+#[test]
+#[ignore = "two minutes of processor time: cargo xtask kept-rigs"]
+fn an_effect_at_a_bound_beside_a_lean_base_is_found_in_the_end() {
+    let row = asked(&Case {
+        noise: NoiseKind::HeavyTails,
+        ..Case::new(
+            Group::Single,
+            Family::Wake,
+            &["hot-film-nonlinearity"],
+            880_000_090,
+        )
+    });
+    assert_eq!(
+        row.missing.first().map(String::as_str),
+        Some("hot-film-nonlinearity")
+    );
+    assert!(row.is_at_floor(), "{:?}", row.over_floor);
+}
+
 #[test]
 #[ignore = "two minutes of processor time: cargo xtask kept-rigs"]
 fn an_effect_beside_a_memory_of_the_flow_is_found_alone() {

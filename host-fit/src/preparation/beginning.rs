@@ -303,27 +303,26 @@ mod tests {
     }
 
     #[test]
-    fn what_falls_and_rises_again_does_not_rest() {
-        let mut command: Vec<f64> = (0..900)
+    fn a_short_rest_where_the_response_does_not_end_is_no_rest() {
+        let command: Vec<f64> = (0..900)
             .map(|k| f64::from(u8::from(k % 150 > 60)))
             .collect();
-        // A pause of 12 samples ends 5 samples before the cut: y falls for six samples more, then rises.
-        command[400..412].fill(0.0);
-        command[300..400].fill(1.0);
-        command[412..432].fill(1.0);
         let y = response(&command);
         let part = |from: usize, to: usize| {
             let (u, y) = (command[from..to].to_vec(), y[from..to].to_vec());
             Record::new("part", Use::Identify, 0.001, u, y)
         };
-        let records = [part(0, 417), part(417, 900)];
+        // The second begins 20 samples after a rising edge, far below 1.
+        let records = [part(0, 381), part(381, 900)];
         let reference = FirstOrder::fitted(&records).unwrap();
-        let mut beginnings: Vec<Beginning> = records
-            .iter()
-            .map(|record| Beginning::of(record, &records, Some(&reference)))
-            .collect();
+        let rests = |command: f64| Beginning {
+            command,
+            rest: 14,
+            follow: 0,
+        };
+        let mut beginnings = [rests(0.0), rests(1.0)];
         Beginning::reconcile(&mut beginnings, &records, &reference);
-        assert!(beginnings[0].rests_at(0.0), "{beginnings:?}");
+        assert_eq!(beginnings[0], rests(0.0));
         assert!(beginnings[1].follow > 0, "{beginnings:?}");
     }
 }

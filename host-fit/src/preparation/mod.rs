@@ -116,7 +116,8 @@ impl Preparation {
 
 /// Sets the output from which free runs start in records that begin in mid-run: the response of a second order with dead
 /// time whose initial state is fitted to the start of the record, plus the slow part of the residual of y against that
-/// response, where it has one (theory 1.5). Single samples are too noisy to give the slope of y, and smoothing y itself would be biased after edges.
+/// response, where it has one (theory 1.5). Single samples are too noisy to give the slope of y, and smoothing y itself would be
+/// biased after edges.
 fn follow(records: &mut [Record], beginnings: &[Beginning]) {
     if beginnings.iter().all(|own| own.follow == 0) {
         return;

@@ -298,19 +298,21 @@ mod tests {
         (0..records).map(&mut one).collect()
     }
 
-    #[test]
-    fn lags_that_are_off_by_a_dozen_samples_are_moved_to_where_they_belong() {
-        let records = remembering(4);
-        let judge = Judge::new(&records, None, FitOptions::default()).expect("records");
-        let search = Search {
-            judge: &judge,
+    static NEVER: AtomicBool = AtomicBool::new(false);
+
+    fn search(judge: &Judge) -> Search<'_> {
+        Search {
+            judge,
             known: Known::of(&judge.learning(0)),
             effects: false,
             most_effects: 0,
-            interrupt: &AtomicBool::new(false),
+            interrupt: &NEVER,
             progress: &|_| {},
-        };
-        let mut terms = vec![Term::State(131), Term::Product(52)];
+        }
+    }
+
+    /// A fit of that flow with these terms.
+    fn begun(judge: &Judge, terms: &[Term]) -> Fit {
         let lean = Model {
             a: vec![0.98],
             b: vec![0.03],
@@ -318,12 +320,36 @@ mod tests {
             delay: Delay::Fixed { delays: vec![20] },
             ..Model::default()
         };
-        let off = terms
-            .iter()
-            .fold(lean, |model, term| term.added_to(&model, &[]));
-        let options = judge.options_for(&off);
-        let begun = fit(&off, &judge.learning(0), &options).expect("a fit");
-        let settled = search.settle_lags(begun.clone(), &mut terms);
+        let add = |model: Model, term: &Term| term.added_to(&model, &[]);
+        let with = terms.iter().fold(lean, add);
+        let options = judge.options_for(&with);
+        fit(&with, &judge.learning(0), &options).expect("a fit")
+    }
+
+    #[test]
+    fn terms_of_a_finished_fit_have_the_lags_of_its_model() {
+        let records = remembering(4);
+        let judge = Judge::new(&records, None, FitOptions::default()).expect("records");
+        let terms = vec![Term::State(131), Term::Product(52)];
+        let begun = begun(&judge, &terms);
+        let found = search(&judge).finish_with_bent(terms, begun, 1);
+        let [only] = &found[..] else {
+            panic!("{found:?}");
+        };
+        let lags = [&only.terms[0], &only.terms[1]].map(Term::lag);
+        assert_eq!((only.bent, lags), (false, [Some(120), Some(61)]));
+        let model = only.judged.model();
+        assert_eq!(model.state_lags, [1, 120]);
+        assert_eq!(model.product_lags, [1, 61]);
+    }
+
+    #[test]
+    fn lags_that_are_off_by_a_dozen_samples_are_moved_to_where_they_belong() {
+        let records = remembering(4);
+        let judge = Judge::new(&records, None, FitOptions::default()).expect("records");
+        let mut terms = vec![Term::State(131), Term::Product(52)];
+        let begun = begun(&judge, &terms);
+        let settled = search(&judge).settle_lags(begun.clone(), &mut terms);
         assert!(settled.mean_square() < 1e-3 * begun.mean_square());
         assert_eq!([terms[0].lag(), terms[1].lag()], [Some(120), Some(61)]);
         assert!(

@@ -254,7 +254,8 @@ impl Search<'_> {
                     chosen.push((0, true));
                 }
             }
-            // At the end, and for a few rounds, what errs less with an effect at a bound: that may come back from there.
+            // When the search ends, terms are screened for a few rounds on fits with an effect at a bound that have a lower
+            // error than every result: with a further term the effect may leave the bound.
             if chosen.is_empty()
                 && from_bound < RULES.rounds_after
                 && let Some(bent) = least_of(&all, |i| all[*i].bent && !all[*i].expanded)
@@ -330,7 +331,7 @@ impl Search<'_> {
         for hypothesis in finished {
             keep(all, hypothesis);
         }
-        // Only where they err less than every result.
+        // Only those with a lower error than every result.
         let least = all[best(all, |_| true)].score() - RULES.price;
         for hypothesis in bent.into_iter().filter(|bent| bent.score() < least) {
             keep(all, hypothesis);

@@ -166,7 +166,7 @@ fn rig(
     };
     let folders = ["before", "after"].map(|name| scratch.join(name));
     let ask = |records: &[records::Part], folder: &Path| {
-        // Without the folder every command fails, which is told.
+        // If this fails, every command fails and reports it.
         let _ = std::fs::create_dir_all(folder);
         Said::of(records, diagnose, folder, options.limit)
     };
@@ -178,10 +178,11 @@ fn rig(
         if !options.tries(change) {
             continue;
         }
-        let differs = broken(change, factor, &before, &ask(&changed, &folders[1]));
+        let after = ask(&changed, &folders[1]);
+        let differs = broken(change, factor, &before, &after);
         let tie = change.changes_samples()
             && differs.of_answer.is_empty()
-            && !differs.of_model.is_empty()
+            && !before.is_built_as(&after)
             && is_near_tie(&folders[0], &folders[1], options.limit);
         let differs = differs.all();
         if !differs.is_empty() {

@@ -86,6 +86,13 @@ impl Said {
     }
 }
 
+impl Said {
+    /// Whether both models have the same lags and the same kind of delay.
+    pub(super) fn is_built_as(&self, other: &Self) -> bool {
+        self.structure == other.structure && self.has_law == other.has_law
+    }
+}
+
 /// What `compare` says of the validation records or, without any, of the others.
 fn judged(compared: &Answer) -> &Value {
     match &compared.document["validate"] {
@@ -253,6 +260,37 @@ mod tests {
             differs(Change::Clock, 1.0, &after),
             ["delay [15.0] → [16.0]"]
         );
+    }
+
+    #[test]
+    fn a_model_that_describes_the_others_records_worse_is_no_near_tie() {
+        let response = |time: f64| {
+            let u = |k: usize| f64::from(u8::from(k / 90 % 2 == 1));
+            let rise = |y: &mut f64, k: usize| {
+                let now = *y;
+                *y += (u(k) - *y) / time;
+                Some(now + 1e-3 * (0.7 * k as f64).sin())
+            };
+            Part {
+                name: "run".to_owned(),
+                held_out: false,
+                period_s: 0.001,
+                u: (0..900).map(u).collect(),
+                y: (0..900).scan(0.0, rise).collect(),
+            }
+        };
+        let scratch = tempfile::tempdir().expect("a folder");
+        let limit = Duration::from_secs(60);
+        let folders = [("quick", 20.0), ("again", 20.0), ("slow", 26.0)].map(|(name, time)| {
+            let folder = scratch.path().join(name);
+            std::fs::create_dir_all(&folder).expect("a folder");
+            let said = Said::of(&[response(time)], false, &folder, limit);
+            assert_eq!(said.failed, None);
+            folder
+        });
+        let [quick, again, slow] = &folders;
+        assert!(is_near_tie(quick, again, limit));
+        assert!(!is_near_tie(quick, slow, limit));
     }
 
     #[test]

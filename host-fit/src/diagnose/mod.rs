@@ -133,9 +133,6 @@ fn chosen(
         "the model as given",
         Some(given.clone()),
     );
-    if let Some(diagnosis) = session.nothing_at_once(given, &given_inside, &as_given, &first) {
-        return Ok(diagnosis);
-    }
     if bears_little(records) {
         // These records cannot identify how the response depends on y or u, so effects and further lags are not tried.
         let given_alone = Hypothesis::new(judge.refitted(&given_inside)?);

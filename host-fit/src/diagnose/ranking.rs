@@ -77,11 +77,6 @@ pub(super) fn rivals_and_chance(
     made.unwrap_or_default()
 }
 
-/// The first-order predictions of all candidates, best first; `before` is the validation error without them.
-pub(super) fn screened(screen: &Screen<'_>, table: &Table, before: f64) -> Vec<Rival> {
-    rated(screen, table, before, |_, _, _| None)
-}
-
 /// The most promising candidates and `named`, refitted on `context`. None if no effect is named.
 fn refitted(
     search: &Search<'_>,

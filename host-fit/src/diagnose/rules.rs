@@ -7,21 +7,13 @@ rules! {
     /// When a model error counts, when an effect is named, and when it is only a surrogate.
     pub struct Rules in "diagnose";
 
-    /// A model error below this factor is within the uncertainty of `y_sd`.
-    floor_margin: f64 = 1.10, "times the noise level", "a standard deviation from 20 repeats has an error of 16 % per sample; null cases of six families stay below 1.03";
-    /// A given model within this factor of the noise level is searched no further unless an effect promises a
-    /// significant gain above the practical margin.
-    at_once: f64 = 1.03, "times the noise level", "null cases after `identify` have 0.99 to 1.02; models whose lags imitate an effect have 1.03 and more";
+    /// A model within this factor of the noise level lacks nothing: neither an effect nor a further one.
+    floor_margin: f64 = 1.03, "times the noise level", "`y_sd` of 20 repeats, pooled over the validation records, gives the noise to 0.4 %; models of the right structure have 0.98 to 1.02";
     /// Level of the tests.
     level: f64 = 0.05, "p-value", "convention";
     /// Family-wise level: the probability that noise alone gives any effect, at any grid point, as large a
     /// gain.
     level_of_search: f64 = 0.02, "p-value", "target: at most 3 % false names";
-    /// On a given model at the noise level, an effect is followed up if its predicted p-value is below this.
-    worth_a_search: f64 = 0.1, "p-value", "judgement: a search for one null case in ten";
-    /// On a given model at the noise level, number of effects that are refitted in full in place of a term of
-    /// the base.
-    settled: usize = 2, "", "judgement: for the time it takes";
     /// An effect must lower the validation error of the best base model by this fraction, unless it fits
     /// equally well with fewer parameters.
     worthwhile: f64 = 0.015, "share of the rms error", "null cases of six families: noise alone reaches 0.01";

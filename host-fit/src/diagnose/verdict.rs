@@ -1,110 +1,16 @@
 //! The verdict: whether anything is missing, and which effects are significant.
 
 use super::estimate::{is_identified, is_there};
-use super::memory::memory;
 use super::outcome::Conclusion;
-use super::ranking::{Rival, not_tried, ranked, screened};
 use super::session::Session;
-use super::{Diagnosis, RULES, Rung, Verdict};
-use crate::model::Model;
+use super::{RULES, Verdict};
 use crate::residual::{FailureCoordinate, NoiseSource, examine};
 use crate::terms::{
-    Found, HeldOut, Hypothesis, Judged, Likelihood, Noise, RULES as TERMS, Screen, Search, Table,
-    Term, p_value,
+    Found, HeldOut, Hypothesis, Judged, Noise, RULES as TERMS, Screen, Search, Table, Term, p_value,
 };
 use model_core::effect::Spec;
-use rayon::prelude::*;
-use std::collections::BTreeMap;
 
 impl Session<'_> {
-    /// The verdict for a given model at the noise level, unless a single effect promises a clear gain.
-    pub(super) fn nothing_at_once(
-        &self,
-        given: &Model,
-        given_inside: &Model,
-        as_given: &HeldOut,
-        first: &Rung,
-    ) -> Option<Diagnosis> {
-        let judge = self.judge();
-        let over = judge.over_noise(as_given.rmse());
-        if over > RULES.at_once || judge.p_above_noise(as_given, RULES.at_once) < RULES.level {
-            return None;
-        }
-        let screen = Screen::new(judge, given_inside)?;
-        let noise = Noise::new(&screen, given_inside, as_given.block(), self.options.seed)?;
-        let table = Table::with_chance(&screen, &self.search.known, &noise);
-        let before = as_given.rmse();
-        let rivals = screened(&screen, &table, before);
-        let effects = rivals.iter().filter(|rival| rival.spec.is_some());
-        let least = effects.map(Rival::rmse).fold(before, f64::min);
-        let promised = 1.0 - least / before;
-        let p = table.chance.p_value(1.0 - (1.0 - promised).powi(2));
-        let promising =
-            over > TERMS.at_the_floor && promised > RULES.worthwhile && p <= RULES.worth_a_search;
-        if promising || self.imitated(given_inside, as_given) {
-            return None;
-        }
-        Some(Diagnosis {
-            verdict: Verdict::NothingMissing,
-            missing: Vec::new(),
-            stand_ins: Vec::new(),
-            sets: Vec::new(),
-            memory: memory(given),
-            tried: 0,
-            alternatives: table.chance.alternatives,
-            usual_by_chance: table.chance.usual(),
-            held_out_by: judge.held_out_by,
-            quoted: None,
-            restarted_s: None,
-            noise_source: judge.noise_source,
-            noise_estimate: judge.measured_noise_rmse() * self.units.y,
-            level_scatter: judge.level_scatter(),
-            ladder: vec![first.clone()],
-            ranking: ranked(&self.units, before, &rivals, &table.chance, None),
-            parameters: BTreeMap::new(),
-            evidence_nats: Likelihood::of(judge, given_inside)
-                .and_then(|likelihood| likelihood.evidence(given_inside)),
-            certificates: BTreeMap::new(),
-            parsimony: None,
-            posterior: Vec::new(),
-            not_tried: not_tried(self.search, given_inside),
-            separation: None,
-            p_value: None,
-            model: given.clone(),
-            base: given.clone(),
-        })
-    }
-
-    /// Whether replacing a term of the given base by an effect lowers the error, or fits equally well with
-    /// fewer parameters. Unnamed terms imitate some effects well enough to reach the noise level.
-    fn imitated(&self, given: &Model, as_given: &HeldOut) -> bool {
-        Term::UNNAMED.iter().any(|stand_in| {
-            let without = stand_in.taken_from(given, given);
-            if without == *given {
-                return false;
-            }
-            let search = self.search;
-            let own = as_given.rmse();
-            let others =
-                search.in_place_of(stand_in, &without, own, |term| term.effect().is_some());
-            let lags = Term::lags_of(&without);
-            // The lags were estimated beside the surrogate: they are moved before the comparison.
-            let others: Vec<_> = others.into_iter().take(RULES.settled).collect();
-            others.into_par_iter().any(|other| {
-                let terms = [lags.clone(), vec![other.term.clone()]].concat();
-                let count = terms.len();
-                let end = search.finish(terms, other.fit, count);
-                end.is_some_and(|end| {
-                    let ratio = end.judged.rmse() / own;
-                    let p = p_value(as_given, &end.judged.held_out);
-                    let better = ratio < 1.0 - RULES.alike && p < RULES.level;
-                    let leaner = ratio < 1.0 + RULES.alike && other.term.cost() < stand_in.cost();
-                    better || leaner
-                })
-            })
-        })
-    }
-
     /// Whether an error is at the noise level, within its uncertainty.
     fn fits(&self, judged: &Judged) -> bool {
         let judge = self.judge();
@@ -360,7 +266,7 @@ impl Session<'_> {
         let excess = |hypothesis: &Hypothesis| judge.excess(&hypothesis.judged.held_out);
         let little = best.judged.rmse() > (1.0 - RULES.worthwhile) * lesser.judged.rmse()
             || excess(best) > (1.0 - RULES.most) * excess(lesser)
-            || judge.over_noise(lesser.judged.rmse()) <= RULES.at_once;
+            || judge.over_noise(lesser.judged.rmse()) <= RULES.floor_margin;
         (little && self.fits(&lesser.judged)) || self.more_than_chance(best, lesser).is_none()
     }
 

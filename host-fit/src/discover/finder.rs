@@ -59,7 +59,7 @@ impl Finder<'_> {
             pool.extend(curves.into_iter().map(|curve| (beside, curve)));
         }
         // A model at the noise level cannot be improved.
-        let open = self.search.judge.over_noise(base.judged.rmse()) > DIAGNOSE.at_once;
+        let open = self.search.judge.over_noise(base.judged.rmse()) > DIAGNOSE.floor_margin;
         let found = open
             .then(|| self.judged(self.followed(pool, number), base, looked_at, number))
             .flatten();

@@ -12,17 +12,17 @@ use crate::model::Model;
 use rayon::prelude::*;
 
 /// An effect added to a model and fitted for a few iterations.
-pub(crate) struct InPlace {
-    pub(crate) term: Term,
-    pub(crate) held_out: HeldOut,
-    pub(crate) fit: Fit,
+struct InPlace {
+    term: Term,
+    held_out: HeldOut,
+    fit: Fit,
 }
 
 impl Search<'_> {
     /// Single terms that could replace a removed one, on the model without it, best first: one of each kind
     /// among `wanted`, and the leading effects. Only those whose validation error is within reach of `own`,
     /// the error with the removed term.
-    pub(crate) fn in_place_of(
+    fn in_place_of(
         &self,
         taken: &Term,
         without: &Model,

@@ -226,6 +226,71 @@ impl Search<'_> {
     /// follows the less promising candidates of the root and of the best hypothesis.
     #[must_use]
     pub fn run(&self, root: Hypothesis, second: impl FnOnce() -> Option<Hypothesis>) -> Found {
+        let (mut all, mut tried) = self.rounds(root, second);
+        (self.progress)("leaving out what is not needed");
+        let root = all[0].clone();
+        let end = best(&all, |_| true);
+        let bare_end = best(&all, Hypothesis::is_bare);
+        let mut found = self.pruned(all[end].clone(), &root);
+        // The best hypothesis without effects is determined before terms are exchanged for effects.
+        let bare = if bare_end == end {
+            found.clone()
+        } else {
+            (self.progress)("the same for the best without effects");
+            self.pruned(all[bare_end].clone(), &root)
+        };
+        if self.over(&found) > RULES.at_the_floor
+            && let Some(start) = self.without_lags(&found, &root)
+        {
+            (self.progress)("lags anew beside the effects");
+            let (anew, further) = self.rounds(start, || None);
+            tried += further;
+            let other = &anew[best(&anew, |_| true)];
+            if other.score() < found.score() - RULES.price {
+                found = self.pruned(other.clone(), &root);
+            }
+            all.extend(anew);
+        }
+        let found = self.exchanged(found, &root);
+        Found {
+            root,
+            best: found,
+            bare,
+            tried,
+            all,
+        }
+    }
+
+    /// The effects of a hypothesis on the lags of `root`; `None` if it has no other terms. Lags that were chosen before
+    /// an effect was there imitate it.
+    fn without_lags(&self, hypothesis: &Hypothesis, root: &Hypothesis) -> Option<Hypothesis> {
+        let (terms, lags): (Vec<Term>, Vec<Term>) = hypothesis
+            .terms
+            .iter()
+            .cloned()
+            .partition(|term| term.effect().is_some());
+        if terms.is_empty() || lags.is_empty() || self.interrupted() {
+            return None;
+        }
+        let own = hypothesis.judged.model().clone();
+        let bare = root.judged.model();
+        let model = lags
+            .iter()
+            .rev()
+            .fold(own, |m, term| term.taken_from(&m, bare));
+        let judged = self.judge.refitted(&model).ok()?;
+        Some(Hypothesis {
+            terms,
+            ..Hypothesis::new(judged)
+        })
+    }
+
+    /// The rounds of a search from `root`: all results, `root` first, and how many proposals were refitted.
+    fn rounds(
+        &self,
+        root: Hypothesis,
+        second: impl FnOnce() -> Option<Hypothesis>,
+    ) -> (Vec<Hypothesis>, usize) {
         let mut all = vec![root];
         let mut second = Some(second);
         let mut tried = Vec::new();
@@ -278,26 +343,7 @@ impl Search<'_> {
             };
         }
         all.retain(|hypothesis| !hypothesis.bent);
-        (self.progress)("leaving out what is not needed");
-        let root = all[0].clone();
-        let end = best(&all, |_| true);
-        let bare_end = best(&all, Hypothesis::is_bare);
-        let found = self.pruned(all[end].clone(), &root);
-        // The best hypothesis without effects is determined before terms are exchanged for effects.
-        let bare = if bare_end == end {
-            found.clone()
-        } else {
-            (self.progress)("the same for the best without effects");
-            self.pruned(all[bare_end].clone(), &root)
-        };
-        let found = self.exchanged(found, &root);
-        Found {
-            root,
-            best: found,
-            bare,
-            tried: tried.len(),
-            all,
-        }
+        (all, tried.len())
     }
 
     /// One round: screens on the `chosen` hypotheses, refits `width` times the usual number of proposals, and

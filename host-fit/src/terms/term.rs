@@ -44,24 +44,8 @@ pub enum Term {
 }
 
 impl Term {
-    /// Terms of the base that are not missing effects but imitate some; their values come from the search.
-    pub(crate) const UNNAMED: [Self; 3 + PATH_TERMS.len()] = [
-        Self::LevelRate,
-        Self::Wake(0.0),
-        Self::Inertia(0.0),
-        Self::path(0),
-        Self::path(1),
-    ];
-
-    const fn path(index: usize) -> Self {
-        Self::Path {
-            spec: PATH_TERMS[index],
-            parameters: Vec::new(),
-        }
-    }
-
     /// The movable lags of `model`, as terms.
-    pub(crate) fn lags_of(model: &Model) -> Vec<Self> {
+    fn lags_of(model: &Model) -> Vec<Self> {
         let mut lags = [&model.state_lags[..], &model.product_lags].concat();
         lags.sort_unstable();
         lags.dedup();

@@ -146,6 +146,23 @@ fn an_effect_at_a_bound_beside_a_lean_base_is_found_in_the_end() {
     assert!(row.is_at_floor(), "{:?}", row.over_floor);
 }
 
+/// The lags of the given model reach 1.01 × the noise level without the droop; fewer lags and the droop do it better.
+#[test]
+#[ignore = "half a minute of processor time: cargo xtask kept-rigs"]
+fn an_effect_that_the_given_lags_imitate_is_found() {
+    let row = asked(&Case {
+        noise: NoiseKind::HeavyTails,
+        ..Case::new(
+            Group::Single,
+            Family::Inertia,
+            &["plenum-droop"],
+            880_000_063,
+        )
+    });
+    assert_eq!(row.missing, ["plenum-droop"], "{}", row.said());
+    assert!(row.is_at_floor(), "{:?}", row.over_floor);
+}
+
 #[test]
 #[ignore = "two minutes of processor time: cargo xtask kept-rigs"]
 fn an_effect_beside_a_memory_of_the_flow_is_found_alone() {

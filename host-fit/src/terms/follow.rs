@@ -344,6 +344,39 @@ mod tests {
     }
 
     #[test]
+    fn lags_are_dropped_beside_an_effect_that_stays() {
+        let records = remembering(4);
+        let judge = Judge::new(&records, None, FitOptions::default()).expect("records");
+        let spec = model_core::effects::spec("hot-film-lag").expect("in the catalogue");
+        let film = Term::Effect {
+            spec,
+            parameters: vec![0.004],
+            grading: Model::default().grading,
+            reference: None,
+        };
+        let judged = |terms: &[Term]| judge.judged_from(begun(&judge, terms)).expect("stable");
+        let terms = vec![Term::State(120), film.clone(), Term::Product(61)];
+        let with = Hypothesis {
+            judged: judged(&terms),
+            terms,
+            ..Hypothesis::new(judged(&[]))
+        };
+        let root = Hypothesis::new(judged(&[]));
+        let search = search(&judge);
+        let anew = search.without_lags(&with, &root).expect("stable");
+        let model = anew.judged.model();
+        assert_eq!(anew.words(), film.name());
+        assert_eq!(
+            (&model.state_lags[..], &model.product_lags[..]),
+            (&[1][..], &[1][..])
+        );
+        assert_eq!(model.effects.len(), 1);
+        // Nothing is dropped where there are lags only, or an effect only.
+        assert!(search.without_lags(&anew, &root).is_none());
+        assert!(search.without_lags(&root, &root).is_none());
+    }
+
+    #[test]
     fn lags_that_are_off_by_a_dozen_samples_are_moved_to_where_they_belong() {
         let records = remembering(4);
         let judge = Judge::new(&records, None, FitOptions::default()).expect("records");

@@ -223,7 +223,8 @@ impl Search<'_> {
 
     /// Searches from `root`, and from `second` unless the first round reaches the noise level, until no
     /// remaining candidate pays for its parameters. If the error is still far above the noise, one extension
-    /// follows the less promising candidates of the root and of the best hypothesis.
+    /// follows the less promising candidates of the root and of the best hypothesis. Where the noise level is not
+    /// reached, lags are searched anew beside the effects of the best hypothesis.
     #[must_use]
     pub fn run(&self, root: Hypothesis, second: impl FnOnce() -> Option<Hypothesis>) -> Found {
         let (mut all, mut tried) = self.rounds(root, second);
@@ -263,7 +264,11 @@ impl Search<'_> {
 
     /// The effects of a hypothesis on the lags of `root`; `None` if it has no other terms. Lags that were chosen before
     /// an effect was there imitate it.
-    fn without_lags(&self, hypothesis: &Hypothesis, root: &Hypothesis) -> Option<Hypothesis> {
+    pub(super) fn without_lags(
+        &self,
+        hypothesis: &Hypothesis,
+        root: &Hypothesis,
+    ) -> Option<Hypothesis> {
         let (terms, lags): (Vec<Term>, Vec<Term>) = hypothesis
             .terms
             .iter()

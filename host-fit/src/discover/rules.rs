@@ -50,7 +50,7 @@ rules! {
     /// A base below this factor is near the noise level: a term must then explain `most_of_it`, and
     /// sensitivity and time in the record are not reported, because record-to-record scatter and drift look
     /// like them.
-    near_the_floor: f64 = 1.10, "times the noise level", "`floor_margin` of `diagnose`: null cases of nine families stay below it";
+    near_the_floor: f64 = 1.10, "times the noise level", "null cases of nine families stay below it";
     /// Share of the unexplained variance that a term must explain near the noise level, and wherever the
     /// sensor has a record-to-record offset.
     most_of_it: f64 = 0.75, "share of the model error above the noise", "curves that imitate an offset drift explained 50 to 70 %, true terms at least 80 % in 16 of 17 cases";

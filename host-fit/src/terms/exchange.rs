@@ -129,6 +129,34 @@ impl Search<'_> {
         hypothesis
     }
 
+    /// The effects of a hypothesis on the lags of `root`; `None` if it has no other terms. Lags that were chosen before
+    /// an effect was there imitate it.
+    pub(super) fn without_lags(
+        &self,
+        hypothesis: &Hypothesis,
+        root: &Hypothesis,
+    ) -> Option<Hypothesis> {
+        let (terms, lags): (Vec<Term>, Vec<Term>) = hypothesis
+            .terms
+            .iter()
+            .cloned()
+            .partition(|term| term.effect().is_some());
+        if terms.is_empty() || lags.is_empty() || self.interrupted() {
+            return None;
+        }
+        let own = hypothesis.judged.model().clone();
+        let bare = root.judged.model();
+        let model = lags
+            .iter()
+            .rev()
+            .fold(own, |m, term| term.taken_from(&m, bare));
+        let judged = self.judge.refitted(&model).ok()?;
+        Some(Hypothesis {
+            terms,
+            ..Hypothesis::new(judged)
+        })
+    }
+
     /// Drops the terms that are not needed. A term that is needed in a larger model is needed in a smaller
     /// one and is not tested again.
     pub(super) fn pruned(&self, mut hypothesis: Hypothesis, root: &Hypothesis) -> Hypothesis {

@@ -262,34 +262,6 @@ impl Search<'_> {
         }
     }
 
-    /// The effects of a hypothesis on the lags of `root`; `None` if it has no other terms. Lags that were chosen before
-    /// an effect was there imitate it.
-    pub(super) fn without_lags(
-        &self,
-        hypothesis: &Hypothesis,
-        root: &Hypothesis,
-    ) -> Option<Hypothesis> {
-        let (terms, lags): (Vec<Term>, Vec<Term>) = hypothesis
-            .terms
-            .iter()
-            .cloned()
-            .partition(|term| term.effect().is_some());
-        if terms.is_empty() || lags.is_empty() || self.interrupted() {
-            return None;
-        }
-        let own = hypothesis.judged.model().clone();
-        let bare = root.judged.model();
-        let model = lags
-            .iter()
-            .rev()
-            .fold(own, |m, term| term.taken_from(&m, bare));
-        let judged = self.judge.refitted(&model).ok()?;
-        Some(Hypothesis {
-            terms,
-            ..Hypothesis::new(judged)
-        })
-    }
-
     /// The rounds of a search from `root`: all results, `root` first, and how many proposals were refitted.
     fn rounds(
         &self,

@@ -5,7 +5,7 @@ use super::alternatives::Set;
 use super::ranking::Rival;
 use super::session::Session;
 use crate::model::Model;
-use crate::terms::{Found, Hypothesis, MostLikely, Term};
+use crate::terms::{Found, Hypothesis, Judge, MostLikely, Term};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -77,23 +77,18 @@ impl Session<'_> {
     pub(super) fn is_certified(&self, best: &Hypothesis, found: &Found) -> bool {
         let certificate = || {
             let own = self.evidence(best)?;
-            self.certificate(own, std::slice::from_ref(&found.bare), found)
+            let bare = Null::of(self.judge(), &found.bare)?;
+            self.certificate(own, &[bare], found)
         };
         certificate().is_some_and(|certificate| certificate.holds())
     }
 
-    /// The certificate of a model with this evidence (nats) against these null models.
-    fn certificate(&self, own: f64, nulls: &[Hypothesis], found: &Found) -> Option<Certificate> {
-        let judge = self.judge();
-        let each = nulls.par_iter().filter_map(|null| {
-            let null = MostLikely::of(judge, null.judged.model())?;
-            // Where the evidence of a null model cannot be computed, its likelihood is used.
-            let evidence = null.evidence(judge).unwrap_or(f64::NEG_INFINITY);
-            Some((null.log_likelihood, evidence))
-        });
-        let (likelihood, evidence) =
-            each.reduce_with(|a, b| (f64::max(a.0, b.0), f64::max(a.1, b.1)))?;
-        let all = judge.first_fold();
+    /// The certificate of a model with this evidence (nats) against these null models; `None` without any.
+    fn certificate(&self, own: f64, nulls: &[Null], found: &Found) -> Option<Certificate> {
+        let most = |of: fn(&Null) -> f64| nulls.iter().map(of).reduce(f64::max);
+        let likelihood = most(|null| null.log_likelihood)?;
+        let evidence = most(|null| null.evidence)?;
+        let all = self.judge().first_fold();
         let mut records: Vec<String> = all.iter().map(|record| record.name.clone()).collect();
         records.dedup();
         // The e-value is divided by the number of structures tried.
@@ -121,13 +116,28 @@ impl Session<'_> {
         let Some(own) = self.evidence(subject) else {
             return BTreeMap::new();
         };
-        let certificate = |(index, term): (usize, &Term)| {
-            let name = term.effect()?.name.to_owned();
-            let set = sets.iter().find(|set| set.names.first() == Some(&name));
-            let names = set.map_or(std::slice::from_ref(&name), |set| &set.names);
+        let without = |index: usize| {
+            subject.terms[index].effect()?;
+            self.search.without(subject, index, &found.root)
+        };
+        let places = (0..subject.terms.len()).into_par_iter();
+        let mut lesser: Vec<Option<Hypothesis>> = places.map(without).collect();
+        // Null models are often common to several effects: each is fitted once.
+        let mut distinct: Vec<Hypothesis> = Vec::new();
+        let mut effects: Vec<(&str, Vec<usize>)> = Vec::new();
+        for (index, effect) in subject.terms.iter().enumerate() {
+            let Some(effect) = effect.effect() else {
+                continue;
+            };
+            let set = sets
+                .iter()
+                .find(|set| set.names.first().is_some_and(|first| first == effect.name));
             let lacks = |model: &&Hypothesis| {
                 let mut effects = model.terms.iter().filter_map(Term::effect);
-                !effects.any(|effect| names.iter().any(|name| name == effect.name))
+                !effects.any(|own| {
+                    own.name == effect.name
+                        || set.is_some_and(|set| set.names.iter().any(|name| name == own.name))
+                })
             };
             let least = |all: &mut dyn Iterator<Item = &Hypothesis>| {
                 all.filter(lacks)
@@ -136,15 +146,50 @@ impl Session<'_> {
             };
             let nulls = [
                 Some(found.bare.clone()),
-                self.search.without(subject, index, &found.root),
+                lesser[index].take(),
                 least(&mut found.all.iter()),
                 least(&mut others.iter().filter_map(|rival| rival.refitted.as_ref())),
             ];
-            let nulls: Vec<Hypothesis> = nulls.into_iter().flatten().collect();
-            let certificate = self.certificate(own, &nulls, found)?;
-            Some((name, certificate))
-        };
-        let terms: Vec<_> = subject.terms.iter().enumerate().collect();
-        terms.into_par_iter().filter_map(certificate).collect()
+            let places = nulls.into_iter().flatten().map(|null| {
+                let is_same = |other: &Hypothesis| is_same(other, &null);
+                distinct.iter().position(is_same).unwrap_or_else(|| {
+                    distinct.push(null);
+                    distinct.len() - 1
+                })
+            });
+            effects.push((effect.name, places.collect()));
+        }
+        let judge = self.judge();
+        let nulls = distinct.par_iter().map(|null| Null::of(judge, null));
+        let nulls: Vec<Option<Null>> = nulls.collect();
+        let certificates = effects.into_iter().filter_map(|(name, places)| {
+            let nulls: Vec<Null> = places.into_iter().filter_map(|at| nulls[at]).collect();
+            Some((name.to_owned(), self.certificate(own, &nulls, found)?))
+        });
+        certificates.collect()
     }
+}
+
+/// What a certificate needs of a model that lacks the effect.
+#[derive(Clone, Copy)]
+struct Null {
+    log_likelihood: f64,
+    evidence: f64,
+}
+
+impl Null {
+    fn of(judge: &Judge, hypothesis: &Hypothesis) -> Option<Self> {
+        let null = MostLikely::of(judge, hypothesis.judged.model())?;
+        Some(Self {
+            log_likelihood: null.log_likelihood,
+            // Where the evidence cannot be computed, the likelihood is used.
+            evidence: null.evidence(judge).unwrap_or(f64::NEG_INFINITY),
+        })
+    }
+}
+
+/// Whether two hypotheses are one model, found on two ways.
+fn is_same(a: &Hypothesis, b: &Hypothesis) -> bool {
+    let [least, most] = [f64::min, f64::max].map(|of| of(a.judged.rmse(), b.judged.rmse()));
+    a.is_built_as(b.judged.model()) && most <= (1.0 + f64::EPSILON.sqrt()) * least
 }

@@ -75,31 +75,38 @@ pub(crate) fn estimates_among(
     .collect()
 }
 
-/// Whether an effect's parameters are identifiable: the interval of its amplitude excludes 0, and each
-/// positive parameter is known to within a factor.
+/// Whether the records identify an effect: the interval of its amplitude excludes 0, and at least one of its
+/// positive parameters is known to within a factor. Two parameters may be correlated, as the two of King's
+/// law are: then only a combination of them is known.
 pub(super) fn is_identified(fit: &Fit, spec: &Spec) -> bool {
     let values = fit.model.values();
-    let amplitude = spec.amplitude.filter(|amplitude| amplitude.linear);
-    own(&fit.model, spec).into_iter().all(|(index, card)| {
-        let half = DEVIATES * fit.standard_error(index).unwrap_or(f64::INFINITY);
-        if amplitude.is_some_and(|amplitude| amplitude.parameter == card.name) {
-            values[index].abs() > half
-        } else if card.is_logarithmic() && card.low < card.high {
-            2.0 * half / values[index] <= RULES.identified.ln()
-        } else {
-            true
-        }
-    })
+    let mut spans = own(&fit.model, spec)
+        .into_iter()
+        .filter_map(|(index, card)| {
+            let half = DEVIATES * fit.standard_error(index).unwrap_or(f64::INFINITY);
+            (card.is_logarithmic() && card.low < card.high).then(|| 2.0 * half / values[index])
+        });
+    let least = spans.next().map(|first| spans.fold(first, f64::min));
+    excludes_zero(fit, spec, f64::INFINITY)
+        && least.is_none_or(|least| least <= RULES.identified.ln())
 }
 
 /// Whether the amplitude of an effect differs significantly from 0; `true` if its card has no linear amplitude.
 pub(super) fn is_there(fit: &Fit, spec: &Spec) -> bool {
-    let values = fit.model.values();
-    let amplitude = spec.amplitude.filter(|amplitude| amplitude.linear);
-    own(&fit.model, spec).into_iter().all(|(index, card)| {
-        let half = DEVIATES * fit.standard_error(index).unwrap_or(0.0);
-        amplitude.is_none_or(|amplitude| amplitude.parameter != card.name)
-            || values[index].abs() > half
+    excludes_zero(fit, spec, 0.0)
+}
+
+/// Whether the interval of an effect's linear amplitude, if it has one, excludes 0. `unknown` is the standard
+/// error of an amplitude that has none.
+fn excludes_zero(fit: &Fit, spec: &Spec, unknown: f64) -> bool {
+    let Some(amplitude) = spec.amplitude.filter(|amplitude| amplitude.linear) else {
+        return true;
+    };
+    let mut own = own(&fit.model, spec).into_iter();
+    let place = own.find(|(_, card)| amplitude.parameter == card.name);
+    place.is_none_or(|(index, _)| {
+        let half = DEVIATES * fit.standard_error(index).unwrap_or(unknown);
+        fit.model.values()[index].abs() > half
     })
 }
 
@@ -120,35 +127,44 @@ mod tests {
     use crate::fit::FitStop;
     use model_core::effects::spec;
 
-    /// Whether a vortex of gain 0.3 and decay time 30 ms counts as identified with these standard errors.
-    fn known_to(gain: f64, decay: f64) -> bool {
-        let vortex = spec("starting-vortex").expect("in the catalogue");
+    /// Whether an effect with these values counts as identified with these standard errors.
+    fn known_to(name: &str, values: &[f64], errors: &[f64]) -> bool {
+        let effect = spec(name).expect("in the catalogue");
         let mut model = Model::default();
-        model.add(vortex, &[0.3, 0.03], None);
-        let at = |name: &str| {
-            let coordinates = model.coordinates();
-            coordinates
-                .iter()
-                .position(|c| c.name == name)
-                .expect("a parameter")
-        };
-        let free = vec![at("starting-vortex.gain"), at("starting-vortex.decay_time")];
+        model.add(effect, values, Some(1.0));
+        let places: Vec<(usize, &Parameter)> = own(&model, effect);
+        let count = errors.len();
+        let mut covariance = vec![0.0; count * count];
+        for (at, error) in errors.iter().enumerate() {
+            covariance[at * count + at] = error * error;
+        }
         let fit = Fit {
+            free: places.iter().map(|(index, _)| *index).collect(),
             model,
             sum_of_squares: 1.0,
             samples: 100,
-            free,
-            covariance: vec![gain * gain, 0.0, 0.0, decay * decay],
+            covariance,
             iterations: 1,
             stop: FitStop::Converged,
         };
-        is_identified(&fit, vortex)
+        is_identified(&fit, effect)
     }
 
     #[test]
     fn an_amplitude_that_may_be_none_and_a_time_that_may_be_any_are_not_known() {
-        assert!(known_to(0.1, 0.01));
-        assert!(!known_to(0.2, 0.01));
-        assert!(!known_to(0.1, 0.05));
+        let known = |gain, decay| known_to("starting-vortex", &[0.3, 0.03], &[gain, decay]);
+        assert!(known(0.1, 0.01));
+        assert!(!known(0.2, 0.01));
+        assert!(!known(0.1, 0.05));
+    }
+
+    /// Ratio and offset of King's law are correlated: one of them is enough.
+    #[test]
+    fn one_known_parameter_of_two_identifies_an_effect() {
+        let known =
+            |ratio, offset| known_to("hot-film-nonlinearity", &[1.5, 0.2], &[ratio, offset]);
+        assert!(known(2.4, 0.04));
+        assert!(known(0.3, 0.4));
+        assert!(!known(2.4, 0.4));
     }
 }

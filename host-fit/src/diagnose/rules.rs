@@ -30,8 +30,8 @@ rules! {
     /// If the final model is above the noise level, effects that explain at least this share are reported as
     /// surrogates.
     stands_in: f64 = 0.25, "share of the model error above the noise", "judgement: nothing is claimed, but the written model has a smaller error";
-    /// An effect beside others is a surrogate if the interval of a positive parameter spans more than this
-    /// factor, or if its amplitude may be 0. A single effect on a base that fits is then not named.
+    /// An effect beside others is a surrogate if the interval of each of its positive parameters spans more than
+    /// this factor, or if its amplitude may be 0. A single effect on a base that fits is then not named.
     identified: f64 = 100.0, "times", "judgement; a wrong hysteresis beside an edge-dependent delay spanned 180";
     /// Where the level of slow noise is unknown, a model error counts if this share of it is a function of a
     /// coordinate.

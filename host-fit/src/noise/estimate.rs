@@ -11,6 +11,8 @@ const SHARES: [f64; 6] = [0.1, 0.25, 0.5, 0.75, 0.9, 0.98];
 const MEMORIES: [f64; 7] = [2.0, 5.0, 12.0, 30.0, 80.0, 200.0, 500.0];
 /// Smallest step in logit share and ln correlation time, relative to the grid's.
 const FINEST: f64 = 0.05;
+/// The first step from the colour of similar errors.
+const NEAR: f64 = 0.25;
 /// Most EM iterations for the variances; the gains decrease.
 const ROUNDS: usize = 60;
 
@@ -60,26 +62,28 @@ impl NoiseModel {
             colour: samples.max(1.0).ln(),
             random_effect: 0.5 * (errors.len().max(1) as f64).ln().max(1.0),
         };
-        Self::estimated(errors, measured, price)
+        Self::estimated(errors, measured, price, None)
     }
 
-    /// The maximum-likelihood noise model of `errors` with all its parameters, without penalties.
+    /// The maximum-likelihood noise model of `errors` with all its parameters, without penalties. Its colour is
+    /// searched around that of a `similar` model's errors, if there is one.
     #[must_use]
-    pub fn most_likely(errors: &[Series], measured: bool) -> Self {
+    pub fn most_likely(errors: &[Series], measured: bool, similar: Option<&Self>) -> Self {
         let free = Price {
             colour: 0.0,
             random_effect: 0.0,
         };
-        Self::estimated(errors, measured, free)
+        let near = similar.map(|noise| noise.colour);
+        Self::estimated(errors, measured, free, near)
     }
 
-    fn estimated(errors: &[Series], measured: bool, price: Price) -> Self {
+    fn estimated(errors: &[Series], measured: bool, price: Price, near: Option<Colour>) -> Self {
         let least = if measured { 1.0 } else { 0.0 };
         let white = Colour::WHITE;
         let errors: Vec<Prepared<'_>> = errors.iter().map(Prepared::of).collect();
         let errors = errors.as_slice();
         let (mut colour, mut best) = (white, likelihood(errors, white, least, price));
-        let coloured = coloured(errors, least, price);
+        let coloured = coloured(errors, least, price, near);
         if coloured.1.log_likelihood > best.log_likelihood + price.colour {
             (colour, best) = coloured;
         }
@@ -94,9 +98,15 @@ impl NoiseModel {
     }
 }
 
-/// The best colour by grid search with refinement.
-fn coloured(errors: &[Prepared<'_>], least: f64, price: Price) -> (Colour, Best) {
+/// The best colour: from the grid, or from `near` in smaller steps, with refinement.
+fn coloured(
+    errors: &[Prepared<'_>],
+    least: f64,
+    price: Price,
+    near: Option<Colour>,
+) -> (Colour, Best) {
     // Equal steps in the logit of the share and in ln of the correlation time.
+    let logit = |share: f64| (share / (1.0 - share)).ln();
     let colour = |[share, memory]: [f64; 2]| Colour {
         share: 1.0 / (1.0 + (-share).exp()),
         pole: (-1.0 / memory.exp()).exp(),
@@ -106,23 +116,29 @@ fn coloured(errors: &[Prepared<'_>], least: f64, price: Price) -> (Colour, Best)
         each.map(|point| (point, likelihood(errors, colour(point), least, price)))
             .collect()
     };
-    let points = SHARES
-        .iter()
-        .flat_map(|share| MEMORIES.map(|memory| [(share / (1.0 - share)).ln(), memory.ln()]));
     let better = |a: &([f64; 2], Best), b: &([f64; 2], Best)| {
         a.1.log_likelihood.total_cmp(&b.1.log_likelihood)
     };
-    let Some(mut best) = evaluate(points.collect()).into_iter().max_by(better) else {
+    let near = near.map(|near| [logit(near.share), (-1.0 / near.pole.ln()).ln()]);
+    let (points, mut step) = match near.filter(|point| point.iter().all(|x| x.is_finite())) {
+        Some(point) => (vec![point], NEAR),
+        None => {
+            let times = MEMORIES.map(f64::ln);
+            let of = |share| times.map(|memory| [logit(share), memory]);
+            (SHARES.into_iter().flat_map(of).collect(), 1.0)
+        }
+    };
+    let Some(mut best) = evaluate(points).into_iter().max_by(better) else {
         return (
             Colour::WHITE,
             likelihood(errors, Colour::WHITE, least, price),
         );
     };
-    let mut step = 1.0;
     while step > FINEST {
         // Share and correlation time are correlated along a ridge: diagonal neighbours are tried too.
-        let around = (0..9).map(|at| [f64::from(at / 3) - 1.0, f64::from(at % 3) - 1.0]);
-        let next = around.map(|[s, m]| [best.0[0] + s * step, best.0[1] + m * step]);
+        let around = (0..9).filter(|at| *at != 4);
+        let next = around.map(|at| [f64::from(at / 3) - 1.0, f64::from(at % 3) - 1.0]);
+        let next = next.map(|[s, m]| [best.0[0] + s * step, best.0[1] + m * step]);
         match evaluate(next.collect()).into_iter().max_by(better) {
             Some(found) if found.1.log_likelihood > best.1.log_likelihood => best = found,
             _ => step *= 0.5,

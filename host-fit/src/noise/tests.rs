@@ -133,6 +133,41 @@ fn offsets_drifts_and_levels_of_records_are_found_with_their_variance() {
     assert_eq!([none.offset, none.drift, none.level], [0.0; 3]);
 }
 
+/// From a colour elsewhere the search ends as high as from the grid.
+#[test]
+fn a_search_from_a_similar_colour_ends_where_the_grid_does() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    for (share, memory) in [(0.3, 4.0), (0.6, 40.0), (0.9, 15.0)] {
+        let how = Disturbed {
+            share,
+            memory,
+            louder: 1.0,
+            ..STILL
+        };
+        let errors = records(&mut rng, 4, 3000, how);
+        let grid = NoiseModel::most_likely(&errors, false, None);
+        assert!((grid.colour.share - share).abs() < 0.1, "{:?}", grid.colour);
+        let elsewhere = NoiseModel {
+            colour: Colour {
+                share: 0.5,
+                pole: (-1.0_f64 / 12.0).exp(),
+            },
+            ..grid.clone()
+        };
+        for similar in [
+            elsewhere,
+            NoiseModel {
+                colour: Colour::WHITE,
+                ..grid.clone()
+            },
+        ] {
+            let near = NoiseModel::most_likely(&errors, false, Some(&similar));
+            let gap = grid.log_likelihood(&errors) - near.log_likelihood(&errors);
+            assert!(gap.abs() < 0.1, "{share}, {memory}: {gap}");
+        }
+    }
+}
+
 #[test]
 fn noise_above_its_standard_errors_counts_and_noise_below_them_does_not() {
     let mut rng = ChaCha8Rng::seed_from_u64(6);

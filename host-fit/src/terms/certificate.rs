@@ -18,6 +18,7 @@ pub(crate) struct MostLikely {
     /// ln of the likelihood of all records up to a constant of the records, nats.
     pub(crate) log_likelihood: f64,
     model: Model,
+    noise: NoiseModel,
     records: Vec<Weighed>,
     samples: f64,
 }
@@ -27,17 +28,17 @@ impl MostLikely {
     /// steps in the metric of the noise. `None` if the free run diverges.
     pub(crate) fn of(judge: &Judge, model: &Model) -> Option<Self> {
         let records = judge.scored_records();
-        let mut best = Self::at(judge, model, &records)?;
+        let mut best = Self::at(judge, model, &records, None)?;
         let all: Vec<&Record> = records.iter().collect();
         if let Ok(fitted) = fit(model, &all, &judge.options_for(model))
-            && let Some(better) = Self::at(judge, &fitted.model, &records)
+            && let Some(better) = Self::at(judge, &fitted.model, &records, Some(&best.noise))
             && better.log_likelihood > best.log_likelihood
         {
             best = better;
         }
         for _ in 0..STEPS {
-            let moved = best.stepped(judge);
-            match moved.and_then(|moved| Self::at(judge, &moved, &records)) {
+            let at = |moved: Model| Self::at(judge, &moved, &records, Some(&best.noise));
+            match best.stepped(judge).and_then(at) {
                 Some(better) if better.log_likelihood > best.log_likelihood => best = better,
                 _ => break,
             }
@@ -45,15 +46,22 @@ impl MostLikely {
         Some(best)
     }
 
-    fn at(judge: &Judge, model: &Model, records: &[Record]) -> Option<Self> {
+    /// `model` as it is, with the most likely noise; its colour is searched near that of a `similar` model.
+    fn at(
+        judge: &Judge,
+        model: &Model,
+        records: &[Record],
+        similar: Option<&NoiseModel>,
+    ) -> Option<Self> {
         let errors = errors(judge, model, records)?;
         let measured = judge.noise_source != NoiseSource::Scatter;
-        let noise = NoiseModel::most_likely(&errors, measured);
+        let noise = NoiseModel::most_likely(&errors, measured, similar);
         Some(Self {
             log_likelihood: noise.log_likelihood(&errors),
             model: model.clone(),
             records: weighed(records, &errors, &noise),
             samples: errors.iter().map(|e| e.residual.len() as f64).sum(),
+            noise,
         })
     }
 

@@ -115,7 +115,7 @@ impl Session<'_> {
         } = alone
             .map(concluded)
             .filter(|conclusion| !conclusion.effects.is_empty())
-            .unwrap_or_else(|| concluded(&named));
+            .unwrap_or_else(|| self.concluded_on_most(&named, &found, as_given));
         if effects.is_empty() && !named.is_bare() {
             compared = self.compared(&last, &found);
         }
@@ -234,6 +234,36 @@ impl Session<'_> {
             base: units.model_out(&judge.final_fit(&found.bare.judged).model),
             model,
         }
+    }
+
+    /// The verdict on the largest set of the effects of `named` for which there is enough evidence. The least
+    /// important effect is left out first: doubts about it are no doubts about the others.
+    fn concluded_on_most(
+        &self,
+        named: &Hypothesis,
+        found: &Found,
+        as_given: &HeldOut,
+    ) -> Conclusion {
+        let all = self.concluded(named, found, as_given);
+        let mut fewer = named.clone();
+        while all.effects.is_empty() {
+            let effects = (0..fewer.terms.len()).filter(|i| fewer.terms[*i].effect().is_some());
+            let effects: Vec<usize> = effects.collect();
+            if effects.len() < 2 {
+                break;
+            }
+            let lesser = effects.into_par_iter();
+            let lesser = lesser.filter_map(|i| self.search.without(&fewer, i, &found.root));
+            let size = |one: &Hypothesis| one.judged.rmse();
+            let least = lesser.min_by(|a, b| size(a).total_cmp(&size(b)));
+            let Some(least) = least else { break };
+            fewer = least;
+            let conclusion = self.concluded(&fewer, found, as_given);
+            if !conclusion.effects.is_empty() {
+                return conclusion;
+            }
+        }
+        all
     }
 
     /// A hypothesis without its effects, and all candidates on that model.

@@ -41,7 +41,7 @@ fn error_of(output: &Output) -> String {
 fn a_slower_rig_gets_the_same_law_and_constants_with_its_period() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut laws = Vec::new();
-    for period_s in [0.001, 0.01, 0.1] {
+    for period_s in [0.001, 0.1] {
         let name = |suffix: &str| folder.path().join(suffix).to_string_lossy().into_owned();
         let [model, controlled, constants] = [name("m.toml"), name("c.toml"), name("c.rs")];
         paper_at(period_s).save(Path::new(&model)).expect("saved");

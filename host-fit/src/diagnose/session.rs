@@ -339,3 +339,71 @@ impl Session<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::residual::plants::{base, records};
+    use crate::terms::{Bench, Known};
+    use model_core::effects::spec;
+    use std::sync::atomic::AtomicBool;
+
+    /// A drift is hidden; a friction beside it has an amplitude that may be 0. The doubt is about the friction.
+    #[test]
+    fn doubts_about_one_effect_are_no_doubts_about_another() {
+        let mut records = records(&[], &[], 3);
+        let given = base(&records);
+        for record in &mut records {
+            let period = record.sample_period_s;
+            for (k, y) in record.y.iter_mut().enumerate() {
+                *y += 0.15 * (1.0 - (-(k as f64) * period / 1.5).exp());
+            }
+        }
+        let bench = Bench::of(&given, &records).expect("records to learn from");
+        let options = Options::default();
+        let search = Search {
+            judge: &bench.judge,
+            known: Known::of(&bench.judge.learning(0)),
+            effects: true,
+            most_effects: 4,
+            interrupt: &AtomicBool::new(false),
+            progress: &|_| {},
+        };
+        let session = Session {
+            search: &search,
+            units: bench.units.clone(),
+            options: &options,
+        };
+        let with = |effects: &[(&str, &[f64])]| {
+            let mut model = bench.given.clone();
+            for (name, start) in effects {
+                model.add(spec(name).expect("in the catalogue"), start, None);
+            }
+            let judged = bench.judge.refitted(&model).expect("stable");
+            let term = |(name, start): &(&str, &[f64])| Term::Effect {
+                spec: spec(name).expect("in the catalogue"),
+                parameters: start.to_vec(),
+                grading: bench.given.grading,
+                reference: None,
+            };
+            let mut with = Hypothesis::new(judged);
+            with.terms = effects.iter().map(term).collect();
+            with
+        };
+        let bare = with(&[]);
+        let found = bare.clone().alone();
+        let drift = ("thermal-drift", [0.1, 1.0].as_slice());
+        let both = with(&[drift, ("stopping-vortex", &[0.001, 0.03])]);
+        let as_given = &bare.judged.held_out;
+        assert!(
+            session
+                .concluded(&both, &found, as_given)
+                .effects
+                .is_empty()
+        );
+        let claimed = session.concluded_on_most(&both, &found, as_given);
+        let names: Vec<&str> = claimed.effects.iter().map(|spec| spec.name).collect();
+        assert_eq!(names, ["thermal-drift"]);
+        assert_eq!(claimed.verdict, Verdict::EffectMissing);
+    }
+}

@@ -55,3 +55,21 @@ impl Bench {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::residual::plants::{base, records};
+
+    /// A constant that a linear fit left in the given model is no reason to fit one in every candidate.
+    #[test]
+    fn a_constant_of_the_given_model_is_not_fitted_where_records_start_at_rest() {
+        let records = records(&[], &[], 3);
+        let given = Model {
+            constant: 1e-6,
+            ..base(&records)
+        };
+        let bench = Bench::of(&given, &records).expect("records to learn from");
+        assert!(!bench.mid_run && !bench.judge.options.constant);
+    }
+}

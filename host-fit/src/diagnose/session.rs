@@ -246,24 +246,35 @@ impl Session<'_> {
     ) -> Conclusion {
         let all = self.concluded(named, found, as_given);
         let mut fewer = named.clone();
-        while all.effects.is_empty() {
-            let effects = (0..fewer.terms.len()).filter(|i| fewer.terms[*i].effect().is_some());
-            let effects: Vec<usize> = effects.collect();
-            if effects.len() < 2 {
-                break;
-            }
-            let lesser = effects.into_par_iter();
-            let lesser = lesser.filter_map(|i| self.search.without(&fewer, i, &found.root));
-            let size = |one: &Hypothesis| one.judged.rmse();
-            let least = lesser.min_by(|a, b| size(a).total_cmp(&size(b)));
-            let Some(least) = least else { break };
-            fewer = least;
-            let conclusion = self.concluded(&fewer, found, as_given);
+        while all.effects.is_empty()
+            && let Some((_, least)) = self.without_the_least(&fewer, &found.root)
+            && !least.is_bare()
+        {
+            let conclusion = self.concluded(&least, found, as_given);
             if !conclusion.effects.is_empty() {
                 return conclusion;
             }
+            fewer = least;
         }
         all
+    }
+
+    /// The effect that lowers the error of `hypothesis` the least, and the hypothesis refitted without it.
+    fn without_the_least(
+        &self,
+        hypothesis: &Hypothesis,
+        root: &Hypothesis,
+    ) -> Option<(&'static Spec, Hypothesis)> {
+        let without = |index: usize| {
+            let spec = hypothesis.terms[index].effect()?;
+            Some((spec, self.search.without(hypothesis, index, root)?))
+        };
+        let places = (0..hypothesis.terms.len()).into_par_iter();
+        let lesser: Vec<_> = places.filter_map(without).collect();
+        let size = |one: &(_, Hypothesis)| one.1.judged.rmse();
+        lesser
+            .into_iter()
+            .min_by(|a, b| size(a).total_cmp(&size(b)))
     }
 
     /// A hypothesis without its effects, and all candidates on that model.
@@ -300,17 +311,9 @@ impl Session<'_> {
         let mut later: Vec<(&'static Spec, Hypothesis)> = Vec::new();
         let mut unproven = 0;
         while left.len() > 1 {
-            let without = |spec: &&'static Spec| {
-                let of = |term: &Term| term.effect().is_some_and(|s| s.name == spec.name);
-                let index = current.terms.iter().position(of)?;
-                Some((*spec, self.search.without(&current, index, root)?))
+            let Some((spec, lesser)) = self.without_the_least(&current, root) else {
+                break;
             };
-            let lesser: Vec<_> = left.par_iter().filter_map(without).collect();
-            let size = |one: &(_, Hypothesis)| one.1.judged.rmse();
-            let least = lesser
-                .into_iter()
-                .min_by(|a, b| size(a).total_cmp(&size(b)));
-            let Some((spec, lesser)) = least else { break };
             left.retain(|other| other.name != spec.name);
             let stands_in = || {
                 self.is_enough(&lesser)
@@ -371,7 +374,7 @@ mod tests {
         };
         let session = Session {
             search: &search,
-            units: bench.units.clone(),
+            units: bench.units,
             options: &options,
         };
         let with = |effects: &[(&str, &[f64])]| {

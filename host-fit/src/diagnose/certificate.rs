@@ -124,20 +124,17 @@ impl Session<'_> {
         let mut lesser: Vec<Option<Hypothesis>> = places.map(without).collect();
         // Null models are often common to several effects: each is fitted once.
         let mut distinct: Vec<Hypothesis> = Vec::new();
-        let mut effects: Vec<(&str, Vec<usize>)> = Vec::new();
+        let mut effects: Vec<(String, Vec<usize>)> = Vec::new();
         for (index, effect) in subject.terms.iter().enumerate() {
             let Some(effect) = effect.effect() else {
                 continue;
             };
-            let set = sets
-                .iter()
-                .find(|set| set.names.first().is_some_and(|first| first == effect.name));
+            let name = effect.name.to_owned();
+            let set = sets.iter().find(|set| set.names.first() == Some(&name));
+            let names = set.map_or(std::slice::from_ref(&name), |set| &set.names);
             let lacks = |model: &&Hypothesis| {
                 let mut effects = model.terms.iter().filter_map(Term::effect);
-                !effects.any(|own| {
-                    own.name == effect.name
-                        || set.is_some_and(|set| set.names.iter().any(|name| name == own.name))
-                })
+                !effects.any(|effect| names.iter().any(|name| name == effect.name))
             };
             let least = |all: &mut dyn Iterator<Item = &Hypothesis>| {
                 all.filter(lacks)
@@ -157,14 +154,15 @@ impl Session<'_> {
                     distinct.len() - 1
                 })
             });
-            effects.push((effect.name, places.collect()));
+            let places = places.collect();
+            effects.push((name, places));
         }
         let judge = self.judge();
         let nulls = distinct.par_iter().map(|null| Null::of(judge, null));
         let nulls: Vec<Option<Null>> = nulls.collect();
         let certificates = effects.into_iter().filter_map(|(name, places)| {
             let nulls: Vec<Null> = places.into_iter().filter_map(|at| nulls[at]).collect();
-            Some((name.to_owned(), self.certificate(own, &nulls, found)?))
+            Some((name, self.certificate(own, &nulls, found)?))
         });
         certificates.collect()
     }

@@ -7,7 +7,7 @@ rules! {
     /// When a model error counts, when an effect is named, and when it is only a surrogate.
     pub struct Rules in "diagnose";
 
-    /// A model within this factor of a known noise level fits: what is left is noise, and a further effect is a surrogate.
+    /// A model whose error is within this factor of a known noise level fits. A further effect is then a surrogate.
     floor_margin: f64 = 1.03, "times the noise level", "`y_sd` of 20 repeats, pooled over the validation records, gives the noise to 0.4 %; models of the right structure have 0.98 to 1.02";
     /// Level of the tests.
     level: f64 = 0.05, "p-value", "convention";

@@ -346,32 +346,21 @@ impl Session<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::residual::plants::{base, records};
-    use crate::terms::{Bench, Known};
+    use crate::residual::plants::{base, drift, records};
+    use crate::terms::Bench;
     use model_core::effects::spec;
     use std::sync::atomic::AtomicBool;
 
-    /// A drift is hidden; a friction beside it has an amplitude that may be 0. The doubt is about the friction.
+    /// A drift is hidden; a vortex beside it has an amplitude that may be 0. The doubt is about the vortex.
     #[test]
     fn doubts_about_one_effect_are_no_doubts_about_another() {
         let mut records = records(&[], &[], 3);
         let given = base(&records);
-        for record in &mut records {
-            let period = record.sample_period_s;
-            for (k, y) in record.y.iter_mut().enumerate() {
-                *y += 0.15 * (1.0 - (-(k as f64) * period / 1.5).exp());
-            }
-        }
+        drift(&mut records, &[(0.15, 1.5)]);
         let bench = Bench::of(&given, &records).expect("records to learn from");
         let options = Options::default();
-        let search = Search {
-            judge: &bench.judge,
-            known: Known::of(&bench.judge.learning(0)),
-            effects: true,
-            most_effects: 4,
-            interrupt: &AtomicBool::new(false),
-            progress: &|_| {},
-        };
+        let never = AtomicBool::new(false);
+        let search = Search::silent(&bench.judge, 4, &never);
         let session = Session {
             search: &search,
             units: bench.units,
@@ -395,8 +384,8 @@ mod tests {
         };
         let bare = with(&[]);
         let found = bare.clone().alone();
-        let drift = ("thermal-drift", [0.1, 1.0].as_slice());
-        let both = with(&[drift, ("stopping-vortex", &[0.001, 0.03])]);
+        let drifting = ("thermal-drift", [0.1, 1.0].as_slice());
+        let both = with(&[drifting, ("stopping-vortex", &[0.001, 0.03])]);
         let as_given = &bare.judged.held_out;
         assert!(
             session

@@ -71,14 +71,7 @@ pub struct Glance {
 #[must_use]
 pub fn glance(model: &Model, records: &[Record], interrupt: &AtomicBool) -> Option<Glance> {
     let bench = Bench::of(model, records)?;
-    let search = Search {
-        judge: &bench.judge,
-        known: Known::of(&bench.judge.learning(0)),
-        effects: false,
-        most_effects: 0,
-        interrupt,
-        progress: &|_| {},
-    };
+    let search = Search::silent(&bench.judge, 0, interrupt);
     let context = screening::Context::new(&search, &bench.given, 1)?;
     let first = context.all(&Entry::ALL).into_iter().next()?;
     (first.score < 0.0).then(|| Glance {

@@ -14,6 +14,20 @@ pub(crate) fn records(effects: &[&str], faults: &[&str], seed: u64) -> Vec<Recor
     set.data.records
 }
 
+/// Adds a drift of the sensor to every record: exponential approaches with an amplitude (y) and a time constant (s).
+pub(crate) fn drift(records: &mut [Record], parts: &[(f64, f64)]) {
+    for record in records {
+        let period = record.sample_period_s;
+        for (k, y) in record.y.iter_mut().enumerate() {
+            let time = k as f64 * period;
+            let each = parts.iter();
+            *y += each
+                .map(|(size, after)| size * (1.0 - (-time / after).exp()))
+                .sum::<f64>();
+        }
+    }
+}
+
 /// The lowest-order bilinear model with a state-dependent delay, identified on the records.
 pub(crate) fn base(records: &[Record]) -> Model {
     let learning: Vec<&Record> = records.iter().filter(|r| r.role == Use::Identify).collect();

@@ -39,8 +39,8 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::residual::plants::{base, records};
-    use crate::terms::{Bench, Known};
+    use crate::residual::plants::{self, base, records};
+    use crate::terms::Bench;
     use model_core::effects::spec;
     use std::sync::atomic::AtomicBool;
 
@@ -49,23 +49,10 @@ mod tests {
     fn a_drift_of_two_time_constants_is_two_drifts() {
         let mut records = records(&[], &[], 3);
         let given = base(&records);
-        for record in &mut records {
-            let period = record.sample_period_s;
-            for (k, y) in record.y.iter_mut().enumerate() {
-                let time = k as f64 * period;
-                let ended = |after: f64| 1.0 - (-time / after).exp();
-                *y += 0.10 * ended(0.6) + 0.12 * ended(5.0);
-            }
-        }
+        plants::drift(&mut records, &[(0.10, 0.6), (0.12, 5.0)]);
         let bench = Bench::of(&given, &records).expect("records to learn from");
-        let search = Search {
-            judge: &bench.judge,
-            known: Known::of(&bench.judge.learning(0)),
-            effects: true,
-            most_effects: 4,
-            interrupt: &AtomicBool::new(false),
-            progress: &|_| {},
-        };
+        let never = AtomicBool::new(false);
+        let search = Search::silent(&bench.judge, 4, &never);
         let drift = spec("thermal-drift").expect("in the catalogue");
         let mut one = bench.given.clone();
         one.add(drift, &[0.2, 2.0], None);

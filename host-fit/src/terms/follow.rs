@@ -260,7 +260,6 @@ fn at_a_bound(model: &Model, term: &Term) -> bool {
 mod tests {
     use super::*;
     use crate::data::{Record, Use};
-    use crate::fit::Known;
     use crate::model::Delay;
     use crate::terms::judge::Judge;
     use std::sync::atomic::AtomicBool;
@@ -301,14 +300,7 @@ mod tests {
     static NEVER: AtomicBool = AtomicBool::new(false);
 
     fn search(judge: &Judge) -> Search<'_> {
-        Search {
-            judge,
-            known: Known::of(&judge.learning(0)),
-            effects: false,
-            most_effects: 0,
-            interrupt: &NEVER,
-            progress: &|_| {},
-        }
+        Search::silent(judge, 0, &NEVER)
     }
 
     /// A fit of that flow with these terms.

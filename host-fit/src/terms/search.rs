@@ -149,6 +149,20 @@ pub struct Search<'a> {
     pub progress: &'a (dyn Fn(&str) + Sync),
 }
 
+impl<'a> Search<'a> {
+    /// A search for at most so many effects that reports no progress.
+    pub(crate) fn silent(judge: &'a Judge, most_effects: usize, interrupt: &'a AtomicBool) -> Self {
+        Self {
+            judge,
+            known: Known::of(&judge.learning(0)),
+            effects: most_effects > 0,
+            most_effects,
+            interrupt,
+            progress: &|_| {},
+        }
+    }
+}
+
 impl Search<'_> {
     pub(super) fn interrupted(&self) -> bool {
         self.interrupt.load(Memory::Relaxed)

@@ -42,6 +42,15 @@ pub fn write_atomic<F>(path: &Path, write: F) -> Result<(), OutputError>
 where
     F: FnOnce(&mut dyn Write) -> io::Result<()>,
 {
+    let mut write = Some(write);
+    write_once(path, &mut |to| write.take().map_or(Ok(()), |write| write(to)))
+}
+
+/// [`write_atomic`], compiled once; calls `write` once.
+fn write_once(
+    path: &Path,
+    write: &mut dyn FnMut(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), OutputError> {
     let failed = |cause: io::Error| OutputError::Io {
         path: path.to_path_buf(),
         cause,

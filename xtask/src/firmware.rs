@@ -122,10 +122,10 @@ pub(crate) fn build(
         .join(bin))
 }
 
-/// Builds the libraries of loop, line and model for `target`, without log messages and with them.
+/// Checks the libraries of loop, line and model for `target`, without log messages and with them.
 pub(crate) fn libraries(target: &str) -> Result<()> {
     let libraries = |arguments: &[&str]| {
-        let mut cargo = cross_cargo("build", target)?;
+        let mut cargo = cross_cargo("check", target)?;
         cargo
             .args(["--package", "firmware"])
             .args(arguments)

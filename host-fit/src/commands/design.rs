@@ -281,8 +281,13 @@ impl Args {
             }
             _ => Vec::new(),
         };
+        // A law that loses attachment on its own model has none.
+        let margin = proof
+            .keeps_its_model()
+            .then(|| steps::law_margin(&design, self.seed, true))
+            .flatten();
         Ok(Tried {
-            margin: steps::law_margin(&design, self.seed, true),
+            margin,
             design: design.which_lost(lost),
             proof,
             targets,

@@ -14,7 +14,7 @@ pub(super) struct Tried {
     pub(super) design: Design,
     #[serde(flatten)]
     pub(super) proof: Proof,
-    /// The robustness margin; none for pulses.
+    /// The robustness margin; none for pulses, and for a law that loses attachment on its own model.
     pub(super) margin: Option<Margin>,
     /// Other targets that pass, if this one does not.
     #[serde(skip_serializing_if = "Vec::is_empty")]

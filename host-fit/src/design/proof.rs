@@ -101,6 +101,13 @@ impl Proof {
         self.lost_where(CaseGroup::decides)
     }
 
+    /// Whether the law keeps attachment on its own model.
+    #[must_use]
+    pub fn keeps_its_model(&self) -> bool {
+        self.lost_where(|group| group == CaseGroup::Model)
+            .is_empty()
+    }
+
     /// Names of the other trials in which attachment was lost: undetectable effects and stress.
     #[must_use]
     pub fn lost_beyond_the_records(&self) -> Vec<String> {

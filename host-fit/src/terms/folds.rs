@@ -86,7 +86,9 @@ pub(crate) fn folds(records: &[Record]) -> (Vec<Fold>, HeldOutBy) {
         return (vec![fold], HeldOutBy::Records);
     }
     if let [only] = identify.as_slice() {
-        let from = (RULES.learned_share * only.len() as f64) as usize;
+        // Before the first edge there is nothing to learn from.
+        let rest = first_edge(&only.u).unwrap_or(0);
+        let from = rest + (RULES.learned_share * (only.len() - rest) as f64) as usize;
         let fold = Fold {
             learning: vec![only.part(0, from)],
             judging: vec![Judging {
@@ -112,6 +114,11 @@ pub(crate) fn folds(records: &[Record]) -> (Vec<Fold>, HeldOutBy) {
         fold
     };
     ((0..count).map(fold).collect(), HeldOutBy::Turns)
+}
+
+/// The first sample whose command is not that of the sample before it.
+fn first_edge(u: &[f64]) -> Option<usize> {
+    Some(u.windows(2).position(|pair| pair[0] != pair[1])? + 1)
 }
 
 #[cfg(test)]

@@ -97,21 +97,7 @@ const STEPS: &[Step] = &[
                 .env("RUSTDOCFLAGS", "-Dwarnings"))
         },
     },
-    // The fitter does not depend on the simulator that it is judged by.
-    Step {
-        name: "library alone",
-        after: &[],
-        room: Some(Room::Host),
-        run: || {
-            run(&mut cargo(&[
-                "check",
-                "--release",
-                "--package=host-fit",
-                "--lib",
-                "--no-default-features",
-            ]))
-        },
-    },
+    // Of the libraries alone: the fitter does not depend on the simulator that it is judged by.
     Step {
         name: "msrv",
         after: &[],

@@ -123,7 +123,7 @@ fn compile_quickly(manifest: &Path) -> Result<()> {
         let table = format!("[profile.release.package.{member}]");
         // The scenarios' package has another name than its folder and is not compiled.
         if member != "tests" && !text.contains(&table) {
-            write!(text, "\n{table}\nopt-level = 1\n")?;
+            write!(text, "\n{table}\nopt-level = 0\n")?;
         }
     }
     Ok(fs::write(manifest, text)?)

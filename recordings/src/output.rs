@@ -43,7 +43,9 @@ where
     F: FnOnce(&mut dyn Write) -> io::Result<()>,
 {
     let mut write = Some(write);
-    write_once(path, &mut |to| write.take().map_or(Ok(()), |write| write(to)))
+    write_once(path, &mut |to| {
+        write.take().map_or(Ok(()), |write| write(to))
+    })
 }
 
 /// [`write_atomic`], compiled once; calls `write` once.

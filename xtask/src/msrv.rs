@@ -33,11 +33,13 @@ pub(crate) fn msrv() -> Result<()> {
     };
     // The libraries that are published, without the program: who uses one of them chooses the compiler. That the fitter
     // compiles without the simulator that it is judged by is checked by the way.
-    check.args(["check", "--release", "--workspace", "--lib"]).args([
-        "--no-default-features",
-        "--exclude=scenarios",
-        "--exclude=xtask",
-    ]);
+    check
+        .args(["check", "--release", "--workspace", "--lib"])
+        .args([
+            "--no-default-features",
+            "--exclude=scenarios",
+            "--exclude=xtask",
+        ]);
     // Build products of another compiler cannot be shared.
     run(check
         .env_remove("RUSTC")

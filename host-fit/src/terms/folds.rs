@@ -205,4 +205,14 @@ mod tests {
         assert_eq!(folds[0].judging[0].from, 6);
         assert_eq!(folds[0].judging[0].record.len(), 10);
     }
+
+    /// Otherwise a step test with a long rest in front is learned from its rest.
+    #[test]
+    fn the_only_record_is_divided_from_its_first_edge_on() {
+        let mut late = record("a", Use::Identify);
+        late.u[5..].fill(1.0);
+        let (folds, _) = folds(&[late]);
+        assert_eq!(folds[0].learning[0].len(), 8);
+        assert_eq!(folds[0].judging[0].from, 8);
+    }
 }

@@ -159,7 +159,7 @@ rules! {
     /// Most folds of a cross-validation.
     most_folds: usize = 4, "", "judgement: for the time it takes";
     /// Share of the only record that is used for estimation.
-    learned_share: f64 = 0.6, "share of the record", "judgement";
+    learned_share: f64 = 0.6, "share of the record from its first edge on", "judgement";
     /// Error assigned to a diverging run.
     diverged: f64 = 10.0, "times the largest |y|", "judgement: worse than any bounded run";
 }

@@ -119,4 +119,24 @@ mod tests {
             .to_string();
         assert!(!help.contains("plenum-droop"), "{help}");
     }
+
+    /// And the example is a command line.
+    #[test]
+    fn every_command_shows_an_example() {
+        let mut program = Cli::command();
+        for command in program.get_subcommands_mut() {
+            let help = command.render_long_help().to_string();
+            let name = command.get_name();
+            let example = help
+                .lines()
+                .find_map(|line| line.strip_prefix("Example: "))
+                .unwrap_or_else(|| panic!("`{name} --help` shows no example"));
+            let words = example.split_whitespace().take_while(|word| *word != ">");
+            let line: Vec<&str> = words.collect();
+            assert_eq!(line[1], name, "{example}");
+            if let Err(error) = Cli::try_parse_from(&line) {
+                panic!("{example}: {error}");
+            }
+        }
+    }
 }

@@ -11,6 +11,8 @@ use super::Console;
 ///
 /// Each RAW.csv (columns t,u,y and any channels; u is 0 or 1) becomes one record named by the file. Periods with
 /// missing or unreadable samples, or with another command than most, are dropped and counted.
+///
+/// Example: host-fit average raw.csv --period 10 --out set
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Raw recordings; each repeats one command sequence.

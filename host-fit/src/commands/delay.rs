@@ -16,6 +16,8 @@ use super::time_span::TimeSpan;
 /// edge is its shift on that trajectory; otherwise the start of each response is located by itself. The law
 /// is fitted to the identify records. It is rejected if it is not a valid delay on all records or not better
 /// than a constant.
+///
+/// Example: host-fit delay DATASET --out delays
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Folder with dataset.toml, or one CSV file.

@@ -32,6 +32,8 @@ use super::words::aligned;
 
 /// Run the whole workflow on bundled data: identify, compare, diagnose, extend, discover, generate constants, close
 /// the loop. Takes about a minute; writes a report page, models and data.
+///
+/// Example: host-fit demo --out demo
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Folder for the report, the pictures, the models and the data.

@@ -23,6 +23,8 @@ use crate::plants::Plants;
 /// law is then tried in the loop: on the model, and on every plant that is consistent with the records of DATASET (delay, gain and time constants at the ends of their intervals, each effect at the largest size that is not
 /// excluded). A law that loses attachment on one of these is refused, with the targets that pass. Stress beyond the
 /// records (every effect at its worst, wrong delays and gains, more noise, lost readings) is reported and never refuses a law.
+///
+/// Example: host-fit design model.toml DATASET --target 0.5 -o controlled.toml
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The model.

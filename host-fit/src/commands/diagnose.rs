@@ -15,6 +15,8 @@ use super::{Console, page};
 ///
 /// Every effect of the catalogue is refitted together with the model. An effect is named if the validation error falls
 /// significantly (family-wise p-value over all candidates) and by more than additional lags achieve.
+///
+/// Example: host-fit diagnose model.toml DATASET -o better.toml --report diagnosis.html
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]

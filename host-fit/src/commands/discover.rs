@@ -17,6 +17,8 @@ use super::{Console, page};
 ///
 /// Curves over every coordinate at every place (jet, delay, flow, sensor) are fitted together with the model.
 /// A term is reported if the validation error falls significantly and by more than additional lags achieve.
+///
+/// Example: host-fit discover model.toml DATASET -o new.toml
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]

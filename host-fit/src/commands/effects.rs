@@ -13,6 +13,8 @@ const FLOW_TERMS: &str = "flow-lag         flow   a second lag in series: T2·q�
                           flow-memory      flow   a later lag of y: adds a·y(t − T) to the recursion";
 
 /// List the catalogue of effects, and the terms of base models.
+///
+/// Example: host-fit effects plenum-droop
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Only this effect, with its equation and parameters.

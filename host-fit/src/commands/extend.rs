@@ -12,6 +12,8 @@ use super::load::{ModelAndData, shell_word};
 use super::{Console, page};
 
 /// Add physical effects to a model, refit everything, and show the validation error before and after.
+///
+/// Example: host-fit extend model.toml DATASET --effect plenum-droop -o better.toml
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]

@@ -22,6 +22,8 @@ use super::{Console, page};
 ///
 /// With the objective `free-run` the coefficients are refined on the free run afterwards, and kept if the validation
 /// error falls.
+///
+/// Example: host-fit identify DATASET -o model.toml
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Folder with dataset.toml, or one CSV file.

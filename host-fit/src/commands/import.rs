@@ -17,6 +17,8 @@ use super::average::positive;
 /// named as its program would: valve, run.valve, data(:,2), data[:,1]. What is not named is found by its name (t, time or
 /// timestamp; u, input, heater, valve …; y, output, temperature …). y_sd, y_min, y_max and every other variable of the
 /// same length are kept. The mapping is kept in dataset.toml, for --like.
+///
+/// Example: host-fit import log.csv -o set
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Files to read, or folders of them.

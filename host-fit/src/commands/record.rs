@@ -19,6 +19,8 @@ use crate::rig_port::PortArgs;
 /// The valve is closed at the end, on any fault, and when the link breaks. Repeats with a lost sample are
 /// played again, so that every written repeat is complete and starts from rest. With `--calibrate` the rig is
 /// measured instead; rig.toml is for `--rig` and for the next build of the firmware.
+///
+/// Example: host-fit record --port /dev/ttyACM0 --rig rig.toml --command command.csv -o raw
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]

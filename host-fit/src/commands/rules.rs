@@ -6,6 +6,8 @@ use super::Console;
 use super::words::Words;
 
 /// List the thresholds by which the tool decides, with their meaning and origin.
+///
+/// Example: host-fit rules residual
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Only this group of rules, for example `residual`.

@@ -10,6 +10,8 @@ use host_fit::steps;
 use super::Console;
 
 /// Simulate a model in free run over a command sequence, and write t,u,y.
+///
+/// Example: host-fit simulate model.toml command.csv -o run.csv
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The model.

@@ -21,6 +21,8 @@ use crate::rig_port::PortArgs;
 /// The residual (reading minus the model's free run) is averaged over blocks, and each block is compared with
 /// the first ones; the probability of any false alarm in 8 hours is --false-alarms. The log starts at rest
 /// and ends at the first lost sample, because a free run needs the whole history.
+///
+/// Example: host-fit watch --port /dev/ttyACM0 --rig rig.toml --seconds 60 -o service
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]

@@ -63,8 +63,8 @@ impl Preparation {
             .map(|(record, beginning)| beginning.filled_in(record))
             .collect();
         let moving_zero = MovingZero::of(&prepared, &beginnings, command.off);
-        if moving_zero.is_some() {
-            rest::tare(&mut prepared, &beginnings, command.off);
+        if let Some(moving) = &moving_zero {
+            moving.subtract(&mut prepared, &beginnings, command.off);
         }
         follow(&mut prepared, &beginnings);
         let zero = rest::level_of_rest(&prepared, &beginnings, command.off)

@@ -6,6 +6,7 @@ use super::reference::FirstOrder;
 use crate::data::Record;
 use crate::model::CommandRange;
 use crate::residual::correlation;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use std::fmt;
 
 /// The means of the pieces of a record through which it rests.
@@ -28,14 +29,32 @@ fn resting<'a>(
     pairs.filter(move |(_, beginning)| beginning.rests_at(off))
 }
 
-/// The standard error of y at rest, rms over the records; none where one does not say it.
-fn noise_at_rest(resting: &[(&Record, &Beginning)]) -> Option<f64> {
-    let mut squares = Vec::new();
+/// The noise of y at rest, y rms.
+struct NoiseAtRest {
+    /// The standard errors of y.
+    stated: f64,
+    /// What of them the rests do not show within themselves: noise that is slower than they are long.
+    slower: f64,
+}
+
+/// None where a record does not say its standard errors.
+fn noise_at_rest(resting: &[(&Record, &Beginning)]) -> Option<NoiseAtRest> {
+    let (mut stated, mut within) = (Vec::new(), Vec::new());
     for (record, beginning) in resting {
         let sd = record.y_sd.as_ref()?;
-        squares.extend(sd.iter().take(beginning.rest).map(|sd| sd * sd));
+        let rest = &record.y[..beginning.rest.min(record.len())];
+        let level = mean(rest);
+        stated.extend(sd.iter().take(rest.len()).map(|sd| sd * sd));
+        within.extend(rest.iter().map(|y| (y - level).powi(2)));
     }
-    (!squares.is_empty()).then(|| mean(&squares).sqrt())
+    // Of a variance of so many samples.
+    let error = (2.0 / within.len().max(1) as f64).sqrt();
+    let stated = mean(&stated);
+    let slower = (1.0 - RULES.slower_by_chance * error) * stated - mean(&within);
+    (stated > 0.0).then(|| NoiseAtRest {
+        stated: stated.sqrt(),
+        slower: slower.max(0.0).sqrt(),
+    })
 }
 
 /// Mean of some pieces, and its standard error; none of fewer than count.
@@ -118,12 +137,15 @@ pub struct MovingZero {
     pub lowest: (String, f64),
     /// The record that rests highest, and where, y.
     pub highest: (String, f64),
+    /// Share of a record's own deviation that is subtracted from it.
+    share: f64,
 }
 
 impl MovingZero {
     /// Whether records rest at different levels under a command of `off`: by more than chance, and by more than slow
-    /// noise makes of a rest: some standard errors of y where they are known, otherwise a small share of all that y does;
-    /// or by half as much, if they creep from each record to the next as chance seldom does.
+    /// noise makes of a rest. That is some standard errors of y where they are known, otherwise a small share of all that y
+    /// does; or half as much, if they creep from each record to the next as chance seldom does. Less is enough where the
+    /// noise is known to be fast; what may be noise of it stays.
     pub(super) fn of(records: &[Record], beginnings: &[Beginning], off: f64) -> Option<Self> {
         let resting: Vec<(&Record, &Beginning)> = resting(records, beginnings, off).collect();
         let levels: Vec<(&Record, (f64, f64))> = resting
@@ -137,21 +159,60 @@ impl MovingZero {
         let lowest = levels.iter().min_by(by_level)?;
         let highest = levels.iter().max_by(by_level)?;
         let apart = highest.1.0 - lowest.1.0;
-        let least = noise_at_rest(&resting).map_or_else(
-            || RULES.moving_zero * range_of_y(records),
-            |noise| RULES.moving_zero_noise * noise,
-        );
-        let share = if creeps(&levels) {
-            RULES.creeping_share
-        } else {
-            1.0
+        let (least, beside) = match noise_at_rest(&resting) {
+            None => (RULES.moving_zero * range_of_y(records), None),
+            Some(noise) => (
+                RULES.moving_zero_noise * noise.stated,
+                Between::of(&levels, noise.slower),
+            ),
         };
         let error = lowest.1.1.hypot(highest.1.1);
-        let moves = apart > RULES.off_zero * error && apart > share * least;
+        let apart_by = |share: f64| apart > RULES.off_zero * error && apart > share * least;
+        let share = if apart_by(1.0) || (creeps(&levels) && apart_by(RULES.creeping_share)) {
+            1.0
+        } else {
+            beside
+                .filter(|beside| beside.p < RULES.moving_zero_p)?
+                .share
+        };
         let named = |of: &(&Record, (f64, f64))| (of.0.name.clone(), of.1.0);
-        moves.then(|| Self {
+        Some(Self {
             lowest: named(lowest),
             highest: named(highest),
+            share,
+        })
+    }
+
+    /// Takes each record from its own zero. Records that do not rest under a command of `off` stay as they are.
+    pub(super) fn subtract(&self, records: &mut [Record], beginnings: &[Beginning], off: f64) {
+        tare(records, beginnings, off, self.share);
+    }
+}
+
+/// The scatter of the levels of rest between the records, beside what noise makes of each.
+struct Between {
+    /// p-value of noise alone, by the ratio of the variances (F-test).
+    p: f64,
+    /// Share of a level's deviation that is not noise, as expected from that ratio.
+    share: f64,
+}
+
+impl Between {
+    /// `slower`: noise that is the same throughout a rest, y rms. None of fewer than two records, and without noise.
+    fn of(levels: &[(&Record, (f64, f64))], slower: f64) -> Option<Self> {
+        let n = levels.len() as f64;
+        let mean = levels.iter().map(|(_, (level, _))| level).sum::<f64>() / n;
+        let between = levels.iter().map(|(_, (level, _))| (level - mean).powi(2));
+        let between = between.sum::<f64>() / (n - 1.0);
+        let within = levels.iter().map(|(_, (_, error))| error * error);
+        let chance = slower * slower + within.sum::<f64>() / n;
+        // Each level's error is known from as many pieces at least.
+        let freedom = n * (RULES.quiet_pieces as f64 - 1.0);
+        let test = FisherSnedecor::new(n - 1.0, freedom).ok()?;
+        let ratio = between / chance;
+        ratio.is_finite().then(|| Self {
+            p: test.sf(ratio),
+            share: (1.0 - 1.0 / ratio).max(0.0),
         })
     }
 }
@@ -163,9 +224,9 @@ fn creeps(levels: &[(&Record, (f64, f64))]) -> bool {
     correlation(&order, &levels).is_some_and(|(_, p)| p < RULES.creeping_zero)
 }
 
-/// Takes each record from its own zero: all rest where they do in the mean. Records that do not rest under a command of
+/// Takes each record from its own zero: by a `share` of 1 all rest where they do in the mean. Records that do not rest under a command of
 /// `off` stay as they are.
-pub(super) fn tare(records: &mut [Record], beginnings: &[Beginning], off: f64) {
+fn tare(records: &mut [Record], beginnings: &[Beginning], off: f64, share: f64) {
     let own = |record: &Record, beginning: &Beginning| {
         let rests = beginning.rests_at(off);
         let pieces = quiet_pieces(record, beginning);
@@ -182,9 +243,9 @@ pub(super) fn tare(records: &mut [Record], beginnings: &[Beginning], off: f64) {
         let Some(own) = own else { continue };
         let envelope = [&mut record.y_min, &mut record.y_max];
         let series = envelope.into_iter().flatten().chain([&mut record.y]);
-        series.flatten().for_each(|y| *y -= own - common);
+        series.flatten().for_each(|y| *y -= share * (own - common));
         if let Some(before) = &mut record.y_before {
-            *before -= own - common;
+            *before -= share * (own - common);
         }
     }
 }
@@ -253,6 +314,23 @@ mod tests {
         assert!(moves(0.012) && !moves(0.02));
     }
 
+    /// Zeros of two days, less than a standard error of a sample apart: where the rests scatter within themselves by all of
+    /// the standard error, nothing of it is slow noise.
+    #[test]
+    fn a_zero_that_moves_by_less_than_the_noise_is_told_where_that_is_fast() {
+        let share = |sd: f64| {
+            let days = [("a", 0.0), ("b", 0.004), ("c", 0.0), ("d", 0.004)];
+            let records = days.map(|(name, zero)| Record {
+                y_sd: Some(vec![sd; 2000]),
+                ..resting(name, zero)
+            });
+            moving(&records).map(|moving| moving.share)
+        };
+        // Uniform noise of ±0.01 has a standard deviation of 0.0058.
+        assert!(share(0.0058).is_some_and(|share| share > 0.9));
+        assert_eq!(share(0.012), None);
+    }
+
     #[test]
     fn a_zero_that_creeps_is_told_by_its_order() {
         let moves = |zeros: &[f64]| {
@@ -278,7 +356,7 @@ mod tests {
         let beginnings = [AT_REST, AT_REST, blown];
         let records = [resting("a", 0.0), resting("b", 0.08), resting("c", 0.3)];
         let mut tared = records.clone();
-        tare(&mut tared, &beginnings, 0.0);
+        tare(&mut tared, &beginnings, 0.0, 1.0);
         let rest = |record: &Record| level(&quiet_pieces(record, &AT_REST)).map(|(level, _)| level);
         let (a, b) = (rest(&tared[0]).unwrap(), rest(&tared[1]).unwrap());
         assert!((a - b).abs() < 1e-12 && (a - 0.04).abs() < 0.005, "{a} {b}");

@@ -50,8 +50,13 @@ rules! {
     off_zero: f64 = 5.0, "standard errors", "convention";
     /// The zero moves if records rest further apart than this, and than chance.
     moving_zero: f64 = 0.03, "share of the range of y", "judgement: what slow noise makes of the mean of half a second stays below it";
-    /// … or, where its standard errors are known, more than so many of them.
+    /// … or, where its standard errors are known, more than so many of them, …
     moving_zero_noise: f64 = 4.0, "standard errors of y", "in 30 sets slow noise reached 2.9";
+    /// … or if the F-test of their scatter against what noise makes of a rest gives this p-value; slow noise is what of the
+    /// variance the rests do not show within themselves, …
+    moving_zero_p: f64 = 0.01, "p-value", "convention; in 34 sets whose zero does not move p was spread evenly from 0.07 to 1";
+    /// … by more than so much.
+    slower_by_chance: f64 = 2.0, "standard errors of that variance", "convention";
     /// This share of either is enough where the rests follow the order of the records …
     creeping_share: f64 = 0.5, "", "judgement: zeros that drifted began at 2.6 standard errors in 30 sets";
     /// … with this p-value.

@@ -16,6 +16,8 @@ use bench::ModelBench;
 ///
 /// The page is served on 127.0.0.1 only, to clients that have the printed address. All results are kept in
 /// the project folder: models that every other command reads, the tree of their origins, the log of commands.
+///
+/// Example: host-fit workbench DATASET
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// Folder with dataset.toml, or one CSV file; without it, files are imported on the page.

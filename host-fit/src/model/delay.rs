@@ -3,7 +3,7 @@
 use model_core::Real;
 use model_core::delay::Transport;
 use model_core::effect::{Physics, Setting, Spec};
-use model_core::effects::{self, AnyTransport};
+use model_core::effects::{self, AnyTransport, ConstantDelay};
 
 /// The input delays of a model.
 #[derive(Clone, Debug, PartialEq)]
@@ -107,6 +107,15 @@ impl Delay {
             (Self::Fixed { .. }, Self::Fixed { .. }) => true,
             (Self::Law(own), Self::Law(other)) => own.spec.name == other.spec.name,
             _ => false,
+        }
+    }
+
+    /// Whether it is a law of the averaged y, not a constant.
+    #[must_use]
+    pub fn follows_y(&self) -> bool {
+        match self {
+            Self::Fixed { .. } => false,
+            Self::Law(law) => law.spec.name != <ConstantDelay<f64> as Physics<f64>>::SPEC.name,
         }
     }
 

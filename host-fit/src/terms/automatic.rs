@@ -14,7 +14,6 @@ use crate::excitation::bears_little;
 use crate::model::{Delay, Model};
 use crate::search::{Progress, Settings, StopReason};
 use crate::simulate::SimulateError;
-use model_core::effect::Physics;
 use model_core::effects::{ConstantDelay, SaturatingDelay};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -183,7 +182,7 @@ pub fn base_model(
         progress("averaging times of the delay law");
         let own = found.best.judged.model();
         let lawful = others.iter().chain([&own.delay]);
-        let averaged = lawful.filter(|law| has_average(law));
+        let averaged = lawful.filter(|law| law.follows_y());
         let tried: Vec<Model> = averaged
             .flat_map(|law| AVERAGES.map(|window| with_average(own, law, window)))
             .collect();
@@ -277,14 +276,6 @@ fn without_needless_law(judge: &Judge, judged: Judged, laws: &[Delay]) -> Judged
         judged
     } else {
         constant
-    }
-}
-
-/// Whether a delay law follows the mean of y.
-fn has_average(law: &Delay) -> bool {
-    match law {
-        Delay::Fixed { .. } => false,
-        Delay::Law(law) => law.spec.name != <ConstantDelay<f64> as Physics<f64>>::SPEC.name,
     }
 }
 

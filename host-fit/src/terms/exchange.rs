@@ -4,7 +4,7 @@
 use super::RULES;
 use super::evidence::{HeldOut, p_value};
 use super::screen::Screen;
-use super::search::{Hypothesis, Search, count_effects, score};
+use super::search::{Effort, Hypothesis, Search, count_effects, score};
 use super::table::Table;
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit};
@@ -72,7 +72,12 @@ impl Search<'_> {
 
     /// Replaces the terms of a hypothesis one by one where that lowers the error. Base terms and effects
     /// imitate each other, and a forward search does not correct a wrong early choice.
-    pub(super) fn exchanged(&self, mut hypothesis: Hypothesis, root: &Hypothesis) -> Hypothesis {
+    pub(super) fn exchanged(
+        &self,
+        mut hypothesis: Hypothesis,
+        root: &Hypothesis,
+        effort: &mut Effort,
+    ) -> Hypothesis {
         if let [Term::Effect { .. }] = hypothesis.terms[..] {
             // The first round compared all possible replacements.
             return hypothesis;
@@ -84,6 +89,7 @@ impl Search<'_> {
             .position(|term| !done.contains(&term.name()))
             && self.effects
             && !self.interrupted()
+            && !effort.is_spent()
         {
             let term = &hypothesis.terms[index];
             let effects = count_effects(&hypothesis.terms);
@@ -107,6 +113,7 @@ impl Search<'_> {
             let without = term.taken_from(hypothesis.judged.model(), root.judged.model());
             let own = hypothesis.judged.rmse();
             let near = self.in_place_of(term, &without, own, wanted);
+            near.iter().for_each(|_| effort.spend_on(&without));
             let other = near.into_iter().next().and_then(|other| {
                 done.push(other.term.name());
                 let mut terms = hypothesis.terms.clone();

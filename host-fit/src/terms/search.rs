@@ -133,6 +133,25 @@ impl Found {
     }
 }
 
+/// What a search may still do, counted in the models that it refits: time would depend on the machine.
+pub(super) struct Effort {
+    /// Parameters times samples.
+    left: f64,
+    samples: f64,
+}
+
+impl Effort {
+    /// Counts a refit of this model with another term.
+    pub(super) fn spend_on(&mut self, model: &Model) {
+        self.left -= model.coordinates().len() as f64 * self.samples;
+    }
+
+    /// Whether no further models are tried.
+    pub(super) fn is_spent(&self) -> bool {
+        self.left <= 0.0
+    }
+}
+
 /// The search with its data and options.
 pub struct Search<'a> {
     /// The bench.
@@ -166,6 +185,15 @@ impl<'a> Search<'a> {
 impl Search<'_> {
     pub(super) fn interrupted(&self) -> bool {
         self.interrupt.load(Memory::Relaxed)
+    }
+
+    /// What a search may do at most.
+    fn effort(&self) -> Effort {
+        let samples: usize = self.judge.learning(0).iter().map(|r| r.len()).sum();
+        Effort {
+            left: RULES.effort,
+            samples: samples as f64,
+        }
     }
 
     pub(super) fn over(&self, hypothesis: &Hypothesis) -> f64 {
@@ -241,7 +269,8 @@ impl Search<'_> {
     /// reached, lags are searched anew beside the effects of the best hypothesis.
     #[must_use]
     pub fn run(&self, root: Hypothesis, second: impl FnOnce() -> Option<Hypothesis>) -> Found {
-        let (mut all, mut tried) = self.rounds(root, second);
+        let mut effort = self.effort();
+        let (mut all, mut tried) = self.rounds(root, second, &mut effort);
         (self.progress)("leaving out what is not needed");
         let root = all[0].clone();
         let end = best(&all, |_| true);
@@ -255,10 +284,11 @@ impl Search<'_> {
             self.pruned(all[bare_end].clone(), &root)
         };
         if self.over(&found) > RULES.at_the_floor
+            && !effort.is_spent()
             && let Some(start) = self.without_lags(&found, &root)
         {
             (self.progress)("lags anew beside the effects");
-            let (anew, further) = self.rounds(start, || None);
+            let (anew, further) = self.rounds(start, || None, &mut effort);
             tried += further;
             let other = &anew[best(&anew, |_| true)];
             if other.score() < found.score() - RULES.price {
@@ -266,7 +296,7 @@ impl Search<'_> {
             }
             all.extend(anew);
         }
-        let found = self.exchanged(found, &root);
+        let found = self.exchanged(found, &root, &mut effort);
         Found {
             root,
             best: found,
@@ -281,6 +311,7 @@ impl Search<'_> {
         &self,
         root: Hypothesis,
         second: impl FnOnce() -> Option<Hypothesis>,
+        effort: &mut Effort,
     ) -> (Vec<Hypothesis>, usize) {
         let mut all = vec![root];
         let mut second = Some(second);
@@ -321,11 +352,11 @@ impl Search<'_> {
                 from_bound += 1;
                 chosen = vec![(bent, self.effects)];
             }
-            if chosen.is_empty() || self.interrupted() {
+            if chosen.is_empty() || self.interrupted() || effort.is_spent() {
                 break;
             }
             let before = all[end].score();
-            let refitted = self.advance(round, &chosen, width, &mut all, &mut tried);
+            let refitted = self.advance(round, &chosen, width, &mut all, &mut tried, effort);
             let gained = all[best(&all, |_| true)].score() <= before - RULES.price;
             stalled = match (refitted, gained) {
                 (false, _) => RULES.patience,
@@ -346,6 +377,7 @@ impl Search<'_> {
         width: usize,
         all: &mut Vec<Hypothesis>,
         tried: &mut Vec<Vec<TermKey>>,
+        effort: &mut Effort,
     ) -> bool {
         let mut pool: Vec<(usize, Proposal)> = Vec::new();
         for &(index, effects) in chosen {
@@ -361,6 +393,7 @@ impl Search<'_> {
         (self.progress)(&format!("round {round}: refitting {} models", pool.len()));
         for (index, proposal) in &pool {
             tried.push(signature(&all[*index], &proposal.terms));
+            effort.spend_on(all[*index].judged.model());
         }
         let mut finished = self.refitted(all, &pool, width);
         finished.extend(self.regraded(&finished));

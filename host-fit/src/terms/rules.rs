@@ -22,8 +22,8 @@ rules! {
     rounds: usize = 6, "", "two effects and two memories need three";
     /// The search ends after this many rounds without a gain.
     patience: usize = 2, "rounds", "judgement: for the time it takes";
-    /// No further models are refitted when so much is done.
-    effort: f64 = 8e7, "parameters x samples", "judgement: two minutes of a processor";
+    /// No further models are refitted when those that were had so many parameters in all.
+    effort: f64 = 1600.0, "parameters", "on five records of 10 000 samples two minutes of a processor";
     /// If the error is at least this factor of the noise level when the search ends, the search is extended
     /// to less promising candidates.
     much: f64 = 1.25, "times the noise level", "what is named leaves less";

@@ -133,17 +133,15 @@ impl Found {
     }
 }
 
-/// What a search may still do, counted in the models that it refits: time would depend on the machine.
+/// What a search may still do: parameters of the models that it refits. A limit in seconds would depend on the machine.
 pub(super) struct Effort {
-    /// Parameters times samples.
     left: f64,
-    samples: f64,
 }
 
 impl Effort {
     /// Counts a refit of this model with another term.
     pub(super) fn spend_on(&mut self, model: &Model) {
-        self.left -= model.coordinates().len() as f64 * self.samples;
+        self.left -= model.coordinates().len() as f64;
     }
 
     /// Whether no further models are tried.
@@ -185,15 +183,6 @@ impl<'a> Search<'a> {
 impl Search<'_> {
     pub(super) fn interrupted(&self) -> bool {
         self.interrupt.load(Memory::Relaxed)
-    }
-
-    /// What a search may do at most.
-    fn effort(&self) -> Effort {
-        let samples: usize = self.judge.learning(0).iter().map(|r| r.len()).sum();
-        Effort {
-            left: RULES.effort,
-            samples: samples as f64,
-        }
     }
 
     pub(super) fn over(&self, hypothesis: &Hypothesis) -> f64 {
@@ -269,7 +258,7 @@ impl Search<'_> {
     /// reached, lags are searched anew beside the effects of the best hypothesis.
     #[must_use]
     pub fn run(&self, root: Hypothesis, second: impl FnOnce() -> Option<Hypothesis>) -> Found {
-        let mut effort = self.effort();
+        let mut effort = Effort { left: RULES.effort };
         let (mut all, mut tried) = self.rounds(root, second, &mut effort);
         (self.progress)("leaving out what is not needed");
         let root = all[0].clone();

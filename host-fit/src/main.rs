@@ -117,7 +117,7 @@ mod tests {
             .expect("the command")
             .render_long_help()
             .to_string();
-        assert!(!help.contains("plenum-droop"), "{help}");
+        assert!(!help.contains("valve-lag"), "{help}");
     }
 
     /// And the example is a command line.

@@ -13,8 +13,6 @@ pub(crate) const TASK: Task = Task {
 
 /// Loop periods of the lockstep run, s.
 const PERIODS: &str = "0.0002,0.001,0.01,0.1";
-/// Samples of each case.
-const STEPS: &str = "1500";
 /// The bundled model that the emulated board runs: a sample every 10 ms.
 const SLOW: &str = "firmware/identified/models/slow.toml";
 
@@ -22,8 +20,7 @@ pub(crate) fn periods(arguments: &[String]) -> Result<()> {
     if !arguments.is_empty() {
         bail!("there are no options");
     }
-    crate::pil::pil(&["--periods", PERIODS, "--steps", STEPS].map(str::to_owned))
-        .context("lockstep")?;
+    crate::pil::pil(&["--periods", PERIODS].map(str::to_owned)).context("lockstep")?;
     let constants = crate::identified::of(Some(&root().join(SLOW)), None)?;
     // Of the injected faults (`cargo xtask faults --model`), a late sample restarts this board by its watchdog: open.
     crate::faults::on_the_line(Some(&constants)).context("the board at 10 ms")

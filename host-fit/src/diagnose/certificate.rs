@@ -24,6 +24,10 @@ pub struct Certificate {
     pub alpha: f64,
     /// Names of the records from which it was computed.
     pub records: Vec<String>,
+    /// Share of the variance that the best model without the effect leaves unexplained and the model with it
+    /// explains, at most 1.
+    #[serde(skip)]
+    pub share: f64,
 }
 
 impl Certificate {
@@ -31,6 +35,13 @@ impl Certificate {
     #[must_use]
     pub fn holds(&self) -> bool {
         self.log_e >= -self.alpha.ln()
+    }
+
+    /// Whether the effect is certified beside an error that it does not explain: what imitates another cause takes part
+    /// of its error only.
+    #[must_use]
+    pub fn holds_beside_others(&self) -> bool {
+        self.holds() && self.share >= RULES.certified_share
     }
 }
 
@@ -98,6 +109,7 @@ impl Session<'_> {
             log_e: own - likelihood - tried,
             alpha: RULES.level_of_search,
             records,
+            share: 0.0,
         })
     }
 
@@ -160,9 +172,17 @@ impl Session<'_> {
         let judge = self.judge();
         let nulls = distinct.par_iter().map(|null| Null::of(judge, null));
         let nulls: Vec<Option<Null>> = nulls.collect();
+        let excess = |hypothesis: &Hypothesis| judge.excess(&hypothesis.judged.held_out);
+        let left = excess(subject);
         let certificates = effects.into_iter().filter_map(|(name, places)| {
+            let without = places.iter().map(|at| excess(&distinct[*at]));
+            let without = without.fold(f64::INFINITY, f64::min);
             let nulls: Vec<Null> = places.into_iter().filter_map(|at| nulls[at]).collect();
-            Some((name, self.certificate(own, &nulls, found)?))
+            let certificate = Certificate {
+                share: 1.0 - left / without.max(f64::MIN_POSITIVE),
+                ..self.certificate(own, &nulls, found)?
+            };
+            Some((name, certificate))
         });
         certificates.collect()
     }

@@ -160,6 +160,8 @@ pub struct Diagnosis {
     /// Surrogates: effects that describe part of the model error without being significant. Beside `missing`,
     /// those without which the model fits within the uncertainty of the noise level.
     pub stand_ins: Vec<String>,
+    /// Those of `stand_ins` that are certified although something else is unexplained (verdict "partly explained").
+    pub certified: Vec<String>,
     /// The equivalence set of each of `missing`, itself first.
     pub sets: Vec<Vec<String>>,
     /// Memories of the flow in the final model.

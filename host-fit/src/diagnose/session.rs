@@ -1,5 +1,6 @@
 //! A diagnosis in progress: from the result of the search to the final answer.
 
+use super::certificate::Certificate;
 use super::estimate::{estimates_among, is_identified};
 use super::memory::memory;
 use super::outcome::Conclusion;
@@ -205,12 +206,24 @@ impl Session<'_> {
         let proven = if claims { way.proven } else { 0 };
         let stand_ins = missing.split_off(proven);
         sets.truncate(proven);
+        let is_certified = |name: &String| {
+            let spec = order.iter().find(|spec| spec.name == name.as_str());
+            let certificate = certificates.get(name);
+            spec.is_some_and(|spec| is_identified(&end, spec))
+                && certificate.is_some_and(Certificate::holds_beside_others)
+        };
+        let certified = stand_ins
+            .iter()
+            .filter(|_| verdict == Verdict::PartlyExplained);
+        let certified = certified.filter(|name| is_certified(name));
+        let certified = certified.cloned().collect();
         let parsimony = self.parsimony(given, &last, &missing);
         Diagnosis {
             verdict,
             sets: sets.into_iter().map(|set| set.names).collect(),
             missing,
             stand_ins,
+            certified,
             memory: memory(&model),
             tried: found.tried,
             alternatives: chance.alternatives,

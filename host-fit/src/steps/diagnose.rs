@@ -58,6 +58,7 @@ impl Serialize for Finding {
             answer: &'a Answer,
             missing: &'a [String],
             stand_ins: &'a [String],
+            certified: &'a [String],
             sets: &'a [Vec<String>],
             memory: &'a [Memory],
             ladder: &'a [Rung],
@@ -89,6 +90,7 @@ impl Serialize for Finding {
             answer: &self.answer,
             missing: &found.missing,
             stand_ins: &found.stand_ins,
+            certified: &found.certified,
             sets: &found.sets,
             memory: &found.memory,
             ladder: &found.ladder,
@@ -242,6 +244,7 @@ fn as_written(diagnosis: &mut Diagnosis, given: &Model, records: &[Record]) -> O
         }
         diagnosis.missing.clear();
         diagnosis.stand_ins.clear();
+        diagnosis.certified.clear();
         diagnosis.sets.clear();
         diagnosis.p_value = None;
         diagnosis.model = given.clone();

@@ -149,6 +149,28 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
                 .confidence(confidence(diagnosis))
                 .next(add(&diagnosis.missing))
         }
+        Verdict::PartlyExplained if !diagnosis.certified.is_empty() && plant == Plant::Flow => {
+            let names = &diagnosis.certified;
+            let certificates = || names.iter().filter_map(|name| diagnosis.certificates.get(name));
+            let share = certificates().map(|one| one.share).fold(1.0, f64::min);
+            let alpha = certificates().map(|one| one.alpha).fold(0.0, f64::max);
+            Answer::new(
+                Tone::Finding,
+                format!("{}, beside something unexplained", missing(names, &[])),
+            )
+            .evidence(format!(
+                "With {} the {error} falls {}.",
+                joined(&diagnosis.stand_ins),
+                from_to(first, last, diagnosis)
+            ))
+            .confidence(format!(
+                "Certified at a level of {} %: no model without it is as likely. It explains {:.0} % of the variance that is \
+                 unexplained without it; the cause of the rest is not identified.",
+                significant(100.0 * alpha, 2),
+                100.0 * share
+            ))
+            .next(add(names))
+        }
         Verdict::PartlyExplained => {
             Answer::new(Tone::Warning, "something is missing; its cause is not identified")
                 .evidence(format!(

@@ -83,7 +83,7 @@ pub struct Row {
     /// Why there is no diagnosis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
-    /// The effects named, in their order.
+    /// The effects named, in their order, and those certified beside something unexplained.
     pub missing: Vec<String>,
     /// Equivalence set of each of them.
     #[serde(default)]

@@ -86,6 +86,7 @@ fn fill(row: &mut Row, case: &Case, program: &Program, folder: &Path) -> Result<
     (document, row.identify, row.diagnose) = asked(case, &plan, program, folder)?;
     row.verdict = verdict(&document)?;
     row.missing = names(&document["missing"]);
+    row.missing.extend(names(&document["certified"]));
     row.stand_ins = names(&document["stand_ins"]);
     let sets = document["sets"].as_array();
     row.sets = sets.map_or_else(Vec::new, |sets| sets.iter().map(names).collect());

@@ -107,6 +107,9 @@ fn outcome(r: &Ranked, diagnosis: &Diagnosis) -> String {
     if diagnosis.missing.contains(&r.effect) {
         return "named".to_owned();
     }
+    if diagnosis.certified.contains(&r.effect) {
+        return "certified".to_owned();
+    }
     if diagnosis.stand_ins.contains(&r.effect) {
         return "surrogate".to_owned();
     }

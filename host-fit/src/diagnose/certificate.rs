@@ -211,3 +211,27 @@ fn is_same(a: &Hypothesis, b: &Hypothesis) -> bool {
     let [least, most] = [f64::min, f64::max].map(|of| of(a.judged.rmse(), b.judged.rmse()));
     a.is_built_as(b.judged.model()) && most <= (1.0 + f64::EPSILON.sqrt()) * least
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_effect_is_certified_beside_others_by_its_evidence_and_its_share() {
+        let holds = |log_e: f64, share: f64| {
+            let certificate = Certificate {
+                evidence_nats: log_e,
+                log_e,
+                alpha: 0.02,
+                records: Vec::new(),
+                share,
+            };
+            (certificate.holds(), certificate.holds_beside_others())
+        };
+        assert_eq!(holds(223.0, 0.86), (true, true));
+        // Most of what it takes may be another cause's.
+        assert_eq!(holds(223.0, 0.56), (true, false));
+        assert_eq!(holds(-184.0, 0.9), (false, false));
+        assert_eq!(holds(3.0, 0.9), (false, false));
+    }
+}

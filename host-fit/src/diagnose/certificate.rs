@@ -24,8 +24,8 @@ pub struct Certificate {
     pub alpha: f64,
     /// Names of the records from which it was computed.
     pub records: Vec<String>,
-    /// Share of the variance that the best model without the effect leaves unexplained and the model with it
-    /// explains, at most 1.
+    /// Of the variance that the best model without the effect leaves unexplained, the share that the model with it
+    /// explains: at most 1, and below 0 where it leaves more.
     #[serde(skip)]
     pub share: f64,
 }
@@ -37,8 +37,8 @@ impl Certificate {
         self.log_e >= -self.alpha.ln()
     }
 
-    /// Whether the effect is certified beside an error that it does not explain: what imitates another cause takes part
-    /// of its error only.
+    /// Whether the effect is certified although part of the error stays unexplained. It must then explain most of the
+    /// error: an effect that imitates another cause explains less.
     #[must_use]
     pub fn holds_beside_others(&self) -> bool {
         self.holds() && self.share >= RULES.certified_share
@@ -89,19 +89,28 @@ impl Session<'_> {
         let certificate = || {
             let own = self.evidence(best)?;
             let bare = Null::of(self.judge(), &found.bare)?;
-            self.certificate(own, &[bare], found)
+            self.certificate(best, own, &[bare], found)
         };
         certificate().is_some_and(|certificate| certificate.holds())
     }
 
-    /// The certificate of a model with this evidence (nats) against these null models; `None` without any.
-    fn certificate(&self, own: f64, nulls: &[Null], found: &Found) -> Option<Certificate> {
+    /// The certificate of `subject`, whose evidence is `own` (nats), against these null models; `None` without any.
+    fn certificate(
+        &self,
+        subject: &Hypothesis,
+        own: f64,
+        nulls: &[Null],
+        found: &Found,
+    ) -> Option<Certificate> {
         let most = |of: fn(&Null) -> f64| nulls.iter().map(of).reduce(f64::max);
         let likelihood = most(|null| null.log_likelihood)?;
         let evidence = most(|null| null.evidence)?;
         let all = self.judge().first_fold();
         let mut records: Vec<String> = all.iter().map(|record| record.name.clone()).collect();
         records.dedup();
+        let left = self.judge().excess(&subject.judged.held_out);
+        let without = nulls.iter().map(|null| null.excess);
+        let without = without.fold(f64::INFINITY, f64::min);
         // The e-value is divided by the number of structures tried.
         let tried = (found.tried.max(1) as f64).ln();
         Some(Certificate {
@@ -109,7 +118,7 @@ impl Session<'_> {
             log_e: own - likelihood - tried,
             alpha: RULES.level_of_search,
             records,
-            share: 0.0,
+            share: 1.0 - left / without.max(f64::MIN_POSITIVE),
         })
     }
 
@@ -172,17 +181,9 @@ impl Session<'_> {
         let judge = self.judge();
         let nulls = distinct.par_iter().map(|null| Null::of(judge, null));
         let nulls: Vec<Option<Null>> = nulls.collect();
-        let excess = |hypothesis: &Hypothesis| judge.excess(&hypothesis.judged.held_out);
-        let left = excess(subject);
         let certificates = effects.into_iter().filter_map(|(name, places)| {
-            let without = places.iter().map(|at| excess(&distinct[*at]));
-            let without = without.fold(f64::INFINITY, f64::min);
             let nulls: Vec<Null> = places.into_iter().filter_map(|at| nulls[at]).collect();
-            let certificate = Certificate {
-                share: 1.0 - left / without.max(f64::MIN_POSITIVE),
-                ..self.certificate(own, &nulls, found)?
-            };
-            Some((name, certificate))
+            Some((name, self.certificate(subject, own, &nulls, found)?))
         });
         certificates.collect()
     }
@@ -193,6 +194,8 @@ impl Session<'_> {
 struct Null {
     log_likelihood: f64,
     evidence: f64,
+    /// Variance above the noise on the validation samples, y².
+    excess: f64,
 }
 
 impl Null {
@@ -202,6 +205,7 @@ impl Null {
             log_likelihood: null.log_likelihood,
             // Where the evidence cannot be computed, the likelihood is used.
             evidence: null.evidence(judge).unwrap_or(f64::NEG_INFINITY),
+            excess: judge.excess(&hypothesis.judged.held_out),
         })
     }
 }

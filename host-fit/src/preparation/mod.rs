@@ -64,7 +64,7 @@ impl Preparation {
             .collect();
         let moving_zero = MovingZero::of(&prepared, &beginnings, command.off);
         if let Some(moving) = &moving_zero {
-            moving.subtract(&mut prepared, &beginnings, command.off);
+            rest::tare(&mut prepared, &beginnings, command.off, moving.share);
         }
         follow(&mut prepared, &beginnings);
         let zero = rest::level_of_rest(&prepared, &beginnings, command.off)

@@ -137,8 +137,8 @@ pub struct MovingZero {
     pub lowest: (String, f64),
     /// The record that rests highest, and where, y.
     pub highest: (String, f64),
-    /// Share of a record's own deviation that is subtracted from it.
-    share: f64,
+    /// Share of a record's own deviation that is subtracted from it, 0 to 1.
+    pub(super) share: f64,
 }
 
 impl MovingZero {
@@ -182,11 +182,6 @@ impl MovingZero {
             share,
         })
     }
-
-    /// Takes each record from its own zero. Records that do not rest under a command of `off` stay as they are.
-    pub(super) fn subtract(&self, records: &mut [Record], beginnings: &[Beginning], off: f64) {
-        tare(records, beginnings, off, self.share);
-    }
 }
 
 /// The scatter of the levels of rest between the records, beside what noise makes of each.
@@ -224,9 +219,9 @@ fn creeps(levels: &[(&Record, (f64, f64))]) -> bool {
     correlation(&order, &levels).is_some_and(|(_, p)| p < RULES.creeping_zero)
 }
 
-/// Takes each record from its own zero: by a `share` of 1 all rest where they do in the mean. Records that do not rest under a command of
-/// `off` stay as they are.
-fn tare(records: &mut [Record], beginnings: &[Beginning], off: f64, share: f64) {
+/// Subtracts from each record this `share` (0 to 1) of its deviation from the mean level of rest. Records that do not rest
+/// under a command of `off` stay as they are.
+pub(super) fn tare(records: &mut [Record], beginnings: &[Beginning], off: f64, share: f64) {
     let own = |record: &Record, beginning: &Beginning| {
         let rests = beginning.rests_at(off);
         let pieces = quiet_pieces(record, beginning);

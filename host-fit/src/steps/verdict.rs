@@ -164,9 +164,13 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
                 from_to(first, last, diagnosis)
             ))
             .confidence(format!(
-                "Certified at a level of {} %: no model without it is as likely. It explains {:.0} % of the variance that is \
-                 unexplained without it; the cause of the rest is not identified.",
+                "Certified at a level of {} %. {} {:.0} % of the variance that is unexplained without it; the cause of the rest \
+                 is not identified.",
                 significant(100.0 * alpha, 2),
+                match names.len() {
+                    1 => "It explains",
+                    _ => "Each explains at least",
+                },
                 100.0 * share
             ))
             .next(add(names))

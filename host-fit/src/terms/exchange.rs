@@ -2,9 +2,10 @@
 //! others.
 
 use super::RULES;
+use super::effort::Effort;
 use super::evidence::{HeldOut, p_value};
 use super::screen::Screen;
-use super::search::{Effort, Hypothesis, Search, count_effects, score};
+use super::search::{Hypothesis, Search, count_effects, score};
 use super::table::Table;
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit};

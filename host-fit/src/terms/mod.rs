@@ -11,6 +11,7 @@ mod automatic;
 mod bench;
 mod certificate;
 mod chance;
+mod effort;
 mod evidence;
 mod exchange;
 mod folds;

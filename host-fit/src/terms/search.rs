@@ -1,6 +1,7 @@
 //! The search over lags, the sensor's offset and effects.
 
 use super::RULES;
+use super::effort::Effort;
 use super::grid::hides;
 use super::judge::{Judge, Judged};
 use super::proposal::Proposal;
@@ -133,23 +134,6 @@ impl Found {
     }
 }
 
-/// What a search may still do: parameters of the models that it refits. A limit in seconds would depend on the machine.
-pub(super) struct Effort {
-    left: f64,
-}
-
-impl Effort {
-    /// Counts a refit of this model with another term.
-    pub(super) fn spend_on(&mut self, model: &Model) {
-        self.left -= model.coordinates().len() as f64;
-    }
-
-    /// Whether no further models are tried.
-    pub(super) fn is_spent(&self) -> bool {
-        self.left <= 0.0
-    }
-}
-
 /// The search with its data and options.
 pub struct Search<'a> {
     /// The bench.
@@ -258,7 +242,7 @@ impl Search<'_> {
     /// reached, lags are searched anew beside the effects of the best hypothesis.
     #[must_use]
     pub fn run(&self, root: Hypothesis, second: impl FnOnce() -> Option<Hypothesis>) -> Found {
-        let mut effort = Effort { left: RULES.effort };
+        let mut effort = Effort::of_a_search();
         let (mut all, mut tried) = self.rounds(root, second, &mut effort);
         (self.progress)("leaving out what is not needed");
         let root = all[0].clone();

@@ -1,0 +1,55 @@
+//! The end of a search: counted in what it refits, since a limit in seconds would depend on the machine.
+
+use super::RULES;
+use crate::model::Model;
+
+/// What a search may still do: parameters of the models that it refits.
+pub(super) struct Effort {
+    left: f64,
+}
+
+impl Effort {
+    /// What one search may do.
+    pub(super) fn of_a_search() -> Self {
+        Self { left: RULES.effort }
+    }
+
+    /// Counts a refit of this model.
+    pub(super) fn spend_on(&mut self, model: &Model) {
+        self.left -= model.coordinates().len() as f64;
+    }
+
+    /// Whether no further models are tried.
+    pub(super) fn is_spent(&self) -> bool {
+        self.left <= 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::residual::plants::{base, records};
+
+    #[test]
+    fn a_large_model_spends_more_than_a_small_one() {
+        let refits = |model: &Model| {
+            let mut effort = Effort::of_a_search();
+            let spent = (1..).find(|_| {
+                effort.spend_on(model);
+                effort.is_spent()
+            });
+            spent.expect("an end")
+        };
+        let small = base(&records(&[], &[], 1));
+        let mut large = small.clone();
+        for _ in 0..small.coordinates().len() {
+            large.state_lags.push(40);
+            large.a.push(0.0);
+        }
+        let (few, many) = (refits(&large), refits(&small));
+        assert!(
+            few > 20 && (2 * few - 1..=2 * few).contains(&many),
+            "{few} {many}"
+        );
+    }
+}

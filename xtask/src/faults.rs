@@ -38,12 +38,17 @@ pub(crate) fn faults(arguments: &[String]) -> Result<()> {
         }
         _ => bail!("the only option is --model FILE"),
     };
-    on_the_line(constants.as_deref())?;
+    of(constants.as_deref())
+}
+
+/// Every fault on the board with these constants.
+pub(crate) fn of(constants: Option<&Path>) -> Result<()> {
+    on_the_line(constants)?;
     let elf = build(
         "qemu-mps2",
         "qemu-mps2",
         &["--features", "defmt"],
-        constants.as_deref(),
+        constants,
     )?;
     let log = elf.with_extension("log");
     let mut process = qemu(&elf)
@@ -102,8 +107,8 @@ pub(crate) fn faults(arguments: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// Only faults between host and board.
-pub(crate) fn on_the_line(constants: Option<&Path>) -> Result<()> {
+/// Faults between host and board.
+fn on_the_line(constants: Option<&Path>) -> Result<()> {
     let rig = build("qemu-mps2", "qemu-rig", &[], constants)?;
     run(scenario("line-faults").arg(&rig))
 }

@@ -22,6 +22,5 @@ pub(crate) fn periods(arguments: &[String]) -> Result<()> {
     }
     crate::pil::pil(&["--periods", PERIODS].map(str::to_owned)).context("lockstep")?;
     let constants = crate::identified::of(Some(&root().join(SLOW)), None)?;
-    // Of the injected faults (`cargo xtask faults --model`), a late sample restarts this board by its watchdog: open.
-    crate::faults::on_the_line(Some(&constants)).context("the board at 10 ms")
+    crate::faults::of(Some(&constants)).context("the board at 10 ms")
 }

@@ -1,11 +1,11 @@
-//! CMSDK APB watchdog: restarts the board if it is not fed.
+//! CMSDK APB watchdog: restarts the board if it is not fed. Its first timeout is the board's non-maskable interrupt,
+//! which must restart the board; the second one would.
 
 use core::mem::MaybeUninit;
 use core::ptr::{addr_of, addr_of_mut};
 
 const BASE: usize = 0x4000_8000;
 const LOAD: *mut u32 = BASE as *mut u32;
-const VALUE: *const u32 = (BASE + 4) as *const u32;
 const CONTROL: *mut u32 = (BASE + 8) as *mut u32;
 const CLEAR: *mut u32 = (BASE + 0xC) as *mut u32;
 const LOCK: *mut u32 = (BASE + 0xC00) as *mut u32;
@@ -21,8 +21,8 @@ static mut MARK: MaybeUninit<u32> = MaybeUninit::uninit();
 pub struct Watchdog(());
 
 impl Watchdog {
-    /// Starts the watchdog: without feeding, the board restarts after twice `ticks` (25 MHz). `_core` is
-    /// consumed to guarantee exclusive ownership.
+    /// Starts the watchdog: without feeding, the non-maskable interrupt comes after `ticks` (25 MHz) and a restart after
+    /// twice that. `_core` is consumed to guarantee exclusive ownership.
     #[must_use]
     pub fn start(_core: cortex_m::peripheral::TPIU, ticks: u32) -> Self {
         mark(RUNNING);
@@ -40,13 +40,6 @@ impl Watchdog {
     pub fn feed(&mut self) {
         // SAFETY: as in `start`.
         unsafe { CLEAR.write_volatile(1) };
-    }
-
-    /// Ticks left of the first of two timeouts.
-    #[must_use]
-    pub fn left(&self) -> u32 {
-        // SAFETY: reading a register.
-        unsafe { VALUE.read_volatile() }
     }
 }
 

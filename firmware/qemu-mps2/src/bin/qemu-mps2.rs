@@ -14,7 +14,7 @@ use board::stack;
 use core::convert::Infallible;
 use core::mem::MaybeUninit;
 use core::ptr::{addr_of, addr_of_mut};
-use cortex_m_rt::entry;
+use cortex_m_rt::{entry, exception};
 use embedded_hal::digital::{ErrorType, OutputPin};
 use firmware::link::desk::Desk;
 use firmware::on_board::SETTINGS;
@@ -31,10 +31,10 @@ use wire::Outbox;
 
 /// SysTick ticks per sample, at 25 MHz.
 const TICKS_PER_SAMPLE: u32 = 25 * on_board::PERIOD_US;
-/// Instructions, at 32 ns each.
-const TWO_AND_A_HALF_PERIODS: u32 = TICKS_PER_SAMPLE / 2 * 5 * 40 / 32;
-/// Watchdog reload value; the restart follows after twice this time.
-const PATIENCE: u32 = 25 * on_board::PATIENCE_US / 2;
+/// In loops of `cortex_m::asm::delay`: two instructions of 32 ns each.
+const TWO_AND_A_HALF_PERIODS: u32 = TICKS_PER_SAMPLE / 2 * 5 * 40 / 64;
+/// Watchdog timeout in its ticks, at 25 MHz.
+const PATIENCE: u32 = 25 * on_board::PATIENCE_US;
 
 /// Damage to apply at the next start; RAM survives a restart.
 #[unsafe(link_section = ".uninit.damage")]
@@ -161,6 +161,12 @@ fn main() -> ! {
             }
         }
     }
+}
+
+/// The watchdog's timeout.
+#[exception]
+unsafe fn NonMaskableInt() -> ! {
+    cortex_m::peripheral::SCB::sys_reset()
 }
 
 /// The self-test with the injected damage.

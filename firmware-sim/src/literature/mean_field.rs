@@ -9,7 +9,8 @@ use std::f64::consts::TAU;
 pub(super) const PUBLISHED: Published = Published {
     name: "mean-field",
     reference: "Noack et al. 2003, J. Fluid Mech. 497, 335",
-    also_right: &[],
+    // The shift of the mean follows the square of the amplitude with a lag of its own.
+    also_right: &["flow-lag"],
     draw: |rng| Box::new(MeanField::draw(rng)),
 };
 

@@ -1,6 +1,6 @@
 //! Which effects are not distinguishable from a named one, and the experiment that would distinguish them.
 
-use super::ranking::{Rival, alike, rivals};
+use super::ranking::{FLOW_LAG, Rival, alike, rivals};
 use super::session::Session;
 use crate::experiment::Separation;
 use crate::model::Model;
@@ -10,15 +10,32 @@ use std::sync::atomic::Ordering;
 
 /// An effect with its equivalence set: all candidates that are not distinguishable from it on these records.
 pub(super) struct Set {
-    pub(super) names: Vec<String>,
+    pub(super) effect: &'static Spec,
     /// For each other member of the set, the model with that member in the effect's place, inner units.
-    pub(super) models: Vec<Model>,
+    pub(super) others: Vec<(String, Model)>,
 }
 
 impl Set {
-    /// Posterior probability of each member, the effect of `last` first. Empty where every free run diverges.
+    /// The members, the effect first. A second lag of the flow is one of a lag in series, since their outputs are the
+    /// same by construction.
+    pub(super) fn names(&self) -> Vec<String> {
+        let own = std::iter::once(self.effect.name.to_owned());
+        let same = self.adds_flow_lag().then(|| FLOW_LAG.to_owned());
+        let others = self.others.iter().map(|(name, _)| name.clone());
+        own.chain(same).chain(others).collect()
+    }
+
+    fn adds_flow_lag(&self) -> bool {
+        self.effect.lag_in_series && self.others.iter().all(|(name, _)| name != FLOW_LAG)
+    }
+
+    /// Posterior probability of each of [`names`](Self::names). Empty where every free run diverges.
     pub(super) fn posterior(&self, likelihood: &Likelihood<'_>, last: &Judged) -> Vec<f64> {
-        let models = std::iter::once(last.model()).chain(&self.models);
+        let own = std::iter::once(last.model());
+        let same = self.adds_flow_lag().then_some(last.model());
+        let models = own
+            .chain(same)
+            .chain(self.others.iter().map(|(_, model)| model));
         let evidence: Vec<f64> = models
             .map(|model| likelihood.evidence(model).unwrap_or(f64::NEG_INFINITY))
             .collect();
@@ -47,8 +64,8 @@ impl Session<'_> {
             .take(told)
             .map(|spec| {
                 let mut set = Set {
-                    names: vec![spec.name.to_owned()],
-                    models: Vec::new(),
+                    effect: spec,
+                    others: Vec::new(),
                 };
                 let owned: Vec<Rival>;
                 let others = if order.len() == 1 {
@@ -71,8 +88,8 @@ impl Session<'_> {
                 let shares = shares_won(&std::iter::once(own).chain(theirs).collect::<Vec<_>>());
                 for (index, (rival, judged)) in fitted.iter().enumerate() {
                     if alike(&judged.held_out, own) || !is_out(&shares, index + 1) {
-                        set.names.push(rival.name.clone());
-                        set.models.push(judged.model().clone());
+                        let model = judged.model().clone();
+                        set.others.push((rival.name.clone(), model));
                     }
                 }
                 set
@@ -94,5 +111,34 @@ impl Session<'_> {
         let models: Vec<Model> = std::iter::once(model.clone()).chain(alternatives).collect();
         let noise = self.judge().measured_noise_rmse() * self.units.y;
         Separation::of(models, effects, noise, self.options.seed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::residual::plants::{base, records};
+    use model_core::effects::spec;
+
+    #[test]
+    fn a_films_lag_and_a_lag_of_the_flow_are_one_thing() {
+        let model = base(&records(&[], &[], 1));
+        let names = |effect: &str, others: &[&str]| {
+            let others = others
+                .iter()
+                .map(|name| ((*name).to_owned(), model.clone()));
+            let effect = spec(effect).expect("in the catalogue");
+            let others = others.collect();
+            Set { effect, others }.names()
+        };
+        assert_eq!(
+            names("hot-film-lag", &["valve-lag"]),
+            ["hot-film-lag", FLOW_LAG, "valve-lag"]
+        );
+        assert_eq!(
+            names("hot-film-lag", &[FLOW_LAG]),
+            ["hot-film-lag", FLOW_LAG]
+        );
+        assert_eq!(names("valve-lag", &[]), ["valve-lag"]);
     }
 }

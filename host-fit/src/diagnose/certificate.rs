@@ -151,8 +151,8 @@ impl Session<'_> {
                 continue;
             };
             let name = effect.name.to_owned();
-            let set = sets.iter().find(|set| set.names.first() == Some(&name));
-            let names = set.map_or(std::slice::from_ref(&name), |set| &set.names);
+            let set = sets.iter().find(|set| set.effect.name == name);
+            let names = set.map_or_else(|| vec![name.clone()], Set::names);
             let lacks = |model: &&Hypothesis| {
                 let mut effects = model.terms.iter().filter_map(Term::effect);
                 !effects.any(|effect| names.iter().any(|name| name == effect.name))

@@ -29,7 +29,7 @@ use crate::data::Record;
 use crate::excitation::bears_little;
 use crate::model::{Model, Start};
 use crate::simulate::SimulateError;
-use crate::terms::{Bench, Hypothesis, Known, Search};
+use crate::terms::{Bench, Effort, Hypothesis, Known, Search};
 use session::Session;
 use std::sync::atomic::{AtomicBool, Ordering};
 use thiserror::Error;
@@ -153,18 +153,24 @@ fn chosen(
         return Err(DiagnoseError::Interrupted);
     }
     let mut origin = root.clone();
-    let mut found = search.run(root, || search.second_root(&given_inside, &origin));
+    let mut effort = Effort::of_a_search();
+    let mut found = search.run_within(
+        root,
+        || search.second_root(&given_inside, &origin),
+        &mut effort,
+    );
     // A structure that is not made of the search's terms may still hold what they do
     // not reach one by one.
     let reached = found.best.judged.rmse();
     if (judge.over_noise(reached) > RULES.floor_margin
         || reached > (1.0 - RULES.worthwhile) * as_given.rmse())
+        && !effort.is_spent()
         && !found.set_out_twice()
         && (own_dynamics || !origin.is_built_as(&given_inside))
         && let Ok(judged) = judge.refitted(&given_inside)
         && judged.rmse() < origin.judged.rmse()
     {
-        let from_given = search.run(Hypothesis::new(judged), || None);
+        let from_given = search.run_within(Hypothesis::new(judged), || None, &mut effort);
         if from_given.best.judged.rmse() < (1.0 - RULES.worthwhile) * reached {
             found = from_given;
         }
@@ -172,6 +178,7 @@ fn chosen(
     // The form of a delay law in the given model was chosen without the effects: beside them another may do better.
     if judge.over_noise(found.best.judged.rmse()) > RULES.floor_margin
         && given_inside.delay.follows_y()
+        && !effort.is_spent()
         && let Some(other) = search.after_another_law(&found.best, &[])
         && other.judged.rmse() < (1.0 - RULES.worthwhile) * found.best.judged.rmse()
     {
@@ -182,7 +189,11 @@ fn chosen(
         };
         if let Ok(root) = search.root(&with_law, mid_run) {
             let set_out = root.clone();
-            let anew = search.run(root, || search.second_root(&with_law, &set_out));
+            let anew = search.run_within(
+                root,
+                || search.second_root(&with_law, &set_out),
+                &mut effort,
+            );
             if anew.best.score() < found.best.score() {
                 (found, origin) = (anew, set_out);
             }

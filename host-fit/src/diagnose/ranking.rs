@@ -23,7 +23,7 @@ pub(super) fn alike(a: &HeldOut, b: &HeldOut) -> bool {
 
 /// A candidate with its first-order prediction, and refitted if the prediction was good enough.
 pub(super) struct Rival {
-    /// The effect's name, or the name of a memory or lag of the flow.
+    /// The effect's name, or that of a base term: a memory, a lag, a path of the drive.
     pub(super) name: String,
     pub(super) spec: Option<&'static Spec>,
     pub(super) refitted: Option<Hypothesis>,
@@ -95,10 +95,10 @@ fn refitted(
         table,
         context.judged.rmse(),
         |place, name, candidate| {
-            // Unnamed terms of the base promise little to first order and often fit equally well after a
-            // refit, as do named effects at another grid point: these are refitted too.
+            // Base terms promise little to first order and often fit equally well after a refit, as do named effects
+            // at another grid point: these are refitted too.
             let wanted = place < RULES.ranked_in_full
-                || [FLOW_MEMORY, FLOW_LAG].contains(&name)
+                || candidate.term.effect().is_none()
                 || named.contains(&name)
                 || (found.iter()).any(|own| table.are_alike(screen, own, candidate));
             if !wanted || named.is_empty() {
@@ -127,13 +127,8 @@ fn rated(
             Term::Effect { spec, .. } => spec.name.to_owned(),
             Term::Memory(_) | Term::Wake(_) => FLOW_MEMORY.to_owned(),
             Term::Inertia(_) => FLOW_LAG.to_owned(),
-            Term::State(_)
-            | Term::Product(_)
-            | Term::Offset
-            | Term::LevelRate
-            | Term::Path { .. } => {
-                continue;
-            }
+            Term::Path { spec, .. } => spec.name.to_owned(),
+            Term::State(_) | Term::Product(_) | Term::Offset | Term::LevelRate => continue,
         };
         if !best.iter().any(|(met, _)| *met == name) {
             best.push((name, candidate));

@@ -1,5 +1,6 @@
 //! A diagnosis in progress: from the result of the search to the final answer.
 
+use super::alternatives::Set;
 use super::certificate::Certificate;
 use super::estimate::{estimates_among, is_identified};
 use super::memory::memory;
@@ -140,8 +141,8 @@ impl Session<'_> {
         let mut sets = self.sets(&last, &order, told, &others, &found.root);
         let alternatives: Vec<Model> = sets
             .iter()
-            .flat_map(|set| &set.models)
-            .map(|model| units.model_out(model))
+            .flat_map(|set| &set.others)
+            .map(|(_, model)| units.model_out(model))
             .collect();
         let end = judge.final_fit(&last.judged);
         let model = units.model_out(&end.model);
@@ -184,18 +185,17 @@ impl Session<'_> {
             // there.
             if let Some(own) = parameters.get(&entry.effect) {
                 entry.parameters.clone_from(own);
-                let set = sets
-                    .iter()
-                    .find(|set| set.names.first() == Some(&entry.effect));
-                entry.confounded_with = set.map(|s| s.names[1..].to_vec()).unwrap_or_default();
+                let set = sets.iter().find(|set| set.effect.name == entry.effect);
+                entry.confounded_with = set.map(|s| s.names()[1..].to_vec()).unwrap_or_default();
             }
         }
         let separated: Vec<String> = {
             let mut names: Vec<String> = Vec::new();
-            for set in sets.iter().filter(|set| !set.models.is_empty()) {
-                for name in &set.names {
-                    if !names.contains(name) {
-                        names.push(name.clone());
+            for set in sets.iter().filter(|set| !set.others.is_empty()) {
+                let others = set.others.iter().map(|(name, _)| name.as_str());
+                for name in std::iter::once(set.effect.name).chain(others) {
+                    if !names.iter().any(|met| met == name) {
+                        names.push(name.to_owned());
                     }
                 }
             }
@@ -220,7 +220,7 @@ impl Session<'_> {
         let parsimony = self.parsimony(given, &last, &missing);
         Diagnosis {
             verdict,
-            sets: sets.into_iter().map(|set| set.names).collect(),
+            sets: sets.iter().map(Set::names).collect(),
             missing,
             stand_ins,
             certified,

@@ -373,7 +373,7 @@ fn bench_check(sets: &[Vec<String>]) -> &'static str {
     let places = |set: &[String]| {
         let of = |name: &String| match name.as_str() {
             FLOW_LAG | FLOW_MEMORY => Some(Place::Flow),
-            name => Some(spec(name)?.place),
+            name => spec(name).map(|spec| if spec.base { Place::Flow } else { spec.place }),
         };
         let mut places: Vec<Place> = Vec::new();
         for place in set.iter().filter_map(of) {

@@ -4,13 +4,15 @@ use super::RULES;
 use crate::model::Model;
 
 /// What a search may still do: parameters of the models that it refits.
-pub(super) struct Effort {
+#[derive(Debug)]
+pub struct Effort {
     left: f64,
 }
 
 impl Effort {
-    /// What one search may do.
-    pub(super) fn of_a_search() -> Self {
+    /// What one search may do, or several that share it.
+    #[must_use]
+    pub fn of_a_search() -> Self {
         Self { left: RULES.effort }
     }
 
@@ -20,7 +22,8 @@ impl Effort {
     }
 
     /// Whether no further models are tried.
-    pub(super) fn is_spent(&self) -> bool {
+    #[must_use]
+    pub fn is_spent(&self) -> bool {
         self.left <= 0.0
     }
 }

@@ -38,6 +38,7 @@ pub use bench::Bench;
 pub(crate) use certificate::MostLikely;
 pub use chance::Chance;
 pub(crate) use chance::Noise;
+pub use effort::Effort;
 pub(crate) use evidence::{HeldOut, p_value};
 pub use folds::HeldOutBy;
 pub(crate) use judge::size;

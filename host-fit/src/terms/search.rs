@@ -242,8 +242,18 @@ impl Search<'_> {
     /// reached, lags are searched anew beside the effects of the best hypothesis.
     #[must_use]
     pub fn run(&self, root: Hypothesis, second: impl FnOnce() -> Option<Hypothesis>) -> Found {
-        let mut effort = Effort::of_a_search();
-        let (mut all, mut tried) = self.rounds(root, second, &mut effort);
+        self.run_within(root, second, &mut Effort::of_a_search())
+    }
+
+    /// The same with what is left of an effort that several searches share.
+    #[must_use]
+    pub fn run_within(
+        &self,
+        root: Hypothesis,
+        second: impl FnOnce() -> Option<Hypothesis>,
+        effort: &mut Effort,
+    ) -> Found {
+        let (mut all, mut tried) = self.rounds(root, second, effort);
         (self.progress)("leaving out what is not needed");
         let root = all[0].clone();
         let end = best(&all, |_| true);
@@ -261,7 +271,7 @@ impl Search<'_> {
             && let Some(start) = self.without_lags(&found, &root)
         {
             (self.progress)("lags anew beside the effects");
-            let (anew, further) = self.rounds(start, || None, &mut effort);
+            let (anew, further) = self.rounds(start, || None, effort);
             tried += further;
             let other = &anew[best(&anew, |_| true)];
             if other.score() < found.score() - RULES.price {
@@ -269,7 +279,7 @@ impl Search<'_> {
             }
             all.extend(anew);
         }
-        let found = self.exchanged(found, &root, &mut effort);
+        let found = self.exchanged(found, &root, effort);
         Found {
             root,
             best: found,

@@ -334,6 +334,8 @@ pub struct Spec {
     pub needs: Needs,
     /// Whether it is a base term, which is never reported as missing: a constant delay, the sensor's offset.
     pub base: bool,
+    /// Whether a second lag of the flow has the same output, whatever the command: the two are always stated together.
+    pub lag_in_series: bool,
     /// Whether it opposes or scales a motion: it is applied after all driving effects.
     pub resists: bool,
     /// Additional card of a delay law.
@@ -359,6 +361,7 @@ impl Spec {
         calibrated: false,
         needs: Needs::Nothing,
         base: false,
+        lag_in_series: false,
         resists: false,
         law: None,
         source: "",

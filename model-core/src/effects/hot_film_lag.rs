@@ -51,6 +51,7 @@ impl<T: Real> Physics<T> for HotFilmLag<T> {
             &[0.006, 0.03, 0.2],
         )],
         amplitude: Some(Amplitude::new("time_constant", "a lag of the hot film")),
+        lag_in_series: true,
         source: "Bruun, Hot-wire Anemometry (1995)",
         ..Spec::PLAIN
     };

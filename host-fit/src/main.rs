@@ -13,6 +13,8 @@ use std::process::ExitCode;
 use clap::{CommandFactory, Parser};
 use commands::{Console, threads};
 use host_fit::data::{memory, visible};
+use host_fit::rules::{Change, change_for_this_run};
+use host_fit::steps::rule_change;
 
 #[derive(Debug, Parser)]
 #[command(version, about, max_term_width = 100)]
@@ -23,6 +25,9 @@ struct Cli {
     /// Memory that may be used for what a file or an option sizes, in GB.
     #[arg(long, global = true, value_name = "GB", default_value = "2", value_parser = gigabytes)]
     memory: u64,
+    /// Give a rule another value for this run (repeatable); `host-fit rules` lists them.
+    #[arg(long, global = true, value_name = "NAME=VALUE", value_parser = rule_change)]
+    set: Vec<Change>,
     #[command(subcommand)]
     command: Command,
 }
@@ -61,6 +66,10 @@ fn gigabytes(text: &str) -> Result<u64, String> {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     memory::set_limit(cli.memory);
+    for change in &cli.set {
+        let _ = writeln!(std::io::stderr(), "{change}");
+    }
+    change_for_this_run(cli.set);
     threads::or_one();
     let console = Console { json: cli.json };
     let result = match &cli.command {

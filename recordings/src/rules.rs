@@ -1,6 +1,9 @@
 //! Rules: thresholds of the tool, each with its meaning and the origin of its value.
 
 use serde::Serialize;
+use std::fmt;
+use std::sync::OnceLock;
+use thiserror::Error;
 
 /// One threshold.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -71,8 +74,8 @@ impl<const N: usize> From<[f64; N]> for Value {
     }
 }
 
-impl std::fmt::Display for Value {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Count(value) => write!(f, "{value}"),
             Self::Number(value) => write!(f, "{value}"),
@@ -95,7 +98,207 @@ pub struct Rulebook {
     pub rules: Vec<Rule>,
 }
 
-/// Writes a structure of rules, its values in force as the constant `RULES`, and its [`Rulebook`].
+/// A rule with another value than the built-in one, for a run: `terms.effort = 800`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    /// The module.
+    pub room: &'static str,
+    /// The rule.
+    pub name: String,
+    /// The built-in value.
+    pub built_in: Value,
+    /// The value of this run.
+    pub value: Value,
+}
+
+impl fmt::Display for Change {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            room,
+            name,
+            built_in,
+            value,
+        } = self;
+        write!(f, "rule {room}.{name}: {value} in place of {built_in}")
+    }
+}
+
+/// Why a rule was not changed.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum ChangeError {
+    /// Not `NAME=VALUE`.
+    #[error("NAME=VALUE is needed, for example `terms.price=0.002`")]
+    Shape,
+    /// No such rule.
+    #[error("there is no rule `{0}`; `host-fit rules` lists them")]
+    Unknown(String),
+    /// A name that several groups have.
+    #[error("`{name}` is a rule of several groups: write {}", .full.join(" or "))]
+    Ambiguous {
+        /// The name.
+        name: String,
+        /// The names with their groups.
+        full: Vec<String>,
+    },
+    /// A value that the rule cannot take.
+    #[error("`{name}` needs {needs}")]
+    Value {
+        /// The name.
+        name: String,
+        /// What it needs.
+        needs: String,
+    },
+}
+
+/// A value may be changed by up to this factor: beyond it a rule no longer does what it is for.
+const MOST_CHANGED: f64 = 100.0;
+
+impl Change {
+    /// The change that `NAME=VALUE` asks for; NAME is `group.rule`, or the rule alone where one group has it. `books` are
+    /// the built-in values.
+    ///
+    /// # Errors
+    /// [`ChangeError`].
+    pub fn read(text: &str, books: &[Rulebook]) -> Result<Self, ChangeError> {
+        let (name, value) = text.split_once('=').ok_or(ChangeError::Shape)?;
+        let (name, value) = (name.trim(), value.trim());
+        let found: Vec<(&'static str, &Rule)> = books
+            .iter()
+            .flat_map(|book| book.rules.iter().map(|rule| (book.room, rule)))
+            .filter(|(room, rule)| rule.name == name || format!("{room}.{}", rule.name) == name)
+            .collect();
+        let (room, rule) = match found[..] {
+            [] => return Err(ChangeError::Unknown(name.to_owned())),
+            [one] => one,
+            _ => {
+                let full = found
+                    .iter()
+                    .map(|(room, rule)| format!("{room}.{}", rule.name));
+                return Err(ChangeError::Ambiguous {
+                    name: name.to_owned(),
+                    full: full.collect(),
+                });
+            }
+        };
+        let value = rule
+            .value
+            .changed(value)
+            .map_err(|needs| ChangeError::Value {
+                name: format!("{room}.{}", rule.name),
+                needs,
+            })?;
+        Ok(Self {
+            room,
+            name: rule.name.clone(),
+            built_in: rule.value.clone(),
+            value,
+        })
+    }
+}
+
+impl Value {
+    /// The value of the same kind that `text` gives, or what is needed.
+    fn changed(&self, text: &str) -> Result<Self, String> {
+        let within = |own: f64, new: f64| {
+            let (least, most) = match own.abs() {
+                0.0 => (0.0, MOST_CHANGED),
+                own => (own / MOST_CHANGED, own * MOST_CHANGED),
+            };
+            let sign = if own < 0.0 { -1.0 } else { 1.0 };
+            match (least..=most).contains(&(sign * new)) {
+                true => Ok(new),
+                false => Err(format!("a value from {} to {}", sign * least, sign * most)),
+            }
+        };
+        let number = |text: &str| {
+            let number = text.trim().parse::<f64>().ok();
+            number.ok_or_else(|| format!("a number, not `{}`", text.escape_debug()))
+        };
+        match self {
+            Self::Number(own) => Ok(Self::Number(within(*own, number(text)?)?)),
+            Self::Count(own) => match text.parse::<u64>() {
+                Ok(new) => Ok(Self::Count(within(*own as f64, new as f64)? as u64)),
+                Err(_) => Err(format!("a whole number, not `{}`", text.escape_debug())),
+            },
+            Self::List(own) => {
+                let parts: Vec<&str> = text.split(',').collect();
+                if parts.len() != own.len() {
+                    return Err(format!("{} numbers with commas between them", own.len()));
+                }
+                let each = own.iter().zip(parts);
+                let each = each.map(|(own, part)| within(*own, number(part)?));
+                Ok(Self::List(each.collect::<Result<_, _>>()?))
+            }
+        }
+    }
+}
+
+/// The changes of this run.
+static CHANGES: OnceLock<Vec<Change>> = OnceLock::new();
+
+/// Changes rules for the rest of the program. Works once, before any rule was read; later calls and rules that were read
+/// before keep their values.
+pub fn change_for_this_run(changes: Vec<Change>) {
+    let _ = CHANGES.set(changes);
+}
+
+/// The changes of this run.
+#[must_use]
+pub fn changes() -> &'static [Change] {
+    CHANGES.get_or_init(Vec::new)
+}
+
+/// A type of a rule's value.
+pub trait Ruled: Sized {
+    /// The value in this type; `None` if it is of another kind.
+    fn from_value(value: &Value) -> Option<Self>;
+}
+
+impl Ruled for f64 {
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Number(value) => Some(*value),
+            _ => None,
+        }
+    }
+}
+
+macro_rules! counts {
+    ($($type:ty),+) => {$(
+        impl Ruled for $type {
+            fn from_value(value: &Value) -> Option<Self> {
+                match value {
+                    Value::Count(value) => Self::try_from(*value).ok(),
+                    _ => None,
+                }
+            }
+        }
+
+        impl<const N: usize> Ruled for [$type; N] {
+            fn from_value(value: &Value) -> Option<Self> {
+                let Value::List(values) = value else {
+                    return None;
+                };
+                let counts: Vec<$type> = values.iter().map(|value| *value as $type).collect();
+                counts.try_into().ok()
+            }
+        }
+    )+};
+}
+
+counts!(usize, u32, u16);
+
+impl<const N: usize> Ruled for [f64; N] {
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::List(values) => values.as_slice().try_into().ok(),
+            _ => None,
+        }
+    }
+}
+
+/// Writes a structure of rules, its built-in values, the values in force as `RULES`, and its [`Rulebook`].
 ///
 /// ```
 /// recordings::rules! {
@@ -131,10 +334,26 @@ macro_rules! rules {
             )+
         }
 
-        /// The values in force.
-        $vis const RULES: $name = $name { $($rule: $value,)+ };
+        /// The values in force: the built-in ones, or those of this run.
+        $vis static RULES: ::std::sync::LazyLock<$name> = ::std::sync::LazyLock::new(|| {
+            let mut rules = $name::BUILT_IN;
+            let of_room = |change: &&$crate::rules::Change| change.room == $room;
+            for change in $crate::rules::changes().iter().filter(of_room) {
+                $(
+                    if change.name == stringify!($rule).replace('_', "-")
+                        && let Some(value) = $crate::rules::Ruled::from_value(&change.value)
+                    {
+                        rules.$rule = value;
+                    }
+                )+
+            }
+            rules
+        });
 
         impl $name {
+            /// The built-in values.
+            pub const BUILT_IN: Self = Self { $($rule: $value,)+ };
+
             /// The table of these rules.
             #[must_use]
             pub fn book(&self) -> $crate::rules::Rulebook {
@@ -164,8 +383,76 @@ pub fn paragraph(lines: &[&str]) -> String {
 }
 
 #[cfg(test)]
+#[expect(unreachable_pub, reason = "what the macro writes is public")]
 mod tests {
-    use super::Value;
+    use super::{Change, ChangeError, Value};
+
+    rules! {
+        /// For the test.
+        pub struct Rules in "residual";
+
+        /// A number.
+        share: f64 = 0.02, "", "convention";
+        /// A count.
+        rounds: usize = 6, "", "convention";
+        /// Several.
+        shapes: [f64; 2] = [0.0, 8.0], "samples", "a grid";
+    }
+
+    #[test]
+    fn a_rule_is_changed_by_its_name_within_a_factor_of_a_hundred() {
+        let books = [Rules::BUILT_IN.book()];
+        let changed = |text: &str| Change::read(text, &books).map(|change| change.to_string());
+        let said = |text: &str| changed(text).map_err(|error| error.to_string());
+        assert_eq!(
+            said("share=0.04").unwrap(),
+            "rule residual.share: 0.04 in place of 0.02"
+        );
+        assert_eq!(
+            said("residual.shapes = 1,16").unwrap(),
+            "rule residual.shapes: 1, 16 in place of 0, 8"
+        );
+        for (text, error) in [
+            (
+                "share",
+                "NAME=VALUE is needed, for example `terms.price=0.002`",
+            ),
+            (
+                "sharp=1",
+                "there is no rule `sharp`; `host-fit rules` lists them",
+            ),
+            (
+                "rounds=2.5",
+                "`residual.rounds` needs a whole number, not `2.5`",
+            ),
+            (
+                "rounds=0",
+                "`residual.rounds` needs a value from 0.06 to 600",
+            ),
+            (
+                "share=nan",
+                "`residual.share` needs a value from 0.0002 to 2",
+            ),
+            (
+                "shapes=1",
+                "`residual.shapes` needs 2 numbers with commas between them",
+            ),
+        ] {
+            assert_eq!(said(text).unwrap_err(), error);
+        }
+        let twice = [books[0].clone(), {
+            let mut other = books[0].clone();
+            other.room = "fit";
+            other
+        }];
+        assert_eq!(
+            Change::read("rounds=3", &twice).unwrap_err(),
+            ChangeError::Ambiguous {
+                name: "rounds".to_owned(),
+                full: vec!["residual.rounds".to_owned(), "fit.rounds".to_owned()],
+            }
+        );
+    }
 
     #[test]
     fn values_read_as_they_are_written() {

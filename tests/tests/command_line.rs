@@ -86,6 +86,44 @@ fn wrong_usage_is_exit_2() {
     assert_eq!(run(&[p("--help")]).status.code(), Some(0));
 }
 
+/// `--set` changes a rule for one run, and what is decided by it.
+#[test]
+fn a_rule_is_changed_for_a_run() {
+    let listed = |change: &[&str]| {
+        let mut arguments = vec![p("rules"), p("delay")];
+        arguments.extend(change.iter().map(|text| p(text)));
+        let books = json(&arguments);
+        let rules = books[0]["rules"].as_array().expect("rules").clone();
+        let rule = rules.iter().find(|rule| rule["name"] == "worst-error");
+        rule.expect("the rule")["value"].as_f64()
+    };
+    assert_eq!(listed(&[]), Some(5.0));
+    let change = ["--set", "delay.worst-error=0.06"];
+    assert_eq!(listed(&change), Some(0.06));
+    let ramp = data("hidden-ramp");
+    let edges = |change: &[&str]| {
+        let mut arguments = vec![p("delay"), ramp.as_path()];
+        arguments.extend(change.iter().map(|text| p(text)));
+        let answer = json(&arguments);
+        answer["statistics"]["all"]["count"]
+            .as_u64()
+            .expect("a count")
+    };
+    assert!(edges(&change) < edges(&[]));
+    for (change, part) in [
+        ("level=0.1", "write terms.level or diagnose.level"),
+        (
+            "worst-error=-1",
+            "`delay.worst-error` needs a value from 0.05 to 500",
+        ),
+        ("no-such=1", "there is no rule `no-such`"),
+    ] {
+        let output = run(&[p("rules"), p("--set"), p(change)]);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(String::from_utf8_lossy(&output.stderr).contains(part));
+    }
+}
+
 #[test]
 fn compare_prints_the_indicators_of_the_contract() {
     let model = data("paper/table-2-state-dependent.toml");

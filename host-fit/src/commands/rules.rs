@@ -7,6 +7,8 @@ use super::words::Words;
 
 /// List the thresholds by which the tool decides, with their meaning and origin.
 ///
+/// `--set NAME=VALUE` on any command gives one another value for that run.
+///
 /// Example: host-fit rules residual
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {

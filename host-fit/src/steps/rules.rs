@@ -2,40 +2,60 @@
 
 use std::fmt::Write as _;
 
-use crate::rules::Rulebook;
+use crate::rules::{Change, ChangeError, Rulebook};
 use crate::{
     data, delay, design, diagnose, discover, excitation, experiment, fit, identify, model, power,
     preparation, residual, search, simulate, terms,
 };
 
-/// The rules of all modules, in the order of the workflow.
-#[must_use]
-pub fn rulebooks() -> Vec<Rulebook> {
-    vec![
-        data::RULES.book(),
-        preparation::RULES.book(),
-        excitation::RULES.book(),
-        delay::RULES.book(),
-        identify::RULES.book(),
-        search::RULES.book(),
-        model::RULES.book(),
-        simulate::RULES.book(),
-        fit::RULES.book(),
-        residual::RULES.book(),
-        terms::RULES.book(),
-        diagnose::RULES.book(),
-        discover::RULES.book(),
-        power::RULES.book(),
-        experiment::RULES.book(),
-        design::RULES.book(),
-    ]
+macro_rules! books {
+    ($($room:ident),+) => {
+        /// The rules in force of all modules, in the order of the workflow.
+        #[must_use]
+        pub fn rulebooks() -> Vec<Rulebook> {
+            vec![$($room::RULES.book()),+]
+        }
+
+        /// The same with their built-in values.
+        fn built_in() -> Vec<Rulebook> {
+            vec![$($room::Rules::BUILT_IN.book()),+]
+        }
+    };
+}
+
+books!(
+    data,
+    preparation,
+    excitation,
+    delay,
+    identify,
+    search,
+    model,
+    simulate,
+    fit,
+    residual,
+    terms,
+    diagnose,
+    discover,
+    power,
+    experiment,
+    design
+);
+
+/// The change of a rule that `NAME=VALUE` asks for.
+///
+/// # Errors
+/// [`ChangeError`].
+pub fn rule_change(text: &str) -> Result<Change, ChangeError> {
+    Change::read(text, &built_in())
 }
 
 /// The page `docs/rules.md`.
 #[must_use]
 pub fn rules_page() -> String {
     let mut page = "# Rules: every threshold, what it decides and where it comes from\n\n\
-         Written by `BLESS=1 cargo test --release -p host-fit --test rules_page` from the code; `host-fit rules` prints the same. A value \
+         Written by `BLESS=1 cargo test --release -p host-fit --test rules_page` from the code; `host-fit rules` prints the same. \
+         `--set NAME=VALUE` on any command gives a rule another value for that run (NAME is `group.rule`, or the rule alone). A value \
          is either a convention, was tuned on the data that is named, or is a judgement: nothing was measured for it.\n"
         .to_owned();
     for book in rulebooks() {

@@ -1,4 +1,4 @@
-//! What comments and pages cite is there: sections and equations of `docs/theory.md`, pages, headings.
+//! What comments and pages cite is there: sections and equations of `docs/theory*.md`, pages, headings.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -31,7 +31,10 @@ fn files() -> Vec<(PathBuf, String)> {
 }
 
 fn theory() -> String {
-    std::fs::read_to_string(root().join("docs/theory.md")).expect("the page")
+    ["theory", "theory-law", "theory-diagnosis"]
+        .map(|page| root().join("docs").join(page).with_extension("md"))
+        .map(|page| std::fs::read_to_string(page).expect("the page"))
+        .concat()
 }
 
 /// The labels that follow `word` in a text: `theory 3.1 and 3.3`, `eqs. (3), (4) or (15)`.

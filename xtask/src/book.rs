@@ -18,15 +18,8 @@ pub(crate) const TASK: Task = Task {
     run: book,
 };
 
-/// Longest page of the reader's part, lines. Generated reference pages and the notebooks may be longer.
+/// Longest page, lines.
 const LONGEST: usize = 250;
-/// Longer pages: written by other tasks, cited as one page by the code, or notebooks.
-const LONG: [&str; 4] = [
-    "rules.md",
-    "theory.md",
-    "history/diagnosis.md",
-    "history/discover.md",
-];
 
 #[derive(Deserialize)]
 struct Effect {
@@ -101,7 +94,7 @@ fn contents(docs: &Path) -> Result<()> {
         }
         let text = fs::read_to_string(docs.join(page))?;
         let lines = text.lines().count();
-        if lines > LONGEST && !LONG.contains(&page.as_str()) {
+        if lines > LONGEST {
             bail!("docs/{page} has {lines} lines; more than {LONGEST} are several pages");
         }
         let folder = Path::new(page).parent().unwrap_or(Path::new(""));

@@ -64,7 +64,7 @@ pub use extend::{Extension, RecordChange, extend};
 pub use identify::{DelayKind, Identification, IdentifiedDelays, IdentifyRequest, identify};
 pub use import::{ImportedSet, import};
 pub use onlooker::Onlooker;
-pub use rules::{rule_change, rulebooks, rules_page};
+pub use rules::{rule_change, rulebooks, rules_pages};
 pub use simulate::{Simulation, simulate};
 
 use crate::data::DataSet;

@@ -50,21 +50,28 @@ pub fn rule_change(text: &str) -> Result<Change, ChangeError> {
     Change::read(text, &built_in())
 }
 
-/// The page `docs/rules.md`.
+/// The page `docs/rules.md` and those of the folder `docs/rules`, one per module: names within `docs`, and texts.
 #[must_use]
-pub fn rules_page() -> String {
-    let mut page = "# Rules: every threshold, what it decides and where it comes from\n\n\
-         Written by `BLESS=1 cargo test --release -p host-fit --test rules_page` from the code; `host-fit rules` prints the same. \
-         `--set NAME=VALUE` on any command gives a rule another value for that run (NAME is `group.rule`, or the rule alone). A value \
-         is either a convention, was tuned on the data that is named, or is a judgement: nothing was measured for it.\n"
+pub fn rules_pages() -> Vec<(String, String)> {
+    let mut head = "# Rules: every threshold, what it decides and where it comes from\n\n\
+         Written by `BLESS=1 cargo test --release -p host-fit --test rules_page` from the code; `host-fit rules` prints the same.\n\
+         `--set NAME=VALUE` on any command gives a rule another value for that run (NAME is `group.rule`, or the rule alone).\n\n\
+         A value is either a convention, was tuned on the data that is named, or is a judgement: nothing was measured for it.\n\n\
+         | group | rules | subject |\n|---|---|---|\n"
         .to_owned();
+    let mut pages = Vec::new();
     for book in rulebooks() {
-        let _ = write!(
-            page,
-            "\n## {}\n\n{}\n\n| rule | value | decides | comes from |\n|---|---|---|---|\n",
-            book.room, book.about
+        let Rulebook { room, about, rules } = book;
+        let _ = writeln!(
+            head,
+            "| [{room}](rules/{room}.md) | {} | {about} |",
+            rules.len()
         );
-        for rule in &book.rules {
+        let mut page = format!(
+            "# Rules of {room}\n\n{about} All groups: [rules](../rules.md).\n\n\
+             | rule | value | decides | comes from |\n|---|---|---|---|\n"
+        );
+        for rule in &rules {
             let value = match rule.unit {
                 "" => rule.value.to_string(),
                 unit => format!("{} {unit}", rule.value),
@@ -73,8 +80,10 @@ pub fn rules_page() -> String {
             let cells = cells.map(|cell| cell.replace('|', "\\|"));
             let _ = writeln!(page, "| {} |", cells.join(" | "));
         }
+        pages.push((format!("rules/{room}.md"), page));
     }
-    page
+    pages.insert(0, ("rules.md".to_owned(), head));
+    pages
 }
 
 #[cfg(test)]

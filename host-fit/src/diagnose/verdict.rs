@@ -22,7 +22,7 @@ impl Session<'_> {
                 judge.over_noise(judged.rmse()) <= RULES.floor_margin
             }
             NoiseSource::Scatter => {
-                judge.unexplained_share(&judged.held_out) <= RULES.too_much && !self.depends(judged)
+                judge.error_of_motion(&judged.held_out) <= RULES.too_much && !self.depends(judged)
             }
         }
     }
@@ -182,8 +182,8 @@ impl Session<'_> {
     /// The best hypothesis, pruned to the effects that are significant beside each other.
     pub(super) fn named(&self, found: &Found) -> Hypothesis {
         let scatter = self.judge().noise_source == NoiseSource::Scatter;
-        let dark = scatter
-            && self.judge().unexplained_share(&found.bare.judged.held_out) <= RULES.too_much;
+        let dark =
+            scatter && self.judge().error_of_motion(&found.bare.judged.held_out) <= RULES.too_much;
         if dark {
             // Without a known noise level, each effect gets a single test.
             self.pared(found, |lesser, best| {

@@ -349,6 +349,21 @@ impl Judge {
         }
     }
 
+    /// Mean square validation error over the variance of y in all records. The validation samples alone may be at rest, as
+    /// at the end of a step test.
+    pub(crate) fn error_of_motion(&self, held_out: &HeldOut) -> f64 {
+        let all = self.first_fold();
+        let ys = || all.iter().flat_map(|record| &record.y);
+        let samples = ys().count().max(1) as f64;
+        let mean = ys().sum::<f64>() / samples;
+        let variance = ys().map(|y| (y - mean).powi(2)).sum::<f64>() / samples;
+        if variance > 0.0 {
+            held_out.measured_rmse().powi(2) / variance
+        } else {
+            1.0
+        }
+    }
+
     /// Unexplained variance e² − σ² per sample.
     pub(crate) fn excess(&self, held_out: &HeldOut) -> f64 {
         (held_out.rmse().powi(2) - self.noise_rmse().powi(2)).max(0.0)

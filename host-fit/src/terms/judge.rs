@@ -389,3 +389,34 @@ impl Judge {
         self.whole.is_some() && one.drifted > other.drifted
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::data::{Record, Use};
+    use crate::model::Model;
+    use crate::terms::Bench;
+
+    /// One step of a first order, at rest long before its end: what is validated there is noise about a level.
+    #[test]
+    fn a_step_test_is_judged_by_its_motion() {
+        let u: Vec<f64> = (0..600).map(|k| f64::from(u8::from(k >= 100))).collect();
+        let mut noise = 1_u32;
+        let mut level = 0.0;
+        let y = u.iter().map(|u| {
+            let shown = level;
+            level += 0.03 * (u - level);
+            noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            shown + 0.04 * (f64::from(noise) / f64::from(u32::MAX) - 0.5)
+        });
+        let record = Record::new("step", Use::Identify, 0.001, u.clone(), y.collect());
+        let given = Model {
+            a: vec![0.97],
+            b: vec![0.03],
+            ..Model::default()
+        };
+        let judge = Bench::of(&given, &[record]).expect("a record").judge;
+        let held_out = judge.held_out(|_| &given).expect("stable");
+        assert!(judge.error_of_motion(&held_out) < 0.01);
+        assert!(judge.unexplained_share(&held_out) > 0.5);
+    }
+}

@@ -155,6 +155,7 @@ fn pages() -> Result<Vec<(String, String)>> {
         "lagging-drive",
         "slow-wake",
         "level-rate",
+        "reading-curve",
         "zero-offset",
         "constant-delay",
         "saturating-delay",

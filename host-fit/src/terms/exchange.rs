@@ -11,6 +11,7 @@ use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit};
 use crate::model::Model;
 use rayon::prelude::*;
+use std::cmp::Ordering;
 
 /// An effect added to a model and fitted for a few iterations.
 struct InPlace {
@@ -102,14 +103,18 @@ impl Search<'_> {
                 done.push(term.name());
                 continue;
             }
-            // Near the noise level, only a replacement with fewer parameters is an improvement.
+            // Near the noise level, a base term is replaced only by fewer parameters, or by as many at its own place.
             let less_only =
                 term.effect().is_none() && self.over(&hypothesis) <= RULES.near_the_floor;
             (self.progress)(&format!("candidates in place of {}", term.name()));
             done.push(term.name());
             let others = effects - count_effects(std::slice::from_ref(term));
             let room = others < self.most_effects;
-            let affordable = |other: &Term| !less_only || other.cost() < term.cost();
+            let affordable = |other: &Term| match other.cost().cmp(&term.cost()) {
+                Ordering::Less => true,
+                Ordering::Equal => !less_only || other.place() == term.place(),
+                Ordering::Greater => !less_only,
+            };
             let wanted = |other: &Term| (room || other.effect().is_none()) && affordable(other);
             let without = term.taken_from(hypothesis.judged.model(), root.judged.model());
             let own = hypothesis.judged.rmse();

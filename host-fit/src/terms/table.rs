@@ -174,7 +174,7 @@ impl Screen<'_> {
         changes.collect()
     }
 
-    /// Changes by terms in the jet path, from all starting values of their cards.
+    /// Changes by terms in the jet path and the reading, from all starting values of their cards.
     fn paths(&self) -> Vec<(Term, Vec<f64>)> {
         let absent = |spec: &&'static Spec| !self.model.has_effect(spec.name);
         let terms = PATH_TERMS.into_iter().filter(absent).flat_map(path_terms);
@@ -462,7 +462,7 @@ impl Screen<'_> {
     }
 }
 
-/// A term in the jet path at all starting values of its card.
+/// A term in the jet path or the reading at all starting values of its card.
 pub(super) fn path_terms(spec: &'static Spec) -> Vec<Term> {
     let each = spec.parameters.iter().map(|parameter| parameter.starts);
     let points = each.fold(vec![Vec::new()], |points: Vec<Vec<f64>>, starts| {

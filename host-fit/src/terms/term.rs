@@ -21,7 +21,7 @@ pub enum Term {
     LevelRate,
     /// A slow wake with this time constant (inner seconds): a memory of the flow.
     Wake(f64),
-    /// A base term in the jet path, with starting values.
+    /// A base term in the jet path or the reading, with starting values.
     Path {
         /// Its card.
         spec: &'static Spec,
@@ -162,6 +162,14 @@ impl Term {
             Self::Effect { spec, .. } | Self::Path { spec, .. } => {
                 spec.parameters.iter().filter(|p| p.low < p.high).count()
             }
+        }
+    }
+
+    /// Where a term with a card acts.
+    pub(super) fn place(&self) -> Option<Place> {
+        match self {
+            Self::Effect { spec, .. } | Self::Path { spec, .. } => Some(spec.place),
+            _ => None,
         }
     }
 

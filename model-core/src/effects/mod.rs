@@ -23,6 +23,7 @@ pub mod lagging_drive;
 pub mod level_rate;
 pub mod plenum_droop;
 pub mod quadratic_drag;
+pub mod reading_curve;
 pub mod rectifying_sensor;
 pub mod saturating_delay;
 pub mod sensor_saturation;
@@ -209,6 +210,7 @@ catalogue! {
     quadratic_drag::QuadraticDrag: QuadraticDrag<T>,
     slow_wake::SlowWake: SlowWake<T>,
     level_rate::LevelRate: LevelRate<T>,
+    reading_curve::ReadingCurve: ReadingCurve<T>,
     rectifying_sensor::RectifyingSensor: RectifyingSensor,
     hot_film_nonlinearity::HotFilmNonlinearity: HotFilmNonlinearity<T>,
     hot_film_lag::HotFilmLag: HotFilmLag<T>,
@@ -236,16 +238,20 @@ pub const DISPERSED_DELAY: &Spec = &<DispersedDelay<f64> as Physics<f64>>::SPEC;
 /// The card of a drive that lags the jets, possibly with inverse response; a base term.
 pub const LAGGING_DRIVE: &Spec = &<LaggingDrive<f64> as Physics<f64>>::SPEC;
 
-/// Base terms in the jet path: a search tries each from all starting values of its card.
-pub const PATH_TERMS: [&Spec; 2] = [DISPERSED_DELAY, LAGGING_DRIVE];
+/// The card of a monotone curve between the flow and its reading, a base term.
+pub const READING_CURVE: &Spec = &<ReadingCurve<f64> as Physics<f64>>::SPEC;
+
+/// Base terms between command, flow and reading: a search tries each from all starting values of its card.
+pub const PATH_TERMS: [&Spec; 3] = [DISPERSED_DELAY, LAGGING_DRIVE, READING_CURVE];
 
 /// The base terms with a card, in their order: after all effects except those that oppose a motion, because a
 /// rate acts on everything that drives the flow.
-pub const NUISANCES: [&Spec; 5] = [
+pub const NUISANCES: [&Spec; 6] = [
     DISPERSED_DELAY,
     LAGGING_DRIVE,
     SLOW_WAKE,
     LEVEL_RATE,
+    READING_CURVE,
     ZERO_OFFSET,
 ];
 
@@ -351,6 +357,7 @@ mod tests {
                 "lagging-drive",
                 "slow-wake",
                 "level-rate",
+                "reading-curve",
                 "zero-offset",
                 "constant-delay",
                 "saturating-delay"

@@ -92,7 +92,7 @@ impl Session<'_> {
         let is_worthwhile = with < (1.0 - worthwhile) * without;
         if open
             && with < without
-            && self.all_are_there(best)
+            && (self.all_are_there(best) || self.is_certified_alone(best, found))
             && let Some(p) = self.more_than_chance(best, bare)
         {
             // On a base that fits, effects with unidentifiable parameters need a certificate.
@@ -110,6 +110,16 @@ impl Session<'_> {
         let scatter = self.judge().noise_source == NoiseSource::Scatter;
         let leaner = is_leaner(best, bare) && !scatter;
         (leaner && self.is_known(best) && needed()).then_some(Earned { p_value: None })
+    }
+
+    /// Whether `best` has one effect, is at a known noise level and holds a certificate: a likelihood ratio says more of
+    /// an amplitude than its interval, which correlated lags widen.
+    fn is_certified_alone(&self, best: &Hypothesis, found: &Found) -> bool {
+        let effects = best.terms.iter().filter_map(Term::effect).count();
+        effects == 1
+            && self.is_enough(best)
+            && !self.is_enough(&found.bare)
+            && self.is_certified(best, found)
     }
 
     /// Whether the effects' parameters are identifiable in the final fit.

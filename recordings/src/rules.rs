@@ -28,6 +28,8 @@ pub enum Value {
     Count(u64),
     /// A number.
     Number(f64),
+    /// Several counts.
+    Counts(Vec<u64>),
     /// Several.
     List(Vec<f64>),
 }
@@ -58,13 +60,13 @@ impl From<u16> for Value {
 
 impl<const N: usize> From<[u32; N]> for Value {
     fn from(values: [u32; N]) -> Self {
-        values.map(f64::from).into()
+        Self::Counts(values.map(u64::from).to_vec())
     }
 }
 
 impl<const N: usize> From<[usize; N]> for Value {
     fn from(values: [usize; N]) -> Self {
-        values.map(|value| value as f64).into()
+        Self::Counts(values.map(|value| value as u64).to_vec())
     }
 }
 
@@ -79,6 +81,10 @@ impl fmt::Display for Value {
         match self {
             Self::Count(value) => write!(f, "{value}"),
             Self::Number(value) => write!(f, "{value}"),
+            Self::Counts(values) => {
+                let each: Vec<String> = values.iter().map(u64::to_string).collect();
+                f.write_str(&each.join(", "))
+            }
             Self::List(values) => {
                 let each: Vec<String> = values.iter().map(f64::to_string).collect();
                 f.write_str(&each.join(", "))
@@ -215,18 +221,25 @@ impl Value {
             let number = text.trim().parse::<f64>().ok();
             number.ok_or_else(|| format!("a number, not `{}`", text.escape_debug()))
         };
+        let count = |own: u64, text: &str| match text.trim().parse::<u64>() {
+            Ok(new) => Ok(within(own as f64, new as f64)? as u64),
+            Err(_) => Err(format!("a whole number, not `{}`", text.escape_debug())),
+        };
+        let parts: Vec<&str> = text.split(',').collect();
+        let of = |wanted: usize| match parts.len() == wanted {
+            true => Ok(parts.iter()),
+            false => Err(format!("{wanted} numbers with commas between them")),
+        };
         match self {
             Self::Number(own) => Ok(Self::Number(within(*own, number(text)?)?)),
-            Self::Count(own) => match text.parse::<u64>() {
-                Ok(new) => Ok(Self::Count(within(*own as f64, new as f64)? as u64)),
-                Err(_) => Err(format!("a whole number, not `{}`", text.escape_debug())),
-            },
+            Self::Count(own) => Ok(Self::Count(count(*own, text)?)),
+            Self::Counts(own) => {
+                let each = own.iter().zip(of(own.len())?);
+                let each = each.map(|(own, part)| count(*own, part));
+                Ok(Self::Counts(each.collect::<Result<_, _>>()?))
+            }
             Self::List(own) => {
-                let parts: Vec<&str> = text.split(',').collect();
-                if parts.len() != own.len() {
-                    return Err(format!("{} numbers with commas between them", own.len()));
-                }
-                let each = own.iter().zip(parts);
+                let each = own.iter().zip(of(own.len())?);
                 let each = each.map(|(own, part)| within(*own, number(part)?));
                 Ok(Self::List(each.collect::<Result<_, _>>()?))
             }
@@ -277,11 +290,11 @@ macro_rules! counts {
 
         impl<const N: usize> Ruled for [$type; N] {
             fn from_value(value: &Value) -> Option<Self> {
-                let Value::List(values) = value else {
+                let Value::Counts(values) = value else {
                     return None;
                 };
-                let counts: Vec<$type> = values.iter().map(|value| *value as $type).collect();
-                counts.try_into().ok()
+                let counts = values.iter().map(|value| <$type>::try_from(*value).ok());
+                counts.collect::<Option<Vec<$type>>>()?.try_into().ok()
             }
         }
     )+};
@@ -397,6 +410,8 @@ mod tests {
         rounds: usize = 6, "", "convention";
         /// Several.
         shapes: [f64; 2] = [0.0, 8.0], "samples", "a grid";
+        /// Several counts.
+        grid: [usize; 2] = [12, 4], "", "a grid";
     }
 
     #[test]

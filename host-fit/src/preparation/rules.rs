@@ -28,9 +28,9 @@ rules! {
     motion_over_noise: f64 = 40.0, "times", "judgement: noise with 10 samples of memory stays below";
     /// Short rests under one command that are further apart than this are no rests.
     rests_apart: f64 = 0.03, "share of the range of y", "judgement: more than noise makes of the mean of a few samples";
-    /// Whether it answers an edge at the first sample is looked at for so long: …
+    /// A record may begin with an edge of the command; its first so many dead times decide whether it does: …
     early: f64 = 2.5, "dead times", "what comes later looks alike";
-    /// … it does if that leaves no more than this of what a relaxation leaves.
+    /// … it does if the response to such an edge leaves less than this share of the residual of a relaxation to rest.
     answer: f64 = 0.95, "share of the sum of squares", "judgement: both have as many parameters, one of two is told its dead time";
     /// In mid-run free runs follow the measurement for twice the dead time, and for no more than this part of a record …
     most_followed: usize = 4, "th of a record", "judgement";

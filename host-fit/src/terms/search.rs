@@ -245,7 +245,7 @@ impl Search<'_> {
         self.run_within(root, second, &mut Effort::of_a_search())
     }
 
-    /// The same with what is left of an effort that several searches share.
+    /// [`run`](Self::run) within an effort that several searches share; once it is spent, no further models are tried.
     #[must_use]
     pub fn run_within(
         &self,

@@ -105,4 +105,30 @@ mod tests {
         }
         assert!(Published::of("gremlin").is_none());
     }
+    /// Hidden effects change the strength of the jets continuously, and the flows still answer pulses.
+    #[test]
+    fn every_flow_answers_pulses_through_every_effect() {
+        for model in PUBLISHED {
+            for name in Hidden::names() {
+                let mut rng = ChaCha8Rng::seed_from_u64(5);
+                let mut flow = model.draw(&mut rng);
+                let mut hidden = Hidden::draw(name, &mut rng).expect("an effect");
+                let half = (0.25 / STEP_S) as usize;
+                let readings: Vec<f64> = (0..12 * half)
+                    .map(|k| {
+                        flow.step(hidden.jet(f64::from(u8::from(k / half % 2 == 1))));
+                        flow.reading()
+                    })
+                    .collect();
+                let last = readings.get(10 * half..).unwrap_or(&[]);
+                let lowest = last.iter().copied().fold(f64::INFINITY, f64::min);
+                let highest = last.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                assert!(
+                    highest - lowest > 0.3,
+                    "{} with {name}: {lowest} to {highest}",
+                    model.name
+                );
+            }
+        }
+    }
 }

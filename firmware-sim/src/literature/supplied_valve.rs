@@ -66,9 +66,8 @@ pub struct SuppliedValve {
     line_m: f64,
     line: Line,
     delayed: VecDeque<f64>,
-    since_edge_s: f64,
-    told: f64,
-    open: f64,
+    /// Commands of the last steps, the newest first, as far back as the longer dead time.
+    told: VecDeque<f64>,
     chamber: f64,
     friction: f64,
 }
@@ -77,19 +76,22 @@ impl SuppliedValve {
     fn draw(rng: &mut ChaCha8Rng) -> Self {
         let line_m = rng.random_range(1.0..2.5);
         let passage_s: f64 = rng.random_range(0.025..0.050);
+        let [attaching_s, separating_s] =
+            [0.040..0.080, 0.080..0.130].map(|range| rng.random_range(range));
+        let [opens_after_s, closes_after_s] =
+            [0.002..0.005, 0.003..0.008].map(|range| rng.random_range(range));
+        let longest = f64::max(opens_after_s, closes_after_s);
         Self {
-            attaching_s: rng.random_range(0.040..0.080),
-            separating_s: rng.random_range(0.080..0.130),
-            opens_after_s: rng.random_range(0.002..0.005),
-            closes_after_s: rng.random_range(0.003..0.008),
+            attaching_s,
+            separating_s,
+            opens_after_s,
+            closes_after_s,
             filling_s: rng.random_range(0.004..0.012),
             emptying_s: rng.random_range(0.010..0.025),
             line_m,
             line: Line::new(line_m, rng.random_range(0.05..0.12)),
             delayed: VecDeque::from(vec![0.0; (passage_s / STEP_S).round() as usize]),
-            since_edge_s: 1.0,
-            told: 0.0,
-            open: 0.0,
+            told: VecDeque::from(vec![0.0; (longest / STEP_S).round() as usize + 1]),
             chamber: 0.0,
             friction: 0.0,
         }
@@ -98,22 +100,21 @@ impl SuppliedValve {
 
 impl Flow for SuppliedValve {
     fn step(&mut self, jet: f64) {
-        if jet != self.told {
-            (self.told, self.since_edge_s) = (jet, 0.0);
-        }
-        self.since_edge_s += STEP_S;
-        let dead_s = if jet > self.open {
+        // The outlet repeats the command after the dead time of the direction in which it is switched. A command of
+        // changing strength is repeated as well.
+        self.told.pop_back();
+        self.told.push_front(jet);
+        let dead_s = if jet > 0.5 {
             self.opens_after_s
         } else {
             self.closes_after_s
         };
-        if self.since_edge_s > dead_s {
-            self.open = jet;
-        }
-        let flowing = self.open * self.chamber.max(0.0).sqrt();
+        let open = self.told.get((dead_s / STEP_S).round() as usize);
+        let open = open.copied().unwrap_or(0.0).max(0.0);
+        let flowing = open * self.chamber.max(0.0).sqrt();
         self.line.step(flowing);
-        let (target, time) = if self.open > 0.0 {
-            (self.open * (1.0 + self.line.pressure), self.filling_s)
+        let (target, time) = if open > 0.0 {
+            (open * (1.0 + self.line.pressure), self.filling_s)
         } else {
             (0.0, self.emptying_s)
         };

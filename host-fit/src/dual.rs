@@ -1,4 +1,4 @@
-//! Forward-mode derivatives: numbers that carry `P` partial derivatives.
+//! Forward-mode derivatives: numbers that carry partial derivatives.
 //!
 //! Running `model-core` in [`Dual`] gives exact sensitivities of a free run
 //! from the very code that runs on the board.
@@ -12,129 +12,144 @@ use model_core::Real;
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A value and its derivatives with respect to `P` parameters.
+/// A value and its derivatives with respect to `N` − 1 parameters, in `N` lanes of which the first holds the value: every
+/// operation then does the same in all lanes, and compiles into whole vectors where `N` is a multiple of 4.
 ///
-/// Ordering looks at the value alone; equality at everything, so that a zero
-/// that still depends on a parameter is not taken for nothing.
+/// Ordering looks at the value alone; equality at everything, so that a zero that still depends on a parameter is not taken
+/// for nothing.
 #[derive(Clone, Copy, Debug)]
-pub struct Dual<const P: usize> {
-    /// The value.
-    pub value: f64,
-    /// ∂value/∂parameter.
-    pub partials: [f64; P],
+#[repr(align(32))]
+pub struct Dual<const N: usize> {
+    lanes: [f64; N],
 }
 
-impl<const P: usize> Dual<P> {
+impl<const N: usize> Dual<N> {
     /// A number that depends on nothing.
     #[inline(always)]
     #[must_use]
     pub const fn constant(value: f64) -> Self {
-        Self {
-            value,
-            partials: [0.0; P],
-        }
+        let mut lanes = [0.0; N];
+        lanes[0] = value;
+        Self { lanes }
     }
 
-    /// The parameter with index `index` itself; a constant if `index >= P`.
+    /// The number with this derivative with respect to parameter `index`; unchanged if `index` + 1 ≥ `N`.
     #[must_use]
-    pub fn parameter(value: f64, index: usize) -> Self {
-        let mut dual = Self::constant(value);
-        if let Some(partial) = dual.partials.get_mut(index) {
-            *partial = 1.0;
+    pub fn with_slope(mut self, index: usize, slope: f64) -> Self {
+        if let Some(lane) = self.lanes.get_mut(index + 1) {
+            *lane = slope;
         }
-        dual
+        self
+    }
+
+    /// ∂value/∂parameter, `N` − 1 of them.
+    #[inline(always)]
+    #[must_use]
+    pub fn partials(&self) -> &[f64] {
+        &self.lanes[1..]
     }
 
     /// f(self), given f and f′ at the value.
     #[inline(always)]
     fn chain(self, value: f64, slope: f64) -> Self {
-        let mut partials = self.partials;
-        for partial in &mut partials {
-            *partial *= slope;
+        let mut lanes = self.lanes;
+        for lane in &mut lanes {
+            *lane *= slope;
         }
-        Self { value, partials }
+        lanes[0] = value;
+        Self { lanes }
+    }
+
+    /// In every lane `f` of both lanes and of `number`, which is 0 in the lane of the value.
+    #[inline(always)]
+    fn with(self, other: Self, number: f64, f: impl Fn(f64, f64, f64) -> f64) -> Self {
+        let mut numbers = [number; N];
+        numbers[0] = 0.0;
+        let mut lanes = [0.0; N];
+        for i in 0..N {
+            lanes[i] = f(self.lanes[i], other.lanes[i], numbers[i]);
+        }
+        Self { lanes }
     }
 }
 
-impl<const P: usize> PartialEq for Dual<P> {
+impl<const N: usize> PartialEq for Dual<N> {
     #[inline(always)]
     fn eq(&self, other: &Self) -> bool {
-        let mut equal = self.value == other.value;
-        for i in 0..P {
-            equal &= self.partials[i] == other.partials[i];
+        let mut equal = true;
+        for i in 0..N {
+            equal &= self.lanes[i] == other.lanes[i];
         }
         equal
     }
 }
 
-impl<const P: usize> PartialOrd for Dual<P> {
+impl<const N: usize> PartialOrd for Dual<N> {
     #[inline(always)]
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        self.value.partial_cmp(&other.value)
+        self.lanes[0].partial_cmp(&other.lanes[0])
     }
 }
 
-impl<const P: usize> Add for Dual<P> {
+impl<const N: usize> Add for Dual<N> {
     type Output = Self;
     #[inline(always)]
     fn add(mut self, other: Self) -> Self {
-        self.value += other.value;
-        for i in 0..P {
-            self.partials[i] += other.partials[i];
+        for i in 0..N {
+            self.lanes[i] += other.lanes[i];
         }
         self
     }
 }
 
-impl<const P: usize> Sub for Dual<P> {
+impl<const N: usize> Sub for Dual<N> {
     type Output = Self;
     #[inline(always)]
     fn sub(mut self, other: Self) -> Self {
-        self.value -= other.value;
-        for i in 0..P {
-            self.partials[i] -= other.partials[i];
+        for i in 0..N {
+            self.lanes[i] -= other.lanes[i];
         }
         self
     }
 }
 
-impl<const P: usize> Mul for Dual<P> {
+impl<const N: usize> Mul for Dual<N> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        let mut partials = [0.0; P];
-        for (i, partial) in partials.iter_mut().enumerate() {
-            *partial = self.partials[i] * other.value + other.partials[i] * self.value;
-        }
-        Self {
-            value: self.value * other.value,
-            partials,
-        }
+        let by = other.lanes[0];
+        self.with(other, self.lanes[0], |own, other, number| {
+            own * by + other * number
+        })
     }
 }
 
-impl<const P: usize> Div for Dual<P> {
+impl<const N: usize> Div for Dual<N> {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
-        let value = self.value / other.value;
-        let mut partials = [0.0; P];
-        for (i, partial) in partials.iter_mut().enumerate() {
-            *partial = (self.partials[i] - other.partials[i] * value) / other.value;
-        }
-        Self { value, partials }
+        let by = other.lanes[0];
+        let (value, inverse) = (self.lanes[0] / by, 1.0 / by);
+        let mut quotient = self.with(other, value, |own, other, number| {
+            (own - other * number) * inverse
+        });
+        quotient.lanes[0] = value;
+        quotient
     }
 }
 
-impl<const P: usize> Neg for Dual<P> {
+impl<const N: usize> Neg for Dual<N> {
     type Output = Self;
     #[inline(always)]
-    fn neg(self) -> Self {
-        self.chain(-self.value, -1.0)
+    fn neg(mut self) -> Self {
+        for lane in &mut self.lanes {
+            *lane = -*lane;
+        }
+        self
     }
 }
 
-impl<const P: usize> Real for Dual<P> {
+impl<const N: usize> Real for Dual<N> {
     const ZERO: Self = Self::constant(0.0);
     const ONE: Self = Self::constant(1.0);
     #[inline(always)]
@@ -147,30 +162,30 @@ impl<const P: usize> Real for Dual<P> {
     }
     #[inline(always)]
     fn value(self) -> f64 {
-        self.value
+        self.lanes[0]
     }
-    #[inline]
+    #[inline(always)]
     fn exp(self) -> Self {
-        let value = Real::exp(self.value);
+        let value = Real::exp(self.lanes[0]);
         self.chain(value, value)
     }
-    #[inline]
+    #[inline(always)]
     fn sin(self) -> Self {
-        self.chain(Real::sin(self.value), Real::cos(self.value))
+        self.chain(Real::sin(self.lanes[0]), Real::cos(self.lanes[0]))
     }
-    #[inline]
+    #[inline(always)]
     fn cos(self) -> Self {
-        self.chain(Real::cos(self.value), -Real::sin(self.value))
+        self.chain(Real::cos(self.lanes[0]), -Real::sin(self.lanes[0]))
     }
-    #[inline]
+    #[inline(always)]
     fn sqrt(self) -> Self {
-        let value = Real::sqrt(self.value);
+        let value = Real::sqrt(self.lanes[0]);
         // At 0 the slope is infinite; 0 keeps a search from running away.
         self.chain(value, if value > 0.0 { 0.5 / value } else { 0.0 })
     }
-    #[inline]
+    #[inline(always)]
     fn cbrt(self) -> Self {
-        let value = Real::cbrt(self.value);
+        let value = Real::cbrt(self.lanes[0]);
         let slope = if value == 0.0 {
             0.0
         } else {
@@ -181,16 +196,16 @@ impl<const P: usize> Real for Dual<P> {
     #[inline(always)]
     fn two_sum(self, term: Self) -> (Self, Self) {
         // Derivatives are not summed for ever: their rounding is left as it is.
-        let (_, error) = self.value.two_sum(term.value);
+        let (_, error) = self.lanes[0].two_sum(term.lanes[0]);
         (self + term, Self::constant(error))
     }
     #[inline(always)]
     fn round(self) -> i32 {
-        Real::round(self.value)
+        Real::round(self.lanes[0])
     }
     #[inline(always)]
     fn floor(self) -> i32 {
-        Real::floor(self.value)
+        Real::floor(self.lanes[0])
     }
 }
 
@@ -205,12 +220,13 @@ mod tests {
             (e.sin() * y - (x + y).cos()) / (T::ONE + x)
         }
         let (x, y, h) = (0.7, 1.3, 1e-6);
-        let dual = f(Dual::<2>::parameter(x, 0), Dual::<2>::parameter(y, 1));
-        assert_eq!(dual.value, f(x, y));
+        let parameter = |value, index| Dual::<4>::constant(value).with_slope(index, 1.0);
+        let dual = f(parameter(x, 0), parameter(y, 1));
+        assert_eq!(dual.value(), f(x, y));
         let by_x = (f(x + h, y) - f(x - h, y)) / (2.0 * h);
         let by_y = (f(x, y + h) - f(x, y - h)) / (2.0 * h);
-        assert_ne!(Dual::<2>::parameter(0.0, 1), Dual::ZERO);
-        assert!((dual.partials[0] - by_x).abs() < 1e-8);
-        assert!((dual.partials[1] - by_y).abs() < 1e-8);
+        assert_ne!(parameter(0.0, 1), Dual::ZERO);
+        assert!((dual.partials()[0] - by_x).abs() < 1e-8);
+        assert!((dual.partials()[1] - by_y).abs() < 1e-8);
     }
 }

@@ -1,7 +1,7 @@
 //! What the host remembers of a signal.
 
 use model_core::Real;
-use model_core::history::{Memory, Past};
+use model_core::history::{Memory, Past, Reaching};
 
 /// A ring buffer with a size chosen at run time: the host's counterpart of
 /// `model_core::history::DelayLine`. It knows where its signal changed last, so that a delay
@@ -19,10 +19,8 @@ pub struct Ring<T> {
 /// Changes that are remembered: jets switch a few times within a delay at most.
 const CHANGES: usize = 4;
 
-impl<T: Real> Ring<T> {
-    /// A ring that reaches back at least `lag` samples.
-    #[must_use]
-    pub fn reaching(lag: usize) -> Self {
+impl<T: Real> Reaching<T> for Ring<T> {
+    fn reaching(lag: usize) -> Self {
         Self {
             samples: vec![T::ZERO; (lag + 1).next_power_of_two()],
             newest: 0,
@@ -33,7 +31,7 @@ impl<T: Real> Ring<T> {
 }
 
 impl<T: Real> Past<T> for Ring<T> {
-    #[inline]
+    #[inline(always)]
     fn back(&self, lag: usize) -> T {
         let mask = self.samples.len() - 1;
         if lag > mask {
@@ -44,7 +42,7 @@ impl<T: Real> Past<T> for Ring<T> {
 }
 
 impl<T: Real> Memory<T> for Ring<T> {
-    #[inline]
+    #[inline(always)]
     fn push(&mut self, value: T) {
         self.count += 1;
         if value != self.samples[self.newest] {
@@ -54,13 +52,13 @@ impl<T: Real> Memory<T> for Ring<T> {
         self.newest = (self.newest + 1) & (self.samples.len() - 1);
         self.samples[self.newest] = value;
     }
-    #[inline]
+    #[inline(always)]
     fn steady(&self, from: usize, to: usize) -> Option<T> {
         let (newest, oldest) = (self.count - from as i64, self.count - to as i64);
         let last = self.changes.iter().find(|change| **change <= newest)?;
         (*last <= oldest).then(|| self.back(from))
     }
-    #[inline]
+    #[inline(always)]
     fn capacity(&self) -> usize {
         self.samples.len()
     }

@@ -6,7 +6,7 @@ use crate::ring::Ring;
 use crate::rules;
 use model_core::effect::Spec;
 use model_core::effects::{LAGGING_DRIVE, SLOW_WAKE};
-use model_core::history::Memory as _;
+use model_core::history::{Memory as _, Reaching as _};
 use model_core::model::{StateOf, observe};
 use model_core::{Input, Output, Parts, Real, State, pairs};
 use std::borrow::Cow;

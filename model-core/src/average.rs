@@ -67,13 +67,13 @@ impl<T: Real> WindowSum<T> {
 
     /// Advances the window by one sample for a look-ahead: cheaper than [`slide`](Self::slide), and accurate
     /// for less than a window's length.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn lean(&mut self, entering: T, leaving: T) {
         self.running.low = self.running.low + (entering - leaving);
     }
 
     /// The sum over the window.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn value(&self) -> T {
         self.running.high + self.running.low

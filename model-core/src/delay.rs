@@ -15,7 +15,7 @@ pub struct Tap<T> {
 
 impl<T: Real> Tap<T> {
     /// A tap on a whole sample.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn on(whole: usize) -> Self {
         Self {
@@ -25,7 +25,7 @@ impl<T: Real> Tap<T> {
     }
 
     /// A tap at any delay ≥ 0 (negative or NaN counts as 0), in samples.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn between(delay: T) -> Self {
         let delay = delay.at_least(T::ZERO);
@@ -38,7 +38,7 @@ impl<T: Real> Tap<T> {
 
     /// A tap at any delay (negative or NaN counts as 0), in samples: on the
     /// nearest sample if `rounded`, as in eq. (4), else between samples.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn at(delay: T, rounded: bool) -> Self {
         if rounded {
@@ -49,7 +49,7 @@ impl<T: Real> Tap<T> {
     }
 
     /// The signal at the tap, linearly interpolated.
-    #[inline]
+    #[inline(always)]
     pub fn read(&self, past: &impl Past<T>) -> T {
         let newer = past.back(self.whole);
         let older = past.back(self.whole.saturating_add(1));
@@ -69,7 +69,7 @@ pub trait Transport<T: Real> {
     fn start(&self) -> Self::State;
 
     /// The command for the valve; a law may delay edges here.
-    #[inline]
+    #[inline(always)]
     fn command(&self, _state: &mut Self::State, command: T) -> T {
         command
     }
@@ -84,7 +84,7 @@ pub trait Transport<T: Real> {
 
     /// Number of samples by which [`command`](Self::command) delays rising and falling edges. A pulse or gap
     /// shorter than that never arrives.
-    #[inline]
+    #[inline(always)]
     fn held_back(&self) -> [T; 2] {
         [T::ZERO; 2]
     }
@@ -101,20 +101,20 @@ pub trait DelayLaw<T: Real> {
     fn start(&self) -> Self::State;
 
     /// The command for the valve; a law may delay edges here.
-    #[inline]
+    #[inline(always)]
     fn command(&self, _state: &mut Self::State, command: T) -> T {
         command
     }
 
     /// The common part of the law for all inputs, evaluated once per sample at the averaged output ỹ_k, or
     /// y_k for an averaged model.
-    #[inline]
+    #[inline(always)]
     fn evaluate(&self, _output: T) -> T {
         T::ZERO
     }
 
     /// The nearest and farthest sample that taps of input `l` can read for outputs ≥ 0, if known.
-    #[inline]
+    #[inline(always)]
     fn range(&self, _l: usize) -> Option<(usize, usize)> {
         None
     }
@@ -133,7 +133,7 @@ pub struct FixedDelay<H> {
 impl<T: Real, H: AsRef<[u16]>> DelayLaw<T> for FixedDelay<H> {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn tap(&self, l: usize, _evaluated: T) -> Tap<T> {
         Tap::on(self.delays.as_ref().get(l).copied().unwrap_or(0).into())
     }
@@ -161,17 +161,17 @@ impl<T: Real, L: Transport<T>, F: AsRef<[T]>, const ROUNDED: bool> DelayLaw<T>
     fn start(&self) -> L::State {
         self.law.start()
     }
-    #[inline]
+    #[inline(always)]
     fn command(&self, state: &mut L::State, command: T) -> T {
         self.law.command(state, command)
     }
-    #[inline]
+    #[inline(always)]
     fn evaluate(&self, output: T) -> T {
         self.law.delay(output)
     }
     /// A law stays within its bounds, and all further operations are monotonic, roundings included: the taps
     /// of the bounds are the extremes.
-    #[inline]
+    #[inline(always)]
     fn range(&self, l: usize) -> Option<(usize, usize)> {
         if !ROUNDED {
             return None;
@@ -180,7 +180,7 @@ impl<T: Real, L: Transport<T>, F: AsRef<[T]>, const ROUNDED: bool> DelayLaw<T>
         let (low, high) = (self.tap(l, low).whole, self.tap(l, high).whole);
         Some((low.min(high), low.max(high)))
     }
-    #[inline]
+    #[inline(always)]
     fn tap(&self, l: usize, evaluated: T) -> Tap<T> {
         let factor = self.factors.as_ref().get(l).copied().unwrap_or(T::ONE);
         Tap::at(factor * evaluated, ROUNDED)

@@ -36,6 +36,12 @@ pub trait Memory<T>: Past<T> + Clone {
     }
 }
 
+/// A memory that is made to measure, or that has its length from its type.
+pub trait Reaching<T>: Memory<T> {
+    /// A memory at rest that reaches back `lag` samples, or as far as its type does.
+    fn reaching(lag: usize) -> Self;
+}
+
 /// Ring buffer of the last `LEN` samples.
 ///
 /// Every sample is stored twice, `LEN` apart, so that the past is contiguous behind the newest sample and a
@@ -74,6 +80,12 @@ impl<T: Real, const LEN: usize> Past<T> for DelayLine<T, LEN> {
         let index = self.newest.min(LEN - 1) + LEN - lag;
         let samples = self.samples.as_flattened();
         samples.get(index).copied().unwrap_or(T::ZERO)
+    }
+}
+
+impl<T: Real, const LEN: usize> Reaching<T> for DelayLine<T, LEN> {
+    fn reaching(_lag: usize) -> Self {
+        Self::new()
     }
 }
 

@@ -298,8 +298,8 @@ where
     };
     let recursion = model.recursion();
     let first = at.arrived;
-    let mut strength = |l: usize| if l == 0 { first } else { arriving.jet(l).0 };
-    let mut next = recursion.next_from(known, horizon, &state.outputs, &mut strength);
+    let strength = |l: usize| if l == 0 { first } else { arriving.jet(l).0 };
+    let mut next = recursion.next_from(known, horizon, &state.outputs, strength);
     if effects.drives() {
         let relaxation = recursion.rate(first);
         let separated = recursion.separated(first, relaxation);

@@ -52,14 +52,17 @@ pub trait Real:
         (sum, (self - (sum - part)) + (term - part))
     }
     /// The magnitude.
+    #[inline(always)]
     fn abs(self) -> Self {
         if self < Self::ZERO { -self } else { self }
     }
     /// This number, or `low` where it is below. NaN is kept.
+    #[inline(always)]
     fn at_least(self, low: Self) -> Self {
         if self < low { low } else { self }
     }
     /// This number, or `high` where it is above. NaN is kept.
+    #[inline(always)]
     fn at_most(self, high: Self) -> Self {
         if self > high { high } else { self }
     }
@@ -70,46 +73,46 @@ macro_rules! real {
         impl Real for $float {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
-            #[inline]
+            #[inline(always)]
             fn from_f64(value: f64) -> Self {
                 value as $float
             }
-            #[inline]
+            #[inline(always)]
             fn from_count(count: u32) -> Self {
                 count as $float
             }
-            #[inline]
+            #[inline(always)]
             fn value(self) -> f64 {
                 self as f64
             }
-            #[inline]
+            #[inline(always)]
             fn exp(self) -> Self {
                 $exp(self)
             }
-            #[inline]
+            #[inline(always)]
             fn sin(self) -> Self {
                 $sin(self)
             }
-            #[inline]
+            #[inline(always)]
             fn cos(self) -> Self {
                 $cos(self)
             }
-            #[inline]
+            #[inline(always)]
             fn sqrt(self) -> Self {
                 if self > 0.0 { $sqrt(self) } else { 0.0 }
             }
-            #[inline]
+            #[inline(always)]
             fn cbrt(self) -> Self {
                 $cbrt(self)
             }
-            #[inline]
+            #[inline(always)]
             fn round(self) -> i32 {
                 // Truncation and the remainder are exact, which adding 0.5 is not.
                 let whole = self as i32;
                 let rest = self - whole as $float;
                 whole.saturating_add((rest + rest) as i32)
             }
-            #[inline]
+            #[inline(always)]
             fn floor(self) -> i32 {
                 let whole = self as i32;
                 if (whole as $float) > self {
@@ -127,7 +130,7 @@ macro_rules! real {
 ///
 /// `libm::expf` takes twice the instructions, and a law that looks ahead calls it
 /// for every sample that it looks ahead.
-#[inline]
+#[inline(always)]
 fn single_exp(x: f32) -> f32 {
     const HIGHEST: f32 = 88.722_84;
     const LOWEST: f32 = -87.336_54;

@@ -6,7 +6,6 @@ use super::{CodegenError, spec_of};
 use crate::model::{Added, CommandRange, Footprint, Model};
 use crate::user_effect::{number, rust_module};
 use model_core::effect::{RustType, Setting};
-use model_core::effects;
 use model_core::recursion::{Grading, LagConvention};
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
@@ -166,7 +165,7 @@ fn path(text: &str) -> Result<TokenStream, CodegenError> {
 /// with index `time` is.
 pub(super) fn buffer(model: &Model, added: &Added, time: usize) -> usize {
     let time = added.parameters.get(time).copied().unwrap_or(0.0) / model.sample_period_s;
-    time.clamp(0.0, effects::LONGEST_BUFFER as f64) as usize + 3
+    time as usize + 3
 }
 
 pub(super) fn coefficients(model: &Model, law: &Written) -> TokenStream {

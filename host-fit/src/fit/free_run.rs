@@ -10,14 +10,14 @@ use crate::dual::Dual;
 use crate::model::{Coordinate, Delay, Kind, Model, Rounding};
 use crate::simulate::{Signals, SimulateError, Simulator};
 use model_core::effect::Sign;
-use model_core::{Output, pairs};
+use model_core::{Output, Real, pairs};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
-/// Derivatives per run.
+/// Lanes of a run, one of them for the value.
 const FEW: usize = 8;
-/// The last run carries all remaining derivatives, if they are at most this many.
-const MANY: usize = 12;
+/// Lanes of the last run, if they are enough for all remaining derivatives.
+const MANY: usize = 20;
 
 /// Options of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -217,10 +217,14 @@ impl<'a> FreeRunProblem<'a> {
         let mut simulated = None;
         let mut rest = &smooth[..];
         while !rest.is_empty() {
-            let at_once = if rest.len() <= MANY { rest.len() } else { FEW };
+            let at_once = if rest.len() < MANY {
+                rest.len()
+            } else {
+                FEW - 1
+            };
             let chunk;
             (chunk, rest) = rest.split_at(at_once);
-            let (run, columns) = if chunk.len() <= FEW {
+            let (run, columns) = if chunk.len() < FEW {
                 self.sensitivities::<FEW>(values, record, chunk)?
             } else {
                 self.sensitivities::<MANY>(values, record, chunk)?
@@ -269,21 +273,21 @@ impl<'a> FreeRunProblem<'a> {
         Some(Part { residual, jacobian })
     }
 
-    /// y_sim of a record and its derivatives with respect to `axes`, at most `P`;
-    /// `None` if it diverges.
-    fn sensitivities<const P: usize>(
+    /// y_sim of a record and its derivatives with respect to `axes`, less than `N`; `None` if it diverges.
+    fn sensitivities<const N: usize>(
         &self,
         values: &[f64],
         record: usize,
         axes: &[usize],
     ) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
         let (signals, lead) = (&self.signals[record], self.lead[record]);
-        let mut duals: Vec<Dual<P>> = values.iter().map(|v| Dual::constant(*v)).collect();
+        let mut duals: Vec<Dual<N>> = values.iter().map(|v| Dual::constant(*v)).collect();
         for (slot, axis) in axes.iter().enumerate() {
             let axis = &self.axes[*axis];
-            duals[axis.index].partials[slot] = axis.slope(values[axis.index]);
+            let slope = axis.slope(values[axis.index]);
+            duals[axis.index] = duals[axis.index].with_slope(slot, slope);
             if let Some(index) = axis.against {
-                duals[index].partials[slot] = -1.0;
+                duals[index] = duals[index].with_slope(slot, -1.0);
             }
         }
         let mut y = Vec::with_capacity(signals.u.len());
@@ -295,9 +299,9 @@ impl<'a> FreeRunProblem<'a> {
         let left = simulator.run(
             signals,
             #[inline(always)]
-            |k, output: &Output<Dual<P>>| {
-                y.push(output.measured.value);
-                for (column, slope) in pairs(&mut columns, &output.measured.partials) {
+            |k, output: &Output<Dual<N>>| {
+                y.push(output.measured.value());
+                for (column, slope) in pairs(&mut columns, output.measured.partials()) {
                     column.push(if k < lead { 0.0 } else { *slope });
                 }
                 ControlFlow::Continue(())
@@ -414,12 +418,12 @@ pub fn sensitivities(
     let none: [&[usize]; 1] = [&[]];
     let chunks: Vec<&[usize]> = match indices {
         [] => none.to_vec(),
-        indices => indices.chunks(FEW).collect(),
+        indices => indices.chunks(FEW - 1).collect(),
     };
     for chunk in chunks {
         let mut duals: Vec<Dual<FEW>> = values.iter().map(|v| Dual::constant(*v)).collect();
         for (slot, index) in chunk.iter().enumerate() {
-            duals[*index] = Dual::parameter(values[*index], slot);
+            duals[*index] = duals[*index].with_slope(slot, 1.0);
         }
         // A clone of an empty vector has no room.
         let mut own: Vec<Vec<f64>> = (0..chunk.len())
@@ -428,8 +432,8 @@ pub fn sensitivities(
         run.clear();
         let simulator = Simulator::with_values(model, &duals, Rounding::None);
         let left = simulator.run(&signals, |_, output: &Output<Dual<FEW>>| {
-            run.push(output.measured.value);
-            for (column, slope) in pairs(&mut own, &output.measured.partials) {
+            run.push(output.measured.value());
+            for (column, slope) in pairs(&mut own, output.measured.partials()) {
                 column.push(*slope);
             }
             ControlFlow::Continue(())

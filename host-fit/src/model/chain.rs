@@ -1,6 +1,7 @@
 //! The effects of a model, composed at run time from the catalogue and the user's own.
 
 use super::{Added, Model};
+use crate::ring::Ring;
 use crate::user_effect::{UserEffect, UserState};
 use model_core::effect::{Effect, Flow, Instant, Place, Setting};
 use model_core::effects::{AnyEffect, AnyState};
@@ -11,7 +12,7 @@ use model_core::{Real, pairs};
 #[allow(clippy::large_enum_variant, reason = "a handful per model")]
 pub enum HostEffect<T: Real> {
     /// From `model_core::effects`.
-    Catalogue(AnyEffect<T>),
+    Catalogue(AnyEffect<T, Ring<T>>),
     /// From an effect file.
     User(UserEffect<T>),
 }
@@ -21,7 +22,7 @@ pub enum HostEffect<T: Real> {
 #[allow(clippy::large_enum_variant, reason = "a handful per model")]
 pub enum HostState<T: Real> {
     /// Of an effect of the catalogue.
-    Catalogue(AnyState<T>),
+    Catalogue(AnyState<T, Ring<T>>),
     /// Of a user's effect.
     User(UserState<T>),
 }

@@ -31,7 +31,7 @@ pub struct Prepared<T: Real> {
 
 impl<T: Real> Prepared<T> {
     /// Whether the delay depends on the averaged output ỹ of eq. (1); otherwise ỹ need not be computed.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn follows_average(&self) -> bool {
         self.follows
     }
@@ -40,7 +40,7 @@ impl<T: Real> Prepared<T> {
 impl<T: Real> Parts<T> for Prepared<T> {
     type Delay = AnyDelay<T>;
     type Effects = Chain<T>;
-    #[inline]
+    #[inline(always)]
     fn recursion(&self) -> Bilinear<'_, T> {
         Bilinear {
             convention: self.convention,
@@ -54,15 +54,15 @@ impl<T: Real> Parts<T> for Prepared<T> {
             pace: self.pace.as_ref(),
         }
     }
-    #[inline]
+    #[inline(always)]
     fn delay(&self) -> &AnyDelay<T> {
         &self.delay
     }
-    #[inline]
+    #[inline(always)]
     fn effects(&self) -> &Chain<T> {
         &self.effects
     }
-    #[inline]
+    #[inline(always)]
     fn averaging(&self) -> Averaging {
         self.averaging
     }
@@ -104,28 +104,28 @@ impl<T: Real> DelayLaw<T> for AnyDelay<T> {
             Self::Law { law, .. } => Some(law.start()),
         }
     }
-    #[inline]
+    #[inline(always)]
     fn command(&self, state: &mut Self::State, command: T) -> T {
         match (self, state) {
             (Self::Law { law, .. }, Some(state)) => law.command(state, command),
             _ => command,
         }
     }
-    #[inline]
+    #[inline(always)]
     fn evaluate(&self, output: T) -> T {
         match self {
             Self::Fixed(law) => law.evaluate(output),
             Self::Law { law, .. } => law.delay(output),
         }
     }
-    #[inline]
+    #[inline(always)]
     fn range(&self, l: usize) -> Option<(usize, usize)> {
         match self {
             Self::Fixed(_) => None,
             Self::Law { ranges, .. } => *ranges.get(l)?,
         }
     }
-    #[inline]
+    #[inline(always)]
     fn tap(&self, l: usize, evaluated: T) -> Tap<T> {
         match self {
             Self::Fixed(law) => law.tap(l, evaluated),

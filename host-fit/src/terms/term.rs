@@ -2,6 +2,7 @@
 
 use super::RULES;
 use crate::model::{Delay, Model};
+use crate::ring::Ring;
 use model_core::effect::{Effect as _, Instant, Place, Setting, Spec};
 use model_core::effects::{AnyEffect, LEVEL_RATE, PATH_TERMS, SLOW_WAKE, ZERO_OFFSET};
 use model_core::recursion::Grading;
@@ -378,7 +379,7 @@ fn mean_delay(spec: &Spec, parameters: &[f64], period: f64) -> f64 {
         channel: 0,
         reference: 1.0,
     };
-    let Some(effect) = AnyEffect::new(spec.name, parameters, &setting) else {
+    let Some(effect) = AnyEffect::<f64, Ring<f64>>::new(spec.name, parameters, &setting) else {
         return 0.0;
     };
     let step = Instant {

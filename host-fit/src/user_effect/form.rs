@@ -124,6 +124,7 @@ fn program(spec: &Spec, written: &Written, text: &str) -> Result<Program, Fault>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ring::Ring;
     use crate::user_effect::UserEffect;
     use model_core::Real;
     use model_core::delay::Transport;
@@ -181,7 +182,8 @@ mod tests {
 
     fn agree<T: Real>(spec: &'static Spec) {
         let parameters = middle::<T>(spec);
-        let own = AnyEffect::new(spec.name, &parameters, &setting()).expect("in the catalogue");
+        let own = AnyEffect::<T, Ring<T>>::new(spec.name, &parameters, &setting())
+            .expect("in the catalogue");
         let form = form(spec.name).unwrap_or_else(|| panic!("{} has no form", spec.name));
         let written = UserEffect::of(&form.value, spec.place, &parameters, &setting());
         let (own, written) = (run(&own), run(&written));

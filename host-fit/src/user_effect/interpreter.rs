@@ -7,11 +7,10 @@ use model_core::Real;
 use model_core::clock::Clock;
 use model_core::delay::Tap;
 use model_core::effect::{Effect, Flow, Instant, Place, Setting};
-use model_core::effects::LONGEST_BUFFER;
-use model_core::history::Memory;
+use model_core::history::{Memory, Reaching as _};
 
 /// Longest delay of a signal, samples; one older sample is kept for interpolation.
-pub(super) const LONGEST_DELAY: u32 = LONGEST_BUFFER as u32 - 2;
+pub(super) const LONGEST_DELAY: u32 = 2046;
 
 /// A user's effect, prepared for a sample period.
 #[derive(Clone, Debug)]

@@ -14,11 +14,11 @@ pub struct AmplitudeSaturation<T> {
 impl<T: Real> Effect<T> for AmplitudeSaturation<T> {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn drives(&self) -> bool {
         true
     }
-    #[inline]
+    #[inline(always)]
     fn drive(&self, _state: &mut (), flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
         -(self.cubic * flow.relaxation) * (flow.now * flow.now * flow.now)
     }

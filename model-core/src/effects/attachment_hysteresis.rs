@@ -20,11 +20,11 @@ impl<T: Real> Effect<T> for AttachmentHysteresis<T> {
     fn start(&self) -> bool {
         false
     }
-    #[inline]
+    #[inline(always)]
     fn drives(&self) -> bool {
         true
     }
-    #[inline]
+    #[inline(always)]
     fn drive(&self, attached: &mut bool, flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
         if flow.now > self.upper {
             *attached = true;

@@ -3,10 +3,13 @@
 use super::{AnyEffect, SPECS};
 use crate::delay::FixedDelay;
 use crate::effect::{Effect, Flow, Influence, Instant, Physics, Place, Setting, Spec};
+use crate::history::DelayLine;
 use crate::model::{Averaging, Input, Params, Parts, matrix, step, vector};
 use crate::real::Real;
 use crate::recursion::{Grading, LagConvention};
 use std::vec::Vec;
+
+type Any<T> = AnyEffect<T, DelayLine<T, 1024>>;
 
 /// 1 kHz, a channel whose reference is 10.
 fn setting<T: Real>(period: f64) -> Setting<T> {
@@ -91,8 +94,7 @@ fn run<T: Real>(spec: &Spec, parameters: &[f64], y: f64, period: f64) -> Vec<f64
         b: vector([number(0.035 * y)]),
         c: matrix([[number(-0.005)]]),
         delay: FixedDelay { delays: [20_u16] },
-        effects: AnyEffect::new(spec.name, &parameters, &setting::<T>(period))
-            .expect("in the catalogue"),
+        effects: Any::new(spec.name, &parameters, &setting::<T>(period)).expect("in the catalogue"),
     };
     let mut state = model.graded_state::<64, 64>();
     let each = (0..1500_usize).map(|k| {
@@ -129,7 +131,7 @@ fn an_effect_acts_at_the_place_on_its_card_only() {
     };
     let bases = super::NUISANCES.into_iter();
     for spec in effects().chain(bases) {
-        let effect = AnyEffect::<f64>::new(spec.name, &middle(spec), &setting(0.001));
+        let effect = Any::<f64>::new(spec.name, &middle(spec), &setting(0.001));
         let effect = effect.expect("an effect of the catalogue");
         assert_eq!(effect.place(), spec.place);
         assert_eq!(
@@ -248,7 +250,7 @@ fn amplitudes_are_what_their_cards_say() {
 
 /// Contribution of the effect to jet, drive and reading for given signals.
 fn added(spec: &Spec, parameters: &[f64]) -> Vec<f64> {
-    let effect = AnyEffect::new(spec.name, parameters, &setting::<f64>(0.001)).expect("known");
+    let effect = Any::new(spec.name, parameters, &setting::<f64>(0.001)).expect("known");
     let mut state = effect.start();
     let mut before = 0.0;
     let each = (0..1500_usize).map(|k| {

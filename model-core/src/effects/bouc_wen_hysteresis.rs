@@ -21,11 +21,11 @@ impl<T: Real> Effect<T> for BoucWenHysteresis<T> {
     fn start(&self) -> T {
         T::ZERO
     }
-    #[inline]
+    #[inline(always)]
     fn drives(&self) -> bool {
         true
     }
-    #[inline]
+    #[inline(always)]
     fn drive(&self, z: &mut T, flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
         let change = flow.now - flow.before;
         // Implicit in z where the loop closes: stable for any change.

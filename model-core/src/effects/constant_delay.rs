@@ -16,11 +16,11 @@ pub struct ConstantDelay<T> {
 impl<T: Real> Transport<T> for ConstantDelay<T> {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn delay(&self, _output: T) -> T {
         self.delay
     }
-    #[inline]
+    #[inline(always)]
     fn bounds(&self) -> Option<[T; 2]> {
         Some([self.delay; 2])
     }

@@ -19,7 +19,7 @@ impl<T: Real> Effect<T> for DispersedDelay<T> {
     fn start(&self) -> [T; 3] {
         [T::ZERO; 3]
     }
-    #[inline]
+    #[inline(always)]
     fn jet(&self, [first, second, third]: &mut [T; 3], jet: T, _at: &Instant<'_, T>) -> T {
         *first = *first + (jet - *first) * self.share;
         *second = *second + (*first - *second) * self.share;

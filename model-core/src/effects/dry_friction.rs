@@ -15,11 +15,11 @@ pub struct DryFriction<T> {
 impl<T: Real> Effect<T> for DryFriction<T> {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn drives(&self) -> bool {
         true
     }
-    #[inline]
+    #[inline(always)]
     fn drive(&self, _state: &mut (), flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
         let step = flow.next - flow.now;
         -step.at_least(-self.level).at_most(self.level)

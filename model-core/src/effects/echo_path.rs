@@ -4,29 +4,34 @@ use crate::delay::Tap;
 use crate::effect::{
     Amplitude, Effect, Instant, Parameter, Physics, Place, RustType, Setting, Spec, Unit, take,
 };
-use crate::history::{DelayLine, Memory};
+use crate::history::{DelayLine, Reaching};
 use crate::real::Real;
+use core::marker::PhantomData;
 
-/// j(t) = v(t) + g·v(t − d), with d of at most `LEN` − 2 samples.
+/// [`Echo`] with d of at most `LEN` − 2 samples.
+pub type EchoPath<T, const LEN: usize> = Echo<T, DelayLine<T, LEN>>;
+
+/// j(t) = v(t) + g·v(t − d), with v remembered by `M`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EchoPath<T, const LEN: usize> {
+pub struct Echo<T, M> {
     gain: T,
     delay: Tap<T>,
+    memory: PhantomData<M>,
 }
 
-impl<T: Real, const LEN: usize> Effect<T> for EchoPath<T, LEN> {
-    type State = DelayLine<T, LEN>;
-    fn start(&self) -> Self::State {
-        DelayLine::new()
+impl<T: Real, M: Reaching<T>> Effect<T> for Echo<T, M> {
+    type State = M;
+    fn start(&self) -> M {
+        M::reaching(self.delay.whole + 1)
     }
-    #[inline]
-    fn jet(&self, past: &mut Self::State, jet: T, _at: &Instant<'_, T>) -> T {
+    #[inline(always)]
+    fn jet(&self, past: &mut M, jet: T, _at: &Instant<'_, T>) -> T {
         past.push(jet);
         jet + self.gain * self.delay.read(past)
     }
 }
 
-impl<T: Real, const LEN: usize> Physics<T> for EchoPath<T, LEN> {
+impl<T: Real, M: Reaching<T>> Physics<T> for Echo<T, M> {
     const SPEC: Spec = Spec {
         name: "echo-path",
         rust: "echo_path::EchoPath",
@@ -53,6 +58,7 @@ impl<T: Real, const LEN: usize> Physics<T> for EchoPath<T, LEN> {
         Self {
             gain,
             delay: Tap::between(delay / setting.period),
+            memory: PhantomData,
         }
     }
 }

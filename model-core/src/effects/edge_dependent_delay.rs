@@ -42,7 +42,7 @@ impl<T: Real> Transport<T> for EdgeDependentDelay<T> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn command(&self, run: &mut Run<T>, command: T) -> T {
         if command == run.level {
             run.samples = run.samples.saturating_add(1);
@@ -66,15 +66,15 @@ impl<T: Real> Transport<T> for EdgeDependentDelay<T> {
         run.through
     }
 
-    #[inline]
+    #[inline(always)]
     fn delay(&self, _output: T) -> T {
         self.shorter
     }
-    #[inline]
+    #[inline(always)]
     fn bounds(&self) -> Option<[T; 2]> {
         Some([self.shorter; 2])
     }
-    #[inline]
+    #[inline(always)]
     fn held_back(&self) -> [T; 2] {
         [self.hold_rise, self.hold_fall]
     }

@@ -14,7 +14,7 @@ pub struct ElectricalPickup<T> {
 impl<T: Real> Effect<T> for ElectricalPickup<T> {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn sense(&self, _state: &mut (), signal: T, at: &Instant<'_, T>) -> T {
         signal + self.gain * at.command
     }

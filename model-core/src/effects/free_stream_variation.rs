@@ -16,7 +16,7 @@ pub struct FreeStreamVariation<T> {
 impl<T: Real> Effect<T> for FreeStreamVariation<T> {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn jet(&self, _state: &mut (), jet: T, at: &Instant<'_, T>) -> T {
         // An unconnected channel counts as at its reference.
         let speed = at

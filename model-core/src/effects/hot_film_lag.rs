@@ -28,7 +28,7 @@ impl<T: Real> Effect<T> for HotFilmLag<T> {
             signal: T::ZERO,
         }
     }
-    #[inline]
+    #[inline(always)]
     fn sense(&self, film: &mut Film<T>, signal: T, _at: &Instant<'_, T>) -> T {
         film.shown =
             self.kept * film.shown + self.from_before * film.signal + self.from_now * signal;

@@ -18,7 +18,7 @@ pub struct HotFilmNonlinearity<T> {
 }
 
 impl<T: Real> HotFilmNonlinearity<T> {
-    #[inline]
+    #[inline(always)]
     fn voltage(&self, friction: T) -> T {
         let cooling = (friction + self.offset).at_least(T::ZERO) * self.per_reference;
         (T::ONE + self.ratio * cooling.cbrt()).sqrt()
@@ -28,7 +28,7 @@ impl<T: Real> HotFilmNonlinearity<T> {
 impl<T: Real> Effect<T> for HotFilmNonlinearity<T> {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn sense(&self, _state: &mut (), signal: T, _at: &Instant<'_, T>) -> T {
         (self.voltage(signal) - self.natural) / self.span
     }

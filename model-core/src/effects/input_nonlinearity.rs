@@ -13,7 +13,7 @@ pub struct InputNonlinearity<T> {
 impl<T: Real> Effect<T> for InputNonlinearity<T> {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn jet(&self, _state: &mut (), jet: T, _at: &Instant<'_, T>) -> T {
         jet * (T::ONE + jet * (self.quadratic + jet * self.cubic))
     }

@@ -25,7 +25,7 @@ impl<T: Real> Effect<T> for LaggingDrive<T> {
     fn start(&self) -> T {
         T::ZERO
     }
-    #[inline]
+    #[inline(always)]
     fn jet(&self, lagging: &mut T, jet: T, _at: &Instant<'_, T>) -> T {
         // The mean over the sample, as an integrating flow receives it.
         let left = (jet - *lagging) * self.mean;

@@ -19,11 +19,11 @@ pub struct LevelRate<T> {
 impl<T: Real> Effect<T> for LevelRate<T> {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn drives(&self) -> bool {
         true
     }
-    #[inline]
+    #[inline(always)]
     fn drive(&self, _state: &mut (), flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
         let attached = flow.next - flow.now - flow.released;
         flow.now * (self.separating * flow.released + self.attaching * attached)

@@ -39,10 +39,8 @@ pub mod zero_offset;
 
 use crate::delay::Transport;
 use crate::effect::{Effect, Flow, Instant, Physics, Place, Setting, Spec};
+use crate::history::{DelayLine, Reaching};
 use crate::real::Real;
-
-/// Longest memory of an effect of [`AnyEffect`], samples.
-pub const LONGEST_BUFFER: usize = 2048;
 
 macro_rules! delay_laws {
     ($($file:ident :: $law:ident),+ $(,)?) => {
@@ -81,14 +79,14 @@ macro_rules! delay_laws {
                     $(Self::$law(law) => AnyTransportState::$law(law.start()),)+
                 }
             }
-            #[inline]
+            #[inline(always)]
             fn command(&self, state: &mut AnyTransportState<T>, command: T) -> T {
                 match (self, state) {
                     $((Self::$law(law), AnyTransportState::$law(state)) => law.command(state, command),)+
                     _ => command,
                 }
             }
-            #[inline]
+            #[inline(always)]
             fn delay(&self, output: T) -> T {
                 match self {
                     $(Self::$law(law) => law.delay(output),)+
@@ -112,26 +110,32 @@ macro_rules! catalogue {
     ($($file:ident :: $effect:ident : $type:ty),+ $(,)?) => {
         $(pub use $file::$effect;)+
 
-        /// Any effect of the catalogue but the delay laws, chosen at run time.
+        /// Any effect of the catalogue but the delay laws, chosen at run time. Those that remember a signal do so in `M`.
         #[derive(Clone, Copy, Debug)]
         #[allow(clippy::large_enum_variant, reason = "a handful per model, on the host")]
-        pub enum AnyEffect<T: Real> {
+        pub enum AnyEffect<T: Real, M> {
             $(#[doc = concat!("`", stringify!($file), "`")] $effect($type),)+
         }
 
         /// The state of [`AnyEffect`].
         #[derive(Clone, Debug)]
         #[allow(clippy::large_enum_variant, reason = "a handful per model, on the host")]
-        pub enum AnyState<T: Real> {
+        pub enum AnyState<T: Real, M: Reaching<T>> {
             $(#[doc = concat!("of `", stringify!($file), "`")] $effect(<$type as Effect<T>>::State),)+
         }
 
         /// The cards of the effects other than delay laws.
         const EFFECTS: &[Spec] = &[
-            $({ #[allow(dead_code, reason = "not every effect has numbers")] type T = f64; <$type as Physics<f64>>::SPEC },)+
+            $({
+                #[allow(dead_code, reason = "not every effect has numbers")]
+                type T = f64;
+                #[allow(dead_code, reason = "few effects have a memory")]
+                type M = DelayLine<f64, 1>;
+                <$type as Physics<f64>>::SPEC
+            },)+
         ];
 
-        impl<T: Real> AnyEffect<T> {
+        impl<T: Real, M: Reaching<T>> AnyEffect<T, M> {
             /// The effect called `name`, prepared; `None` for an unknown name or a delay law.
             #[must_use]
             pub fn new(name: &str, parameters: &[T], setting: &Setting<T>) -> Option<Self> {
@@ -150,14 +154,15 @@ macro_rules! catalogue {
             }
         }
 
-        impl<T: Real> Effect<T> for AnyEffect<T> {
-            type State = AnyState<T>;
-            fn start(&self) -> AnyState<T> {
+        impl<T: Real, M: Reaching<T>> Effect<T> for AnyEffect<T, M> {
+            type State = AnyState<T, M>;
+            fn start(&self) -> AnyState<T, M> {
                 match self {
                     $(Self::$effect(effect) => AnyState::$effect(Effect::<T>::start(effect)),)+
                 }
             }
-            fn jet(&self, state: &mut AnyState<T>, jet: T, at: &Instant<'_, T>) -> T {
+            #[inline(always)]
+            fn jet(&self, state: &mut AnyState<T, M>, jet: T, at: &Instant<'_, T>) -> T {
                 match (self, state) {
                     $((Self::$effect(effect), AnyState::$effect(state)) => effect.jet(state, jet, at),)+
                     _ => jet,
@@ -168,13 +173,15 @@ macro_rules! catalogue {
                     $(Self::$effect(effect) => Effect::<T>::drives(effect),)+
                 }
             }
-            fn drive(&self, state: &mut AnyState<T>, flow: &Flow<T>, at: &Instant<'_, T>) -> T {
+            #[inline(always)]
+            fn drive(&self, state: &mut AnyState<T, M>, flow: &Flow<T>, at: &Instant<'_, T>) -> T {
                 match (self, state) {
                     $((Self::$effect(effect), AnyState::$effect(state)) => effect.drive(state, flow, at),)+
                     _ => T::ZERO,
                 }
             }
-            fn sense(&self, state: &mut AnyState<T>, signal: T, at: &Instant<'_, T>) -> T {
+            #[inline(always)]
+            fn sense(&self, state: &mut AnyState<T, M>, signal: T, at: &Instant<'_, T>) -> T {
                 match (self, state) {
                     $((Self::$effect(effect), AnyState::$effect(state)) => effect.sense(state, signal, at),)+
                     _ => signal,
@@ -197,7 +204,7 @@ catalogue! {
     plenum_droop::PlenumDroop: PlenumDroop<T>,
     free_stream_variation::FreeStreamVariation: FreeStreamVariation<T>,
     input_nonlinearity::InputNonlinearity: InputNonlinearity<T>,
-    echo_path::EchoPath: EchoPath<T, LONGEST_BUFFER>,
+    echo_path::Echo: Echo<T, M>,
     starting_vortex::StartingVortex: StartingVortex<T>,
     stopping_vortex::StoppingVortex: StoppingVortex<T>,
     dispersed_delay::DispersedDelay: DispersedDelay<T>,

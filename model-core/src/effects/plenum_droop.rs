@@ -21,7 +21,7 @@ impl<T: Real> Effect<T> for PlenumDroop<T> {
     fn start(&self) -> T {
         T::ONE
     }
-    #[inline]
+    #[inline(always)]
     fn jet(&self, pressure: &mut T, jet: T, _at: &Instant<'_, T>) -> T {
         let strength = jet * *pressure;
         let half = (self.refill + self.depletion * jet) / (T::ONE + T::ONE);

@@ -15,11 +15,11 @@ pub struct QuadraticDrag<T> {
 impl<T: Real> Effect<T> for QuadraticDrag<T> {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn drives(&self) -> bool {
         true
     }
-    #[inline]
+    #[inline(always)]
     fn drive(&self, _state: &mut (), flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
         // Δ + d·Δ·|Δ| = Δ₀ solved for Δ.
         let free = flow.next - flow.now;

@@ -19,7 +19,7 @@ pub struct ReadingCurve<T> {
 }
 
 /// tanh(x/2).
-#[inline]
+#[inline(always)]
 fn tanh_of_half<T: Real>(x: T) -> T {
     let two = T::ONE + T::ONE;
     T::ONE - two / (x.exp() + T::ONE)
@@ -28,7 +28,7 @@ fn tanh_of_half<T: Real>(x: T) -> T {
 impl<T: Real> Effect<T> for ReadingCurve<T> {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn sense(&self, _state: &mut (), signal: T, _at: &Instant<'_, T>) -> T {
         let steep = tanh_of_half((signal - self.centre) * self.per_width);
         self.width * (steep + self.natural)

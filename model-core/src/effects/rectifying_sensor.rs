@@ -10,7 +10,7 @@ pub struct RectifyingSensor;
 impl<T: Real> Effect<T> for RectifyingSensor {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn sense(&self, _state: &mut (), signal: T, _at: &Instant<'_, T>) -> T {
         signal.abs()
     }

@@ -22,7 +22,7 @@ pub struct SaturatingDelay<T> {
 impl<T: Real> Transport<T> for SaturatingDelay<T> {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn delay(&self, output: T) -> T {
         let x = (output / self.level).at_most(T::ONE);
         // Rounding must not exceed the bounds.
@@ -30,7 +30,7 @@ impl<T: Real> Transport<T> for SaturatingDelay<T> {
         self.floor + self.rise * share
     }
     /// A bend within ±1 keeps the law monotone.
-    #[inline]
+    #[inline(always)]
     fn bounds(&self) -> Option<[T; 2]> {
         let monotone = self.bend.at_least(-T::ONE).at_most(T::ONE) == self.bend;
         if !monotone || self.level <= T::ZERO {

@@ -15,7 +15,7 @@ pub struct SensorSaturation<T> {
 impl<T: Real> Effect<T> for SensorSaturation<T> {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn sense(&self, _state: &mut (), signal: T, _at: &Instant<'_, T>) -> T {
         signal.at_least(self.lower).at_most(self.upper)
     }

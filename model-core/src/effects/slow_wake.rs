@@ -21,11 +21,11 @@ impl<T: Real> Effect<T> for SlowWake<T> {
     fn start(&self) -> T {
         T::ZERO
     }
-    #[inline]
+    #[inline(always)]
     fn drives(&self) -> bool {
         true
     }
-    #[inline]
+    #[inline(always)]
     fn drive(&self, wake: &mut T, flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
         let drive = -(self.pull * *wake * flow.relaxation);
         *wake = flow.now + self.kept * (*wake - flow.now);

@@ -23,12 +23,12 @@ pub struct StateDependentDelay<T> {
 impl<T: Real> Transport<T> for StateDependentDelay<T> {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn delay(&self, output: T) -> T {
         self.floor + self.rise * (-self.rate * output).exp()
     }
     /// The exponential lies between 0 and 1.
-    #[inline]
+    #[inline(always)]
     fn bounds(&self) -> Option<[T; 2]> {
         if self.rate < T::ZERO {
             return None;

@@ -17,7 +17,7 @@ impl<T: Real> Effect<T> for StoppingVortex<T> {
     fn start(&self) -> Vortex<T> {
         Vortex::none()
     }
-    #[inline]
+    #[inline(always)]
     fn jet(&self, vortex: &mut Vortex<T>, jet: T, _at: &Instant<'_, T>) -> T {
         jet - self.shedding.step(vortex, jet, |change: T| -change)
     }

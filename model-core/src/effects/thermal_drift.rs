@@ -18,7 +18,7 @@ impl<T: Real> Effect<T> for ThermalDrift<T> {
     fn start(&self) -> T {
         T::ZERO
     }
-    #[inline]
+    #[inline(always)]
     fn sense(&self, warmth: &mut T, signal: T, _at: &Instant<'_, T>) -> T {
         let shown = signal + self.amplitude * *warmth;
         *warmth = *warmth + (T::ONE - *warmth) * self.share;

@@ -18,7 +18,7 @@ impl<T: Real> Effect<T> for ValveLag<T> {
     fn start(&self) -> T {
         T::ZERO
     }
-    #[inline]
+    #[inline(always)]
     fn jet(&self, opening: &mut T, jet: T, _at: &Instant<'_, T>) -> T {
         let share = if jet > *opening {
             self.opening

@@ -36,7 +36,7 @@ impl<T: Real> Shedding<T> {
 
     /// What the flow receives after a sample in which the jet comes to `jet`;
     /// `edge` is what of a change of the jet makes a vortex.
-    #[inline]
+    #[inline(always)]
     pub(super) fn step(&self, vortex: &mut Vortex<T>, jet: T, edge: impl Fn(T) -> T) -> T {
         let fed = edge(jet - vortex.jet).at_least(T::ZERO);
         vortex.jet = jet;

@@ -30,7 +30,7 @@ impl<T: Real> Effect<T> for VortexShedding<T> {
             rate: T::ZERO,
         }
     }
-    #[inline]
+    #[inline(always)]
     fn sense(&self, state: &mut Oscillation<T>, signal: T, at: &Instant<'_, T>) -> T {
         let shown = signal + self.gain * (state.q - at.present);
         let apart = state.q - at.arrived;

@@ -17,7 +17,7 @@ pub struct ZeroOffset<T> {
 impl<T: Real> Effect<T> for ZeroOffset<T> {
     type State = ();
     fn start(&self) {}
-    #[inline]
+    #[inline(always)]
     fn sense(&self, _state: &mut (), signal: T, _at: &Instant<'_, T>) -> T {
         signal + self.level
     }

@@ -13,6 +13,7 @@ use host_fit::ring::Ring;
 use model_core::State;
 use model_core::control::HoldTimes;
 use model_core::effects::StateDependentDelay;
+use model_core::history::Reaching as _;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 

@@ -9,7 +9,7 @@ use host_fit::ring::Ring;
 use host_fit::simulate::HostState;
 use model_core::average::WindowSum;
 use model_core::control::Pulses;
-use model_core::history::{Memory as _, Past as _};
+use model_core::history::{Memory as _, Past as _, Reaching as _};
 
 /// One sample of a loop: prediction and decision, from the counts of sensor and
 /// measured channel.

@@ -410,5 +410,10 @@ mod tests {
         let names: Vec<&str> = claimed.effects.iter().map(|spec| spec.name).collect();
         assert_eq!(names, ["thermal-drift"]);
         assert_eq!(claimed.verdict, Verdict::EffectMissing);
+        // The verdict is on what is handed over: a given model at the noise level lacks nothing.
+        let verdict = |as_given: &HeldOut| session.concluded(&bare, &found, as_given).verdict;
+        assert_eq!(verdict(as_given), Verdict::Unexplained);
+        let drifts = &claimed.model.judged.held_out;
+        assert_eq!(verdict(drifts), Verdict::NothingMissing);
     }
 }

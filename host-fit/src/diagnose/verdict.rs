@@ -14,17 +14,18 @@ impl Session<'_> {
     /// Whether an error is at the noise level, within its uncertainty.
     fn fits(&self, judged: &Judged) -> bool {
         let judge = self.judge();
-        if judge.p_above_noise(&judged.held_out, RULES.floor_margin) >= RULES.level {
-            return true;
-        }
-        match judge.noise_source {
-            NoiseSource::Measured | NoiseSource::Repeats => {
-                judge.over_noise(judged.rmse()) <= RULES.floor_margin
-            }
-            NoiseSource::Scatter => {
-                judge.error_of_motion(&judged.held_out) <= RULES.too_much && !self.depends(judged)
-            }
-        }
+        self.is_at_noise(&judged.held_out)
+            || (judge.noise_source == NoiseSource::Scatter
+                && judge.error_of_motion(&judged.held_out) <= RULES.too_much
+                && !self.depends(judged))
+    }
+
+    /// Whether an error is no more than the noise, by a test or within the uncertainty of a known level.
+    fn is_at_noise(&self, held_out: &HeldOut) -> bool {
+        let judge = self.judge();
+        judge.p_above_noise(held_out, RULES.floor_margin) >= RULES.level
+            || (judge.noise_source != NoiseSource::Scatter
+                && judge.over_noise(held_out.rmse()) <= RULES.floor_margin)
     }
 
     /// Whether a model fits within the uncertainty of a known noise level: further effects are then not
@@ -290,8 +291,11 @@ impl Session<'_> {
         let bare = &found.bare;
         let effects: Vec<&'static Spec> = best.terms.iter().filter_map(Term::effect).collect();
         let judge = self.judge();
+        // Where the given model has the smallest error it is handed over, and the verdict is on it.
         let of_bare = || Conclusion {
-            verdict: if self.fits(&bare.judged) {
+            verdict: if self.fits(&bare.judged)
+                || (as_given.rmse() < bare.judged.rmse() && self.is_at_noise(as_given))
+            {
                 Verdict::NothingMissing
             } else {
                 Verdict::Unexplained

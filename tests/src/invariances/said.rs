@@ -237,7 +237,14 @@ pub(super) fn broken(change: Change, factor: f64, before: &Said, after: &Said) -
     match (before.edges, after.edges) {
         (Some(one), Some(two)) if near(one, two, known_to) => {}
         (None, None) => {}
-        (one, two) => of_answer.push(format!("measured delay {one:?} → {two:?}")),
+        (one, two) => {
+            let told = |delay: Option<f64>, said: &Said| match delay {
+                Some(delay) => format!("{delay:.2} ± {:.2}", said.delay_known_to),
+                None => "none".to_owned(),
+            };
+            let (one, two) = (told(one, before), told(two, after));
+            of_answer.push(format!("measured delay {one} → {two}"));
+        }
     }
     found
 }

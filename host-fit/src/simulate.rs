@@ -192,11 +192,24 @@ impl<T: Real> Simulator<T> {
         let bound = RULES.diverged * signals.scale(self.usual);
         let window = self.prepared.averaging().window;
         let mut channels = vec![T::ZERO; signals.channels.len()];
-        if self.begins_held(signals) {
-            self.hold_first(signals, &mut state, &mut channels, self.zero);
+        let begins = self.begins_held(signals);
+        let first = self.held(signals).filter(|_| begins);
+        if begins && first.is_none() {
+            self.settle(signals, &mut state, &mut channels);
         }
-        for (k, u) in signals.u.iter().enumerate() {
-            let output = self.observe(signals, &mut state, &mut channels, k, *u);
+        // What is held before the record runs through the same loop.
+        let held = first.map_or(0, |_| self.samples_held());
+        let (before, y) = first.unwrap_or((0.0, T::ZERO));
+        let (before, y) = (std::iter::repeat_n(before, held), y - self.zero);
+        for (i, u) in before.chain(signals.u.iter().copied()).enumerate() {
+            let k = i.saturating_sub(held);
+            if i < held {
+                self.advance(&mut state, y, window);
+            }
+            let output = self.observe(signals, &mut state, &mut channels, k, u);
+            if i < held {
+                continue;
+            }
             if sink(k, &output).is_break() {
                 return None;
             }
@@ -219,17 +232,20 @@ impl<T: Real> Simulator<T> {
         let mut channels = vec![T::ZERO; signals.channels.len()];
         let y = signals.y.unwrap_or(&[]);
         if let Some(first) = y.first() {
-            if self.start == Start::Measured {
-                self.hold_first(signals, &mut state, &mut channels, T::ZERO);
-            } else {
+            if self.start != Start::Measured {
                 self.advance(&mut state, T::from_f64(*first), window);
+            } else if let Some((u, y)) = self.held(signals) {
+                for _ in 0..self.samples_held() {
+                    self.advance(&mut state, y, window);
+                    self.observe_apart(signals, &mut state, &mut channels, 0, u);
+                }
             }
         }
         for (k, u) in signals.u.iter().enumerate() {
             let Some(measured) = y.get(k + 1) else {
                 return;
             };
-            let output = self.observe(signals, &mut state, &mut channels, k, *u);
+            let output = self.observe_apart(signals, &mut state, &mut channels, k, *u);
             sink(k + 1, output.next);
             self.advance(&mut state, T::from_f64(*measured), window);
         }
@@ -275,34 +291,44 @@ impl<T: Real> Simulator<T> {
             || signals.u_before.is_some_and(|u| u != 0.0)
     }
 
-    /// Runs constant inputs before the first sample until the memories are filled; without measured y, until
-    /// the model has settled.
-    fn hold_first(
+    /// [`observe`](Self::observe) as a function of its own, for runs that need not be fast.
+    #[inline(never)]
+    fn observe_apart(
         &self,
         signals: &Signals<'_>,
         state: &mut HostState<T>,
         channels: &mut [T],
-        zero: T,
-    ) {
+        k: usize,
+        u: f64,
+    ) -> Output<T> {
+        self.observe(signals, state, channels, k, u)
+    }
+
+    /// Command and measured output that are held before the first sample, if they are known.
+    fn held(&self, signals: &Signals<'_>) -> Option<(f64, T)> {
+        let u = signals.u_before.or(signals.u.first().copied())?;
+        let y = signals
+            .y_before
+            .or_else(|| signals.followed.first().copied())
+            .or_else(|| signals.y.and_then(<[f64]>::first).copied())?;
+        Some((u, T::from_f64(y)))
+    }
+
+    /// How long they are held: until the memories are filled.
+    fn samples_held(&self) -> usize {
+        self.memory.outputs.max(self.memory.jets).max(self.fades)
+    }
+
+    /// Runs the first command before the first sample until the model has settled.
+    fn settle(&self, signals: &Signals<'_>, state: &mut HostState<T>, channels: &mut [T]) {
         let Some(u) = signals.u_before.or(signals.u.first().copied()) else {
             return;
         };
         let window = self.prepared.averaging().window;
         let full = self.memory.outputs.max(self.memory.jets);
-        let held = signals
-            .y_before
-            .or_else(|| signals.followed.first().copied())
-            .or_else(|| signals.y.and_then(<[f64]>::first).copied());
-        if let Some(y) = held {
-            for _ in 0..full.max(self.fades) {
-                self.advance(state, T::from_f64(y) - zero, window);
-                self.observe(signals, state, channels, 0, u);
-            }
-            return;
-        }
         let (mut last, mut still) = (f64::INFINITY, 0);
         for _ in 0..SETTLED {
-            let next = self.observe(signals, state, channels, 0, u).next;
+            let next = self.observe_apart(signals, state, channels, 0, u).next;
             let value = next.value();
             if !value.is_finite() {
                 return;
@@ -318,6 +344,21 @@ impl<T: Real> Simulator<T> {
                 return;
             }
         }
+    }
+}
+
+impl Simulator<f64> {
+    /// The readings of a free run over `signals`.
+    ///
+    /// # Errors
+    /// The sample of divergence.
+    pub fn readings(&self, signals: &Signals<'_>) -> Result<Vec<f64>, usize> {
+        let mut y = Vec::with_capacity(signals.u.len());
+        let left = self.run(signals, |_, output: &Output<f64>| {
+            y.push(output.measured);
+            ControlFlow::Continue(())
+        });
+        left.map_or(Ok(y), Err)
     }
 }
 
@@ -358,13 +399,7 @@ impl Model {
     /// # Errors
     /// The sample of divergence.
     pub fn run_free(&self, signals: &Signals<'_>) -> Result<Vec<f64>, usize> {
-        let simulator = Simulator::with_values(self, &self.values(), Rounding::Samples);
-        let mut y = Vec::with_capacity(signals.u.len());
-        let left = simulator.run(signals, |_, output: &Output<f64>| {
-            y.push(output.measured);
-            ControlFlow::Continue(())
-        });
-        left.map_or(Ok(y), Err)
+        Simulator::with_values(self, &self.values(), Rounding::Samples).readings(signals)
     }
 
     /// The free run over a record: the predicted reading y_sim.

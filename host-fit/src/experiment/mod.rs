@@ -11,15 +11,12 @@ pub use rules::{RULES, Rules};
 pub use separation::Separation;
 
 use crate::model::Model;
-use crate::model::Rounding;
 use crate::output::{OutputError, write_atomic};
-use crate::simulate::{Signals, Simulator};
+use crate::simulate::Signals;
 use command::{Openings, families, mutate};
-use model_core::Output;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use std::ops::ControlFlow;
 use std::path::Path;
 use thiserror::Error;
 
@@ -198,13 +195,7 @@ fn run(model: &Model, u: &[f64]) -> Option<Vec<f64>> {
         channels: references.iter().map(Vec::as_slice).collect(),
         ..Signals::commanded(model, u)
     };
-    let simulator = Simulator::with_values(model, &model.values(), Rounding::Samples);
-    let mut y = Vec::with_capacity(u.len());
-    let left = simulator.run(&signals, |_, output: &Output<f64>| {
-        y.push(output.measured);
-        ControlFlow::Continue(())
-    });
-    left.is_none().then_some(y)
+    model.run_free(&signals).ok()
 }
 
 impl Experiment {

@@ -14,9 +14,10 @@ use model_core::{Output, Real, pairs};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
-/// Lanes of a run, one of them for the value.
+/// Lanes of a run, one of them for the value: those of the first runs, and of the last one the fewest that are enough for
+/// all remaining derivatives.
 const FEW: usize = 8;
-/// Lanes of the last run, if they are enough for all remaining derivatives.
+const SOME: usize = 12;
 const MANY: usize = 20;
 
 /// Options of a fit.
@@ -198,53 +199,38 @@ impl<'a> FreeRunProblem<'a> {
 
     /// y_sim of a record; `None` if it diverges.
     fn run(&self, values: &[f64], record: usize) -> Option<Vec<f64>> {
-        let signals = &self.signals[record];
-        let mut y = Vec::with_capacity(signals.u.len());
         let simulator = Simulator::with_values(self.model, values, self.rounding);
-        let left = simulator.run(signals, |_, output: &Output<f64>| {
-            y.push(output.measured);
-            ControlFlow::Continue(())
-        });
-        left.is_none().then_some(y)
+        simulator.readings(&self.signals[record]).ok()
     }
 
     /// Residuals of a record and their Jacobian; `None` if it diverges.
     fn part(&self, values: &[f64], record: usize) -> Option<Part> {
-        let smooth: Vec<usize> = (0..self.axes.len())
-            .filter(|axis| self.axes[*axis].secant.is_none())
-            .collect();
+        let (smooth, slopes): (Vec<usize>, Vec<Slopes>) = (self.axes.iter().enumerate())
+            .filter(|(_, axis)| axis.secant.is_none())
+            .map(|(i, axis)| {
+                let own = (axis.index, axis.slope(values[axis.index]));
+                let against = axis.against.map(|index| (index, -1.0));
+                (i, [Some(own), against])
+            })
+            .unzip();
+        let signals = &self.signals[record];
+        let (simulated, columns) =
+            derivatives(self.model, values, self.rounding, signals, &slopes)?;
         let mut jacobian: Vec<Vec<f64>> = vec![Vec::new(); self.axes.len()];
-        let mut simulated = None;
-        let mut rest = &smooth[..];
-        while !rest.is_empty() {
-            let at_once = if rest.len() < MANY {
-                rest.len()
-            } else {
-                FEW - 1
-            };
-            let chunk;
-            (chunk, rest) = rest.split_at(at_once);
-            let (run, columns) = if chunk.len() < FEW {
-                self.sensitivities::<FEW>(values, record, chunk)?
-            } else {
-                self.sensitivities::<MANY>(values, record, chunk)?
-            };
-            simulated = Some(run);
-            for (axis, column) in chunk.iter().zip(columns) {
-                jacobian[*axis] = column;
-            }
+        for (axis, column) in smooth.into_iter().zip(columns) {
+            jacobian[axis] = column;
         }
-        let simulated = match simulated {
-            Some(run) => run,
-            None => self.run(values, record)?,
-        };
         let (measured, lead) = (self.measured[record], self.lead[record]);
         let residual = |(k, sim): (usize, &f64)| {
             if k < lead { 0.0 } else { measured[k] - sim }
         };
         let mut residual: Vec<f64> = simulated.iter().enumerate().map(residual).collect();
         for (axis, column) in self.axes.iter().zip(&mut jacobian) {
-            let Some(half) = axis.secant else { continue };
+            let Some(half) = axis.secant else {
+                let unscored = lead.min(column.len());
+                column[..unscored].fill(0.0);
+                continue;
+            };
             let at = |shift: f64| {
                 let mut moved = values.to_vec();
                 moved[axis.index] = (values[axis.index] + shift).clamp(axis.low, axis.high);
@@ -272,43 +258,76 @@ impl<'a> FreeRunProblem<'a> {
         }
         Some(Part { residual, jacobian })
     }
+}
 
-    /// y_sim of a record and its derivatives with respect to `axes`, less than `N`; `None` if it diverges.
-    fn sensitivities<const N: usize>(
-        &self,
-        values: &[f64],
-        record: usize,
-        axes: &[usize],
-    ) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
-        let (signals, lead) = (&self.signals[record], self.lead[record]);
-        let mut duals: Vec<Dual<N>> = values.iter().map(|v| Dual::constant(*v)).collect();
-        for (slot, axis) in axes.iter().enumerate() {
-            let axis = &self.axes[*axis];
-            let slope = axis.slope(values[axis.index]);
-            duals[axis.index] = duals[axis.index].with_slope(slot, slope);
-            if let Some(index) = axis.against {
-                duals[index] = duals[index].with_slope(slot, -1.0);
-            }
-        }
-        let mut y = Vec::with_capacity(signals.u.len());
-        // A clone of an empty vector has no room.
-        let mut columns: Vec<Vec<f64>> = (0..axes.len())
-            .map(|_| Vec::with_capacity(signals.u.len()))
-            .collect();
-        let simulator = Simulator::with_values(self.model, &duals, self.rounding);
-        let left = simulator.run(
-            signals,
-            #[inline(always)]
-            |k, output: &Output<Dual<N>>| {
-                y.push(output.measured.value());
-                for (column, slope) in pairs(&mut columns, output.measured.partials()) {
-                    column.push(if k < lead { 0.0 } else { *slope });
-                }
-                ControlFlow::Continue(())
-            },
-        );
-        left.is_none().then_some((y, columns))
+/// A derivative: up to two coordinates and how fast each of them moves.
+type Slopes = [Option<(usize, f64)>; 2];
+
+/// y_sim and its derivatives along `slopes`, in as few runs as possible; `None` if it diverges.
+fn derivatives(
+    model: &Model,
+    values: &[f64],
+    rounding: Rounding,
+    signals: &Signals<'_>,
+    slopes: &[Slopes],
+) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+    if slopes.is_empty() {
+        let simulator = Simulator::with_values(model, values, rounding);
+        return Some((simulator.readings(signals).ok()?, Vec::new()));
     }
+    let (mut simulated, mut columns, mut rest) = (Vec::new(), Vec::new(), slopes);
+    while !rest.is_empty() {
+        let at_once = if rest.len() < MANY {
+            rest.len()
+        } else {
+            FEW - 1
+        };
+        let chunk;
+        (chunk, rest) = rest.split_at(at_once);
+        let (run, own) = match at_once {
+            0..FEW => derivatives_at_once::<FEW>(model, values, rounding, signals, chunk)?,
+            FEW..SOME => derivatives_at_once::<SOME>(model, values, rounding, signals, chunk)?,
+            _ => derivatives_at_once::<MANY>(model, values, rounding, signals, chunk)?,
+        };
+        simulated = run;
+        columns.extend(own);
+    }
+    Some((simulated, columns))
+}
+
+/// [`derivatives`] along less than `N` slopes, in one run.
+fn derivatives_at_once<const N: usize>(
+    model: &Model,
+    values: &[f64],
+    rounding: Rounding,
+    signals: &Signals<'_>,
+    slopes: &[Slopes],
+) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+    let mut duals: Vec<Dual<N>> = values.iter().map(|v| Dual::constant(*v)).collect();
+    for (lane, moved) in slopes.iter().enumerate() {
+        for (index, slope) in moved.iter().flatten() {
+            duals[*index] = duals[*index].with_slope(lane, *slope);
+        }
+    }
+    let mut y = Vec::with_capacity(signals.u.len());
+    // A clone of an empty vector has no room.
+    let mut columns: Vec<Vec<f64>> = slopes
+        .iter()
+        .map(|_| Vec::with_capacity(signals.u.len()))
+        .collect();
+    let simulator = Simulator::with_values(model, &duals, rounding);
+    let left = simulator.run(
+        signals,
+        #[inline(always)]
+        |_, output: &Output<Dual<N>>| {
+            y.push(output.measured.value());
+            for (column, slope) in pairs(&mut columns, output.measured.partials()) {
+                column.push(*slope);
+            }
+            ControlFlow::Continue(())
+        },
+    );
+    left.is_none().then_some((y, columns))
 }
 
 impl LeastSquares for FreeRunProblem<'_> {
@@ -411,39 +430,8 @@ pub fn sensitivities(
     indices: &[usize],
 ) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
     let signals = Signals::of(model, record).ok()?;
-    let values = model.values();
-    let mut run = Vec::with_capacity(record.len());
-    let mut columns = Vec::with_capacity(indices.len());
-    // An empty chunk if only the run is wanted.
-    let none: [&[usize]; 1] = [&[]];
-    let chunks: Vec<&[usize]> = match indices {
-        [] => none.to_vec(),
-        indices => indices.chunks(FEW - 1).collect(),
-    };
-    for chunk in chunks {
-        let mut duals: Vec<Dual<FEW>> = values.iter().map(|v| Dual::constant(*v)).collect();
-        for (slot, index) in chunk.iter().enumerate() {
-            duals[*index] = duals[*index].with_slope(slot, 1.0);
-        }
-        // A clone of an empty vector has no room.
-        let mut own: Vec<Vec<f64>> = (0..chunk.len())
-            .map(|_| Vec::with_capacity(record.len()))
-            .collect();
-        run.clear();
-        let simulator = Simulator::with_values(model, &duals, Rounding::None);
-        let left = simulator.run(&signals, |_, output: &Output<Dual<FEW>>| {
-            run.push(output.measured.value());
-            for (column, slope) in pairs(&mut own, output.measured.partials()) {
-                column.push(*slope);
-            }
-            ControlFlow::Continue(())
-        });
-        if left.is_some() {
-            return None;
-        }
-        columns.append(&mut own);
-    }
-    Some((run, columns))
+    let slopes: Vec<Slopes> = indices.iter().map(|i| [Some((*i, 1.0)), None]).collect();
+    derivatives(model, &model.values(), Rounding::None, &signals, &slopes)
 }
 
 fn descend(

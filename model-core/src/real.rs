@@ -73,46 +73,46 @@ macro_rules! real {
         impl Real for $float {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
-            #[inline(always)]
+            #[inline]
             fn from_f64(value: f64) -> Self {
                 value as $float
             }
-            #[inline(always)]
+            #[inline]
             fn from_count(count: u32) -> Self {
                 count as $float
             }
-            #[inline(always)]
+            #[inline]
             fn value(self) -> f64 {
                 self as f64
             }
-            #[inline(always)]
+            #[inline]
             fn exp(self) -> Self {
                 $exp(self)
             }
-            #[inline(always)]
+            #[inline]
             fn sin(self) -> Self {
                 $sin(self)
             }
-            #[inline(always)]
+            #[inline]
             fn cos(self) -> Self {
                 $cos(self)
             }
-            #[inline(always)]
+            #[inline]
             fn sqrt(self) -> Self {
                 if self > 0.0 { $sqrt(self) } else { 0.0 }
             }
-            #[inline(always)]
+            #[inline]
             fn cbrt(self) -> Self {
                 $cbrt(self)
             }
-            #[inline(always)]
+            #[inline]
             fn round(self) -> i32 {
                 // Truncation and the remainder are exact, which adding 0.5 is not.
                 let whole = self as i32;
                 let rest = self - whole as $float;
                 whole.saturating_add((rest + rest) as i32)
             }
-            #[inline(always)]
+            #[inline]
             fn floor(self) -> i32 {
                 let whole = self as i32;
                 if (whole as $float) > self {
@@ -130,7 +130,7 @@ macro_rules! real {
 ///
 /// `libm::expf` takes twice the instructions, and a law that looks ahead calls it
 /// for every sample that it looks ahead.
-#[inline(always)]
+#[inline]
 fn single_exp(x: f32) -> f32 {
     const HIGHEST: f32 = 88.722_84;
     const LOWEST: f32 = -87.336_54;

@@ -221,7 +221,6 @@ impl<T: Real> Bilinear<'_, T> {
     }
 
     /// [`next`](Self::next) for one input and a grading other than proportional.
-    #[inline(always)]
     fn graded(&self, drive: T, known: &Known<T>, horizon: usize, y: &impl Past<T>, jet: T) -> T {
         let pace = self.pace();
         let limit = pace.order;

@@ -105,6 +105,7 @@ mod tests {
         }
         assert!(Published::of("gremlin").is_none());
     }
+
     /// Hidden effects change the strength of the jets continuously, and the flows still answer pulses.
     #[test]
     fn every_flow_answers_pulses_through_every_effect() {

@@ -6,6 +6,7 @@ use super::{CodegenError, spec_of};
 use crate::model::{Added, CommandRange, Footprint, Model};
 use crate::user_effect::{number, rust_module};
 use model_core::effect::{RustType, Setting};
+use model_core::effects::LONGEST_BUFFER;
 use model_core::recursion::{Grading, LagConvention};
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
@@ -165,7 +166,7 @@ fn path(text: &str) -> Result<TokenStream, CodegenError> {
 /// with index `time` is.
 pub(super) fn buffer(model: &Model, added: &Added, time: usize) -> usize {
     let time = added.parameters.get(time).copied().unwrap_or(0.0) / model.sample_period_s;
-    time as usize + 3
+    (time as usize).saturating_add(3).min(LONGEST_BUFFER)
 }
 
 pub(super) fn coefficients(model: &Model, law: &Written) -> TokenStream {

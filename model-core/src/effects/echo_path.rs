@@ -1,5 +1,6 @@
 //! A delayed second arrival of part of the jet.
 
+use super::LONGEST_BUFFER;
 use crate::delay::Tap;
 use crate::effect::{
     Amplitude, Effect, Instant, Parameter, Physics, Place, RustType, Setting, Spec, Unit, take,
@@ -11,7 +12,7 @@ use core::marker::PhantomData;
 /// [`Echo`] with d of at most `LEN` − 2 samples.
 pub type EchoPath<T, const LEN: usize> = Echo<T, DelayLine<T, LEN>>;
 
-/// j(t) = v(t) + g·v(t − d), with v remembered by `M`.
+/// j(t) = v(t) + g·v(t − d), with v remembered by `M`, for d of at most [`LONGEST_BUFFER`] − 2 samples; without echo beyond.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Echo<T, M> {
     gain: T,
@@ -22,7 +23,7 @@ pub struct Echo<T, M> {
 impl<T: Real, M: Reaching<T>> Effect<T> for Echo<T, M> {
     type State = M;
     fn start(&self) -> M {
-        M::reaching(self.delay.whole + 1)
+        M::reaching(self.delay.whole.saturating_add(1).min(LONGEST_BUFFER - 1))
     }
     #[inline(always)]
     fn jet(&self, past: &mut M, jet: T, _at: &Instant<'_, T>) -> T {

@@ -42,6 +42,9 @@ use crate::effect::{Effect, Flow, Instant, Physics, Place, Setting, Spec};
 use crate::history::{DelayLine, Reaching};
 use crate::real::Real;
 
+/// Longest memory of an effect, samples: half a second at 0.13 ms a sample.
+pub const LONGEST_BUFFER: usize = 4096;
+
 macro_rules! delay_laws {
     ($($file:ident :: $law:ident),+ $(,)?) => {
         $(pub use $file::$law;)+

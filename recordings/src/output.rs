@@ -53,29 +53,15 @@ fn write_once(
     path: &Path,
     write: &mut dyn FnMut(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), OutputError> {
-    let failed = |cause: io::Error| OutputError::Io {
-        path: path.to_path_buf(),
-        cause,
-    };
-    let target = match fs::canonicalize(path) {
-        Ok(existing) => existing,
-        Err(e) if e.kind() == io::ErrorKind::NotFound => path.to_path_buf(),
-        Err(e) => return Err(failed(e)),
-    };
-    if target.is_dir() || target.file_name().is_none() {
-        return Err(OutputError::NoFileName {
-            path: path.to_path_buf(),
-        });
-    }
+    let failed = failed(path);
+    let target = target(path)?;
     if target.exists() && !target.is_file() {
         let mut device = BufWriter::new(File::options().write(true).open(&target).map_err(failed)?);
         return write(&mut device)
             .and_then(|()| device.flush())
             .map_err(failed);
     }
-    let mut temporary = permitted(tempfile::Builder::new().prefix(".host-fit-"), 0o666)
-        .tempfile_in(parent_of(&target))
-        .map_err(|e| failed(without_temporary_name(e)))?;
+    let mut temporary = temporary(&target).map_err(failed)?;
     {
         let mut buffered = BufWriter::with_capacity(1 << 16, temporary.as_file_mut());
         write(&mut buffered)
@@ -85,6 +71,49 @@ fn write_once(
     temporary.as_file().sync_all().map_err(failed)?;
     temporary.persist(&target).map_err(|e| failed(e.error))?;
     Ok(())
+}
+
+/// Refuses an output that [`write_atomic`] could not write now; what is there stays as it is. For commands that work long
+/// before they write.
+///
+/// # Errors
+/// [`OutputError`] as of [`write_atomic`].
+pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+    let target = target(path)?;
+    if target.exists() && !target.is_file() {
+        let device = File::options().write(true).open(&target);
+        return device.map(drop).map_err(failed(path));
+    }
+    temporary(&target).map(drop).map_err(failed(path))
+}
+
+fn failed(path: &Path) -> impl Fn(io::Error) -> OutputError + Copy {
+    |cause| OutputError::Io {
+        path: path.to_path_buf(),
+        cause,
+    }
+}
+
+/// What is written where `path` is asked for.
+fn target(path: &Path) -> Result<PathBuf, OutputError> {
+    let target = match fs::canonicalize(path) {
+        Ok(existing) => existing,
+        Err(e) if e.kind() == io::ErrorKind::NotFound => path.to_path_buf(),
+        Err(e) => return Err(failed(path)(e)),
+    };
+    if target.is_dir() || target.file_name().is_none() {
+        return Err(OutputError::NoFileName {
+            path: path.to_path_buf(),
+        });
+    }
+    Ok(target)
+}
+
+/// An empty file beside `target`, which goes with the value.
+fn temporary(target: &Path) -> io::Result<tempfile::NamedTempFile> {
+    permitted(tempfile::Builder::new().prefix(".host-fit-"), 0o666)
+        .tempfile_in(parent_of(target))
+        .map_err(without_temporary_name)
 }
 
 /// Several output files that belong together: written into a temporary folder beside the target, moved in together.
@@ -103,10 +132,7 @@ impl Staging {
     /// # Errors
     /// [`OutputError`] when `target` is a file, or no folder can be made beside it.
     pub fn new(target: &Path) -> Result<Self, OutputError> {
-        let failed = |cause: io::Error| OutputError::Io {
-            path: target.to_path_buf(),
-            cause,
-        };
+        let failed = failed(target);
         let real = match fs::canonicalize(target) {
             Ok(existing) if existing.is_dir() => existing,
             Ok(_) => return Err(failed(io::Error::from(io::ErrorKind::NotADirectory))),
@@ -293,6 +319,22 @@ mod tests {
             .collect();
         names.sort();
         names
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_refused_before_the_work() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("model.toml");
+        check_writable(&file).unwrap();
+        assert!(entries(folder.path()).is_empty());
+        fs::write(&file, "kept").unwrap();
+        check_writable(&file).unwrap();
+        assert_eq!(fs::read_to_string(&file).unwrap(), "kept");
+        let nowhere = folder.path().join("no/model.toml");
+        let said = check_writable(&nowhere).unwrap_err().to_string();
+        assert!(said.contains("no/model.toml cannot be written"), "{said}");
+        let error = check_writable(folder.path()).unwrap_err();
+        assert!(matches!(error, OutputError::NoFileName { .. }), "{error}");
     }
 
     fn full_disk(w: &mut dyn Write) -> io::Result<()> {

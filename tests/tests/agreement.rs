@@ -70,6 +70,7 @@ starts = [0.1]
     let case = Case {
         name: "hostile".to_owned(),
         model: model.clone(),
+        is_bundled: false,
     };
     for tool in Tool::ALL.into_iter().filter(|tool| tool.is_installed()) {
         let folder = tempfile::tempdir().expect("a folder");

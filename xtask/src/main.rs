@@ -8,6 +8,7 @@ mod book;
 mod browser;
 mod budgets;
 mod campaigns;
+mod changelog;
 mod ci;
 mod elf;
 mod examples;
@@ -48,6 +49,7 @@ const TASKS: &[Task] = &[
     bench_search::TASK,
     book::TASK,
     browser::TASK,
+    changelog::TASK,
     ci::TASK,
     examples::TASK,
     faults::TASK,

@@ -1,6 +1,6 @@
 //! Constants of an identified model. Generated; edit the model file instead.
 //!
-//! - tool: host-fit 0.1.0
+//! - tool: host-fit 0.2.0
 //! - structure: averaged model, N1 = 2, N2 = 2, N3 = 2, window 250 samples, one-step lags (lag 1 is y_k)
 //! - units: y is the normalised friction gain, u is 0 or 1, delays and lags are samples of 0.001 s
 

@@ -1,6 +1,6 @@
 //! Constants of an identified model. Generated; edit the model file instead.
 //!
-//! - tool: host-fit 0.1.0
+//! - tool: host-fit 0.2.0
 //! - structure: full model, N1 = 1, N2 = 1, N3 = 1, window 20 samples, one-step lags (lag 1 is y_k)
 //! - command: 2.0 is no jet, 7.0 a full one; in Rust the model takes `share(command)`
 //! - units: y is the normalised friction gain, u is 0 or 1, delays and lags are samples of 0.001 s

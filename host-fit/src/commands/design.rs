@@ -14,7 +14,7 @@ use super::average::{not_negative, positive};
 use super::drawings::{margin_picture, proof_picture};
 use super::time_span::TimeSpan;
 use super::tried::Tried;
-use super::{Console, page, rig_constants};
+use super::{Console, check_outputs, page, rig_constants};
 use crate::plants::Plants;
 
 /// Design an on/off law for the valve from a model and write it into the model file.
@@ -339,6 +339,8 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
             .error(clap::error::ErrorKind::MissingRequiredArgument, problem)
             .exit();
     }
+    let outputs = [&args.output].into_iter().chain(&args.report);
+    check_outputs(outputs.chain(&args.picture).chain(&args.csv))?;
     let model = Model::load(&args.model)?;
     check_period(&model).with_context(|| format!("no law for {}", args.model.display()))?;
     let set = args.dataset.as_deref().map(DataSet::load).transpose()?;

@@ -9,7 +9,7 @@ use host_fit::steps;
 
 use super::effect_files::EffectFiles;
 use super::load::ModelAndData;
-use super::{Console, page};
+use super::{Console, check_outputs, page};
 
 /// Find the physical effect that a model lacks, by the error of its free run on the validation records.
 ///
@@ -56,6 +56,7 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
+    check_outputs(args.output.iter().chain(&args.report))?;
     let (mut model, set) = args.from.load()?;
     args.define(&mut model)?;
     let mut finding = steps::diagnose(&model, &set, &args.options(), &console.watch())?;

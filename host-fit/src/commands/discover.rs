@@ -11,7 +11,7 @@ use host_fit::steps;
 use super::effect_files::EffectFiles;
 use super::effect_names::EffectName;
 use super::load::ModelAndData;
-use super::{Console, page};
+use super::{Console, check_outputs, page};
 
 /// Find a missing term outside the catalogue: where it acts, what it depends on, its curve and a formula.
 ///
@@ -74,6 +74,8 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
+    let outputs = args.output.iter().chain(&args.report);
+    check_outputs(outputs.chain(&args.effect_out).chain(&args.trace))?;
     let (mut model, set) = args.from.load()?;
     let options = args.prepare(&mut model)?;
     let mut found = steps::discover(&model, &set, &options, &console.watch())?;

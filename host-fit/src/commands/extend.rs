@@ -9,7 +9,7 @@ use host_fit::steps;
 use super::effect_files::EffectFiles;
 use super::effect_names::EffectName;
 use super::load::{ModelAndData, shell_word};
-use super::{Console, page};
+use super::{Console, check_outputs, page};
 
 /// Add physical effects to a model, refit everything, and show the validation error before and after.
 ///
@@ -45,6 +45,7 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
+    check_outputs([&args.output].into_iter().chain(&args.report))?;
     let (mut model, set) = args.from.load()?;
     args.define(&mut model)?;
     let mut extension = steps::extend(&model, &set, &args.effect, &console.show_progress())?;

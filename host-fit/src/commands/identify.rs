@@ -14,7 +14,7 @@ use super::effect_files::EffectFiles;
 use super::effect_names::EffectName;
 use super::load::shell_word;
 use super::time_span::{NotATime, TimeSpan};
-use super::{Console, page};
+use super::{Console, check_outputs, page};
 
 /// Identify a model: structure chosen by validation error, or with the counts of lags that are given.
 ///
@@ -223,6 +223,7 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
+    check_outputs([&args.output].into_iter().chain(&args.report))?;
     let set = DataSet::load(&args.dataset)?;
     let request = args.request(set.sample_period_s)?;
     let mut found = steps::identify(&set, &request, &console.watch())?;

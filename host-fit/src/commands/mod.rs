@@ -4,12 +4,13 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{self, IsTerminal, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use anyhow::Context;
 use host_fit::data::{visible, visible_json};
+use host_fit::output::check_writable;
 use host_fit::search::Snapshot;
 use host_fit::steps::Onlooker;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -194,6 +195,14 @@ pub(crate) fn paragraph(error: &anyhow::Error) -> String {
         }
     }
     text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Refuses outputs that cannot be written, before the work and not after it.
+pub(crate) fn check_outputs<'a>(
+    files: impl IntoIterator<Item = &'a PathBuf>,
+) -> anyhow::Result<()> {
+    let mut files = files.into_iter();
+    Ok(files.try_for_each(|file| check_writable(file))?)
 }
 
 /// Prints a text and a line end, with control characters escaped: names in it come from files.

@@ -21,16 +21,10 @@ pub enum FailureCoordinate {
     LevelOfU,
     /// Rate of change of the model's output, y/s; for graded commands.
     RateOfY,
-    /// Fraction of the last `window_s` seconds in which the valve was open.
-    Blowing {
-        /// Window length, s.
-        window_s: f64,
-    },
-    /// Mean of the command over the last `window_s` seconds; for graded commands.
-    MeanInput {
-        /// Window length, s.
-        window_s: f64,
-    },
+    /// Fraction of a window of the past in which the valve was open.
+    Blowing(Window),
+    /// Mean of the command over a window of the past; for graded commands.
+    MeanInput(Window),
     /// Time since the record began, s.
     TimeInRecord,
     /// A measured channel, in its own unit.
@@ -49,6 +43,22 @@ pub enum FailureCoordinate {
     FrequencyBand,
 }
 
+/// A stretch of the past.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// Its samples, at least 1.
+    pub samples: usize,
+    /// Time between them, s.
+    pub period_s: f64,
+}
+
+impl std::fmt::Display for Window {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let seconds = self.samples as f64 * self.period_s;
+        write!(f, "{} s", significant(seconds, 3))
+    }
+}
+
 impl FailureCoordinate {
     /// Unit of its values; empty for a pure number and for channels.
     #[must_use]
@@ -59,8 +69,8 @@ impl FailureCoordinate {
             Self::LevelOfU => "u",
             Self::RateOfY => "y/s",
             Self::FrequencyBand => "Hz",
-            Self::Blowing { .. }
-            | Self::MeanInput { .. }
+            Self::Blowing(_)
+            | Self::MeanInput(_)
             | Self::Channel(_)
             | Self::PulseNumber
             | Self::PulseInCycle { .. } => "",
@@ -76,9 +86,7 @@ impl FailureCoordinate {
             | Self::Channel(_)
             | Self::PulseNumber
             | Self::PulseInCycle { .. } => true,
-            Self::Blowing { window_s } | Self::MeanInput { window_s } => {
-                *window_s >= RULES.slow_window_s
-            }
+            Self::Blowing(window) | Self::MeanInput(window) => window.samples >= RULES.slow_window,
             Self::SinceRisingEdge
             | Self::SinceFallingEdge
             | Self::LevelOfY
@@ -127,8 +135,8 @@ impl FailureCoordinate {
             }
             Self::LevelOfU
             | Self::RateOfY
-            | Self::Blowing { .. }
-            | Self::MeanInput { .. }
+            | Self::Blowing(_)
+            | Self::MeanInput(_)
             | Self::Channel(_) => format!("at {self} between {low} and {high}"),
         }
     }
@@ -152,8 +160,8 @@ impl fmt::Display for FailureCoordinate {
             Self::LevelOfY => f.write_str("level of y"),
             Self::LevelOfU => f.write_str("level of u"),
             Self::RateOfY => f.write_str("rate of change of y"),
-            Self::Blowing { window_s } => write!(f, "blowing in the last {window_s} s"),
-            Self::MeanInput { window_s } => write!(f, "mean input over the last {window_s} s"),
+            Self::Blowing(window) => write!(f, "blowing in the last {window}"),
+            Self::MeanInput(window) => write!(f, "mean input over the last {window}"),
             Self::TimeInRecord => f.write_str("time in the record"),
             Self::Channel(name) => write!(f, "channel {name}"),
             Self::PulseNumber => f.write_str("pulse number"),
@@ -175,12 +183,19 @@ impl Serialize for FailureCoordinate {
 #[cfg(test)]
 mod tests {
     use super::FailureCoordinate as C;
+    use super::Window;
 
     #[test]
     fn names_and_stretches_read_well() {
-        let long = C::Blowing { window_s: 4.0 };
+        let of = |samples| {
+            C::Blowing(Window {
+                samples,
+                period_s: 0.001,
+            })
+        };
+        let long = of(4000);
         assert_eq!(long.to_string(), "blowing in the last 4 s");
-        assert!(long.is_slow() && !C::Blowing { window_s: 0.25 }.is_slow());
+        assert!(long.is_slow() && !of(250).is_slow());
         assert_eq!(
             long.stretch(0.25, 1.0),
             "at blowing in the last 4 s between 0.25 and 1"

@@ -47,7 +47,7 @@ pub(super) fn floor(records: &[&Record], residual: &[Vec<f64>]) -> (Vec<Vec<f64>
 /// periods.
 fn by_repeats(record: &Record) -> Option<f64> {
     let period = command_period(&record.u)?;
-    let history = (RULES.history_s / record.sample_period_s).round().max(1.0) as usize;
+    let history = RULES.history;
     let mut least: Option<f64> = None;
     for periods in 1..=RULES.periods_back {
         let shift = periods * period;

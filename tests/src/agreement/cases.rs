@@ -14,6 +14,8 @@ pub struct Case {
     pub name: String,
     /// The model.
     pub model: Model,
+    /// Whether the model is a file of this project.
+    pub is_bundled: bool,
 }
 
 fn root() -> PathBuf {
@@ -53,16 +55,26 @@ fn base() -> Model {
 #[must_use]
 pub fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
-    let mut add = |name: String, model: Model| cases.push(Case { name, model });
     for folder in ["data/paper", "firmware/identified/models"] {
         for path in files(folder) {
             let name = path.file_stem().unwrap_or_default().to_string_lossy();
             // The rig file is not a model.
             if name != "rig" {
-                add(name.into_owned(), Model::load(&path).expect("a model"));
+                cases.push(Case {
+                    name: name.into_owned(),
+                    model: Model::load(&path).expect("a model"),
+                    is_bundled: true,
+                });
             }
         }
     }
+    let mut add = |name: String, model: Model| {
+        cases.push(Case {
+            name,
+            model,
+            is_bundled: false,
+        });
+    };
     for spec in SPECS.iter().chain(NUISANCES) {
         if spec.place == Place::Delay {
             continue;

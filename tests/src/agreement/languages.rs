@@ -13,6 +13,8 @@ use std::process::{Command, Stdio};
 pub enum Tool {
     /// GCC.
     C,
+    /// GCC for a Cortex-M4F, and QEMU.
+    Board,
     /// Python 3 with NumPy.
     Python,
     /// GNU Octave.
@@ -21,11 +23,12 @@ pub enum Tool {
 
 impl Tool {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::C, Self::Python, Self::Octave];
+    pub const ALL: [Self; 4] = [Self::C, Self::Board, Self::Python, Self::Octave];
 
-    fn command(self) -> Command {
+    pub(super) fn command(self) -> Command {
         match self {
             Self::C => Command::new("gcc"),
+            Self::Board => Command::new("arm-none-eabi-gcc"),
             Self::Python => Command::new(python()),
             Self::Octave => {
                 let mut octave = Command::new("octave-cli");
@@ -44,21 +47,19 @@ impl Tool {
         } else {
             command.arg("--version");
         }
-        let run = command.stdout(Stdio::null()).stderr(Stdio::null()).status();
-        run.is_ok_and(|status| status.success())
+        let mut qemu = Command::new("qemu-system-arm");
+        runs(&mut command) && (self != Self::Board || runs(qemu.arg("--version")))
     }
+}
+
+fn runs(command: &mut Command) -> bool {
+    let run = command.stdout(Stdio::null()).stderr(Stdio::null()).status();
+    run.is_ok_and(|status| status.success())
 }
 
 /// The first Python on the path with NumPy, or the system's.
 fn python() -> &'static str {
-    let has = |program: &str| {
-        let mut command = Command::new(program);
-        command
-            .args(["-c", "import numpy"])
-            .stdout(Stdio::null())
-            .stderr(Stdio::null());
-        command.status().is_ok_and(|status| status.success())
-    };
+    let has = |program: &str| runs(Command::new(program).args(["-c", "import numpy"]));
     if has("python3") {
         "python3"
     } else {
@@ -90,46 +91,52 @@ pub fn run(tool: Tool, cases: &[Case], folder: &Path) -> Result<Vec<Row>> {
         write_inputs(folder, i, vectors)?;
     }
     let mut rows = Vec::new();
-    let mut judge = |case: &Case, language, said: &Said, expected: &Said, most: f64| {
-        let largest = expected[0]
-            .iter()
-            .chain(&expected[1])
-            .fold(1e-9_f64, |m, y| m.max(y.abs()));
-        let mut difference = 0.0_f64;
-        for (said, expected) in said.iter().zip(expected) {
-            if said.len() != expected.len() {
-                difference = f64::INFINITY;
-            }
+    let mut judge =
+        |case: &Case, language, (said, instructions): (&Said, _), expected: &Said, most: f64| {
+            let largest = expected[0]
+                .iter()
+                .chain(&expected[1])
+                .fold(1e-9_f64, |m, y| m.max(y.abs()));
+            let mut difference = 0.0_f64;
             for (said, expected) in said.iter().zip(expected) {
-                let off = (said - expected).abs() / largest;
-                difference = if off.is_nan() {
-                    f64::INFINITY
-                } else {
-                    difference.max(off)
-                };
+                if said.len() != expected.len() {
+                    difference = f64::INFINITY;
+                }
+                for (said, expected) in said.iter().zip(expected) {
+                    let off = (said - expected).abs() / largest;
+                    difference = if off.is_nan() {
+                        f64::INFINITY
+                    } else {
+                        difference.max(off)
+                    };
+                }
             }
-        }
-        rows.push(Row {
-            case: case.name.clone(),
-            language,
-            difference,
-            agrees: difference <= most,
-        });
+            rows.push(Row {
+                case: case.name.clone(),
+                language,
+                difference,
+                agrees: difference <= most,
+                instructions,
+            });
+        };
+    let compiled = match tool {
+        Tool::C => &[(Precision::Single, "C f32"), (Precision::Double, "C f64")][..],
+        // A board computes in single precision.
+        Tool::Board => &[(Precision::Single, "C board")],
+        Tool::Python | Tool::Octave => &[],
     };
-    if tool == Tool::C {
-        for (i, case) in cases.iter().enumerate() {
-            for (precision, language) in
-                [(Precision::Single, "C f32"), (Precision::Double, "C f64")]
-            {
-                let said = c(case, i, precision, folder)
-                    .with_context(|| format!("{}, {language}", case.name))?;
-                let expected = match precision {
-                    Precision::Single => expected::<f32>(case, &vectors[i]),
-                    Precision::Double => expected::<f64>(case, &vectors[i]),
-                };
-                judge(case, language, &said, &expected, 0.0);
-            }
+    for (i, case) in cases.iter().enumerate() {
+        for &(precision, language) in compiled {
+            let (said, instructions) = c(tool, case, i, precision, folder)
+                .with_context(|| format!("{}, {language}", case.name))?;
+            let expected = match precision {
+                Precision::Single => expected::<f32>(case, &vectors[i]),
+                Precision::Double => expected::<f64>(case, &vectors[i]),
+            };
+            judge(case, language, (&said, instructions), &expected, 0.0);
         }
+    }
+    if !compiled.is_empty() {
         return Ok(rows);
     }
     let (language, text) = match tool {
@@ -145,7 +152,7 @@ pub fn run(tool: Tool, cases: &[Case], folder: &Path) -> Result<Vec<Row>> {
         judge(
             case,
             language,
-            &own,
+            (&own, None),
             &expected::<f64>(case, vectors),
             TOLERANCE,
         );
@@ -185,7 +192,7 @@ fn blocks(text: &str) -> Vec<Vec<f64>> {
     blocks.map(numbers).collect()
 }
 
-fn output(command: &mut Command) -> Result<String> {
+pub(super) fn output(command: &mut Command) -> Result<String> {
     let done = command.output().context("the tool does not start")?;
     ensure!(
         done.status.success(),
@@ -199,58 +206,85 @@ fn output(command: &mut Command) -> Result<String> {
     Ok(String::from_utf8(done.stdout)?)
 }
 
-fn c(case: &Case, i: usize, precision: Precision, folder: &Path) -> Result<Said> {
-    let model = portable::c(&case.model, precision)?;
+/// C99 as the page of exports promises it.
+pub(super) const C: [&str; 9] = [
+    "-std=c99",
+    "-O2",
+    "-ffp-contract=off",
+    "-Wall",
+    "-Wextra",
+    "-pedantic",
+    "-Werror",
+    "-Wno-misleading-indentation",
+    "-Wno-type-limits",
+];
+const CORTEX_M4F: [&str; 6] = [
+    "-DBOARD",
+    "-mcpu=cortex-m4",
+    "-mthumb",
+    "-mfloat-abi=hard",
+    "-mfpu=fpv4-sp-d16",
+    "--specs=rdimon.specs",
+];
+const BOARD_START: &str = include_str!("board.c");
+const BOARD_MEMORY: &str = include_str!("board.ld");
+
+/// What case `i` says in C, and on a board the instructions of a sample.
+fn c(
+    tool: Tool,
+    case: &Case,
+    i: usize,
+    precision: Precision,
+    folder: &Path,
+) -> Result<(Said, Option<f64>)> {
     let vectors = Vectors::of(&case.model);
-    let channels = vectors.channels[0].len();
-    let law = match &case.model.law {
-        None => "",
-        Some(Law::Track(_)) => {
-            "f = fopen(argv[2], \"r\"); printf(\"=\\n\"); law_reset();\n\
-             while (fscanf(f, \"%lf\", &x[0]) == 1) { struct law_decision d = law_step((real)x[0], NULL); printf(\"%.17g\\n\", (double)d.estimate); }\n\
-             rewind(f); printf(\"=\\n\"); law_reset();\n\
-             while (fscanf(f, \"%lf\", &x[0]) == 1) { printf(\"%d\\n\", law_step((real)x[0], NULL).on); }\nfclose(f);"
-        }
-        Some(Law::Maximise(_)) => {
-            "printf(\"=\\n\"); for (i = 0; i < 320; i++) { printf(\"0\\n\"); } printf(\"=\\n\"); law_reset(); \
-             for (i = 0; i < 320; i++) { printf(\"%d\\n\", law_step()); }"
-        }
-    };
     let [u, y] = vectors.before;
-    let main = format!(
-        "{model}\n#include <stdio.h>\nint main(int argc, char **argv)\n{{\n    double x[{width}]; real v[{width}]; int i, held;\n    \
-         FILE *f;\n    (void)argc; (void)x; (void)v; (void)i;\n    for (held = 0; held < 2; held++) {{\n        \
-         f = fopen(argv[1], \"r\");\n        printf(\"=\\n\");\n        for (i = 0; ; i++) {{\n            int n = 0, got = 1;\n            \
-         while (n < {width} && got == 1) {{ got = fscanf(f, \"%lf\", &x[n]); n++; }}\n            if (got != 1) break;\n            \
-         for (n = 1; n < {width}; n++) v[n - 1] = (real)x[n];\n            \
-         if (i == 0) {{ if (held) model_hold((real){u:?}, (real){y:?}, v); else model_reset(); }}\n            \
-         printf(\"%.17g\\n\", (double)model_step((real)x[0], {given}));\n        }}\n        fclose(f);\n    }}\n    {law}\n    return 0;\n}}\n",
-        width = channels + 1,
-        given = if channels == 0 { "NULL" } else { "v" },
+    let mut played = format!(
+        "#define WIDTH {}\n#define U_BEFORE (real){u:?}\n#define Y_BEFORE (real){y:?}\n",
+        vectors.channels[0].len() + 1
     );
-    let (source, program) = (folder.join("main.c"), folder.join("main"));
-    std::fs::write(&source, main)?;
-    let mut gcc = Command::new("gcc");
-    gcc.args([
-        "-std=c99",
-        "-O2",
-        "-ffp-contract=off",
-        "-Wall",
-        "-Wextra",
-        "-pedantic",
-        "-Werror",
-    ]);
-    gcc.args(["-Wno-misleading-indentation", "-Wno-type-limits", "-o"])
-        .arg(&program)
-        .arg(&source)
-        .arg("-lm");
-    output(&mut gcc)?;
-    let mut run = Command::new(&program);
-    run.arg(folder.join(format!("in{i}.txt")))
-        .arg(folder.join(format!("law{i}.txt")));
-    let mut said = blocks(&output(&mut run)?);
+    match &case.model.law {
+        None => {}
+        Some(Law::Track(_)) => played += "#define TRACKS\n",
+        Some(Law::Maximise(_)) => played += "#define PULSES 320\n",
+    }
+    let program = folder.join("main");
+    for (name, text) in [
+        ("case.h", played.as_str()),
+        ("model.c", &portable::c(&case.model, precision)?),
+        ("main.c", include_str!("main.c")),
+        ("board.c", BOARD_START),
+        ("board.ld", BOARD_MEMORY),
+    ] {
+        std::fs::write(folder.join(name), text)?;
+    }
+    let mut gcc = tool.command();
+    gcc.args(C).arg("-o").arg(&program).arg("main.c");
+    if tool == Tool::Board {
+        gcc.args(CORTEX_M4F).args(["-T", "board.ld", "board.c"]);
+    }
+    output(gcc.arg("-lm").current_dir(folder))?;
+    let (inputs, readings) = (format!("in{i}.txt"), format!("law{i}.txt"));
+    let mut run = if tool == Tool::Board {
+        let mut qemu = Command::new("qemu-system-arm");
+        qemu.args(["-machine", "mps2-an386", "-cpu", "cortex-m4"])
+            .args(["-icount", "shift=5,sleep=off", "-display", "none"])
+            .args(["-monitor", "none", "-serial", "null", "-kernel", "main"])
+            .arg("-semihosting-config")
+            .arg(format!(
+                "enable=on,target=native,arg=main,arg={inputs},arg={readings}"
+            ));
+        qemu
+    } else {
+        let mut run = Command::new(&program);
+        run.arg(inputs).arg(readings);
+        run
+    };
+    let mut said = blocks(&output(run.current_dir(folder))?);
+    let instructions = said.get(4).and_then(|list| list.first()).copied();
     said.resize(4, Vec::new());
-    Said::try_from(said).map_err(|_| anyhow::anyhow!("four blocks"))
+    let said = Said::try_from(said).map_err(|_| anyhow::anyhow!("four blocks"))?;
+    Ok((said, instructions))
 }
 
 fn interpreted_python(cases: &[Case], folder: &Path) -> Result<String> {

@@ -3,10 +3,12 @@
 
 mod cases;
 mod languages;
+mod pace;
 mod vectors;
 
 pub use cases::{Case, cases};
 pub use languages::{Tool, run};
+pub use pace::{Pace, pace};
 pub use vectors::Vectors;
 
 /// Tolerance for Python and Octave, relative to the largest |y|.
@@ -23,4 +25,6 @@ pub struct Row {
     pub difference: f64,
     /// Whether it is within the promised tolerance.
     pub agrees: bool,
+    /// Instructions of a sample, where a board ran it.
+    pub instructions: Option<f64>,
 }

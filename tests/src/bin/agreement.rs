@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 use clap::Parser;
-use scenarios::agreement::{Tool, cases, run};
+use scenarios::agreement::{Pace, Tool, cases, pace, run};
 use std::process::ExitCode;
 
 /// Runs every bundled model, effect, delay law and control law in C, Python and Octave and compares with the
@@ -13,6 +13,9 @@ struct Arguments {
     /// Fail if a language's tool is not installed.
     #[arg(long)]
     all: bool,
+    /// Times a million samples of the bundled models in each language instead.
+    #[arg(long)]
+    pace: bool,
     /// Only cases whose names contain this.
     #[arg(long, default_value = "")]
     only: String,
@@ -23,6 +26,23 @@ fn main() -> Result<ExitCode> {
     let mut cases = cases();
     cases.retain(|case| case.name.contains(&arguments.only));
     let folder = tempfile::tempdir()?;
+    if arguments.pace {
+        cases.retain(|case| case.is_bundled);
+        println!(
+            "{:<28} {:>8} {:>8} {:>8} {:>9}",
+            "seconds for 10^6 samples", "Rust", "C", "C / Rust", "Python"
+        );
+        for case in &cases {
+            let Pace { rust, c, python } = pace(case, folder.path())?;
+            let python = python.map_or("-".to_owned(), |s| format!("{s:.2}"));
+            println!(
+                "{:<28} {rust:>8.3} {c:>8.3} {:>8.2} {python:>9}",
+                case.name,
+                c / rust
+            );
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
     let mut failed = 0;
     println!("{:<44} {:<8} {:>12}", "model", "language", "difference");
     for tool in Tool::ALL {
@@ -41,7 +61,14 @@ fn main() -> Result<ExitCode> {
             } else {
                 format!("{:.1e}", row.difference)
             };
-            println!("{:<44} {:<8} {said:>12}{mark}", row.case, row.language);
+            let instructions = row
+                .instructions
+                .map(|n| format!("{n:>8.0} instructions a sample"));
+            let instructions = instructions.unwrap_or_default();
+            println!(
+                "{:<44} {:<8} {said:>12}{instructions}{mark}",
+                row.case, row.language
+            );
         }
     }
     println!(

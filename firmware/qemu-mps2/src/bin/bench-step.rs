@@ -1,5 +1,5 @@
-//! Instructions of one step of Table II's model: this crate's and the C peer's,
-//! in one run. Sends a line over the serial line and stops.
+//! Instructions of one step of Table II's model: model-core's, those of C by hand and
+//! those of the exported C, in one run. Sends nine numbers over the serial line and stops.
 #![no_std]
 #![no_main]
 
@@ -15,6 +15,8 @@ const STEPS: u32 = 20_000;
 
 unsafe extern "C" {
     fn peer_step(command: i32) -> f32;
+    fn model_step(command: f32, channels: *const f32) -> f32;
+    fn model_reset();
 }
 
 #[inline(never)]
@@ -34,6 +36,9 @@ fn main() -> ! {
         let mut state = full::state(&full::model());
         let (mut own, mut peer, mut apart) = (0_u32, 0_u32, 0.0_f32);
         let (mut own_most, mut peer_most) = (0, 0);
+        let (mut exported, mut exported_most, mut differ) = (0_u32, 0, 0_u32);
+        // SAFETY: the exported model keeps its state to itself and is called from here only.
+        unsafe { model_reset() };
         for k in 0..STEPS {
             let on = command(k);
             let (ours, taken) = ticks.measure(|| own_step(&mut state, on));
@@ -43,6 +48,13 @@ fn main() -> ! {
             let (theirs, taken) = ticks.measure(|| unsafe { peer_step(on.into()) });
             peer += taken;
             peer_most = taken.max(peer_most);
+            let command = if on { 1.0 } else { 0.0 };
+            // SAFETY: as above; the model has no channels to read.
+            let step = || unsafe { model_step(command, core::ptr::null()) };
+            let (written, taken) = ticks.measure(step);
+            exported += taken;
+            exported_most = taken.max(exported_most);
+            differ += u32::from(written.to_bits() != ours.to_bits());
             let distance = if ours > theirs {
                 ours - theirs
             } else {
@@ -50,7 +62,10 @@ fn main() -> ! {
             };
             apart = if distance > apart { distance } else { apart };
         }
-        for word in [STEPS, own, peer, own_most, peer_most, (apart * 1e9) as u32] {
+        let apart = (apart * 1e9) as u32;
+        let sums = [STEPS, own, peer, exported];
+        let most = [own_most, peer_most, exported_most];
+        for word in sums.into_iter().chain(most).chain([apart, differ]) {
             uart.send(&word.to_le_bytes());
         }
     }

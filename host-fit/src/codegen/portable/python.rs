@@ -249,6 +249,10 @@ fn class(sheet: &Sheet<'_>) -> String {
     if average {
         w.push_str("        self.sum = self.fresh = 0.0\n        self.in_block = 0\n");
     }
+    let averaged = model.averaging.averaged_model;
+    if averaged {
+        w.push_str("        self.sums = [0.0] * (JETS + 1)  # of the jets so far\n");
+    }
     if sheet.clocked {
         w.push_str("        self.lived, self.since_edge, self.last_command = 0, 1 << 24, 0.0\n");
     }
@@ -291,6 +295,9 @@ fn class(sheet: &Sheet<'_>) -> String {
         effect(w, own, indent, "jet", "jet = ");
     }
     w.push_str("        jets.append(jet)\n");
+    if averaged {
+        w.push_str("        sums = self.sums\n        sums.append(sums[-1] + jet)\n");
+    }
     arriving(sheet, w);
     w.push_str("        reading = now\n");
     if sheet.at(Place::Sensor).next().is_some() {
@@ -306,9 +313,15 @@ fn class(sheet: &Sheet<'_>) -> String {
                     if self.in_block >= WINDOW - 1:\n            self.sum, self.fresh, self.in_block = self.fresh, 0.0, 0\n        \
                     else:\n            self.sum += y[-1] - y[-WINDOW]\n");
     }
+    // Sums stay small, and thereby exact.
+    let shorter = if averaged {
+        "            self.sums = [s - self.sums[-JETS - 1] for s in self.sums[-JETS - 1:]]\n"
+    } else {
+        ""
+    };
     let _ = write!(
         w,
-        "        y.append(flow)\n        if len(y) > 65536 + OUTPUTS:\n            del y[:-OUTPUTS]\n            del self.jets[:-JETS]\n\n    \
+        "        y.append(flow)\n        if len(y) > 65536 + OUTPUTS:\n            del y[:-OUTPUTS]\n            del self.jets[:-JETS]\n{shorter}\n    \
          def step(self, command, channels=USUAL):\n        \
          \"\"\"The reading at this sample, under the command from now to the next one; the model moves on.\"\"\"\n        \
          reading, _, following, _ = self.observe({share}, channels, True)\n        self.advance(following)\n        return reading\n\n    \
@@ -333,7 +346,7 @@ fn arriving(sheet: &Sheet<'_>, w: &mut String) {
     let read = |lag: &str, plus: usize| {
         let from = plus + 1;
         if model.averaging.averaged_model {
-            format!("sum(jets[-{from} - {lag} - WINDOW + 1:len(jets) - {plus} - {lag}]) / WINDOW")
+            format!("(sums[-{from} - {lag}] - sums[-{from} - {lag} - WINDOW]) / WINDOW")
         } else {
             format!("jets[-{from} - {lag}]")
         }

@@ -7,10 +7,10 @@ use super::place::{Entry, Place};
 use super::term::{Shape, Term};
 use crate::data::Record;
 use crate::model::Model;
+use crate::parallel;
 use crate::terms::{Chance, HeldOut, Noise, Screen, Search, Tangent};
 use crate::user_effect::Definition;
 use model_core::effects::ZERO_OFFSET;
-use rayon::prelude::*;
 
 /// A curve that was screened.
 pub(super) struct Screened {
@@ -248,7 +248,7 @@ impl<'a> Context<'a> {
         entries: &[Entry],
         make: impl Fn((Term, Model)) -> Option<T> + Sync,
     ) -> Vec<T> {
-        let each = coordinates.into_par_iter().map(|coordinate| {
+        let each = parallel::each(coordinates, |coordinate| {
             let Some(series) = values_of(&coordinate, self.model, &self.learning) else {
                 return Vec::new();
             };
@@ -263,7 +263,7 @@ impl<'a> Context<'a> {
             let shown = entries.iter().filter_map(shown);
             shown.filter_map(&make).collect::<Vec<_>>()
         });
-        each.flatten().collect()
+        each.into_iter().flatten().collect()
     }
 
     /// A curve of zeros over the coordinate's range, and the model with it.

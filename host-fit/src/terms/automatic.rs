@@ -12,10 +12,10 @@ use super::{Known, RULES};
 use crate::data::Record;
 use crate::excitation::bears_little;
 use crate::model::{Delay, Model};
+use crate::parallel;
 use crate::search::{Progress, Settings, StopReason};
 use crate::simulate::SimulateError;
 use model_core::effects::{ConstantDelay, SaturatingDelay};
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// From which level of y on, in inner units, a delay is tried as that of the attached flow …
@@ -118,11 +118,9 @@ pub fn base_model(
         true => linear::baselines(&given, &judge.learning(0)),
         false => Vec::new(),
     };
-    let linear = linear.into_par_iter();
-    let linear: Vec<Hypothesis> = linear
-        .filter_map(|model| judge.refitted(&model).ok())
-        .map(Hypothesis::new)
-        .collect();
+    let linear: Vec<Hypothesis> = parallel::some(&linear, |model| {
+        judge.refitted(model).ok().map(Hypothesis::new)
+    });
     let Some(root) = roots
         .iter()
         .min_by(by_score)
@@ -186,10 +184,7 @@ pub fn base_model(
         let tried: Vec<Model> = averaged
             .flat_map(|law| AVERAGES.map(|window| with_average(own, law, window)))
             .collect();
-        let tried = tried
-            .into_par_iter()
-            .filter_map(|model| judge.refitted(&model).ok());
-        let tried: Vec<Judged> = tried.collect();
+        let tried = parallel::some(&tried, |model| judge.refitted(model).ok());
         let best = tried
             .into_iter()
             .min_by(|a, b| a.size().total_cmp(&b.size()));

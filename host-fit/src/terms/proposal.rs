@@ -5,8 +5,8 @@ use super::screen::Screen;
 use super::table::{Candidate, Table};
 use super::term::Term;
 use crate::linalg::{dot, solve_symmetric};
+use crate::parallel;
 use model_core::effect::Place;
-use rayon::prelude::*;
 
 /// Terms to add together, with their predicted gain.
 #[derive(Clone, Debug)]
@@ -152,20 +152,17 @@ impl<'t> Sets<'t> {
             kept.for_each(|i| used[*i] = true);
             used
         };
-        let rows: Vec<Vec<(f64, f64)>> = (0..count)
-            .into_par_iter()
-            .map(|i| {
-                let wanted = |j: usize| used[i] && used[j] && j <= i;
-                let cell = |j: usize| {
-                    if wanted(j) {
-                        both(&columns[i], &columns[j])
-                    } else {
-                        (0.0, 0.0)
-                    }
-                };
-                (0..count).map(cell).collect()
-            })
-            .collect();
+        let rows: Vec<Vec<(f64, f64)>> = parallel::each(0..count, |i| {
+            let wanted = |j: usize| used[i] && used[j] && j <= i;
+            let cell = |j: usize| {
+                if wanted(j) {
+                    both(&columns[i], &columns[j])
+                } else {
+                    (0.0, 0.0)
+                }
+            };
+            (0..count).map(cell).collect()
+        });
         let products = (0..count * count)
             .map(|cell| {
                 let (i, j) = (cell / count, cell % count);

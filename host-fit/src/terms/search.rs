@@ -10,11 +10,11 @@ use super::table::{Table, has_jet_effect};
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, Known, fit, lean_base};
 use crate::model::{Model, Start};
+use crate::parallel;
 use crate::residual::NoiseSource;
 use crate::simulate::SimulateError;
 use model_core::effect::Spec;
 use model_core::effects::NUISANCES;
-use rayon::prelude::*;
 use std::cmp::Ordering;
 use std::sync::atomic::{AtomicBool, Ordering as Memory};
 
@@ -199,16 +199,13 @@ impl Search<'_> {
         if !self.judge.on_off {
             // Graded commands identify the response to jets of part strength.
             let others = self.judge.other_gradings(judged.model().grading);
-            let others: Vec<Judged> = others
-                .into_par_iter()
-                .filter_map(|grading| {
-                    let other = Model {
-                        grading,
-                        ..judged.model().clone()
-                    };
-                    self.judge.refitted(&other).ok()
-                })
-                .collect();
+            let others = parallel::some(others, |grading| {
+                let other = Model {
+                    grading,
+                    ..judged.model().clone()
+                };
+                self.judge.refitted(&other).ok()
+            });
             let better = others
                 .into_iter()
                 .min_by(|a, b| a.rmse().total_cmp(&b.rmse()));
@@ -518,21 +515,17 @@ impl Search<'_> {
         pool: &[(usize, Proposal)],
         width: usize,
     ) -> Vec<Hypothesis> {
-        let brief: Vec<Option<(f64, usize, Fit)>> = pool
-            .par_iter()
-            .enumerate()
-            .map(|(at, (index, proposal))| {
-                if self.interrupted() {
-                    return None;
-                }
-                let parent = &all[*index];
-                let fit = self.set_out(parent.judged.model(), proposal, RULES.brief)?;
-                let rmse = self.judge.held_out(|_| &fit.model).ok()?.rmse();
-                let cost: usize = proposal.terms.iter().map(Term::cost).sum();
-                Some((score(rmse, parent.cost() + cost), at, fit))
-            })
-            .collect();
-        let mut brief: Vec<(f64, usize, Fit)> = brief.into_iter().flatten().collect();
+        let mut brief: Vec<(f64, usize, Fit)> = parallel::some(0..pool.len(), |at| {
+            if self.interrupted() {
+                return None;
+            }
+            let (index, proposal) = &pool[at];
+            let parent = &all[*index];
+            let fit = self.set_out(parent.judged.model(), proposal, RULES.brief)?;
+            let rmse = self.judge.held_out(|_| &fit.model).ok()?.rmse();
+            let cost: usize = proposal.terms.iter().map(Term::cost).sum();
+            Some((score(rmse, parent.cost() + cost), at, fit))
+        });
         brief.sort_by(|a, b| a.0.total_cmp(&b.0));
         // Refitted in full in any case: the best without effects and the best on each screened model, for
         // which a brief fit says less. Proposals that converge to the same model are fitted once.
@@ -552,7 +545,7 @@ impl Search<'_> {
                 leading.push((at, fit));
             }
         }
-        let finished = leading.into_par_iter().map(|(at, fit)| {
+        let finished = parallel::each(leading, |(at, fit)| {
             let (index, proposal) = &pool[at];
             let terms = [all[*index].terms.clone(), proposal.terms.clone()].concat();
             let from_given = all[*index].from_given;
@@ -563,7 +556,7 @@ impl Search<'_> {
             });
             finished.collect::<Vec<_>>()
         });
-        finished.collect::<Vec<_>>().concat()
+        finished.concat()
     }
 
     /// The best of `finished` with another response to jets of part strength, if that lowers the error. Only
@@ -576,8 +569,8 @@ impl Search<'_> {
             return None;
         }
         let learning = self.judge.learning(0);
-        let others = self.judge.other_gradings(model.grading).into_par_iter();
-        let fits = others.filter_map(|grading| {
+        let others = self.judge.other_gradings(model.grading);
+        let fits = parallel::some(others, |grading| {
             let other = Model {
                 grading,
                 ..model.clone()
@@ -588,7 +581,6 @@ impl Search<'_> {
             };
             fit(&other, &learning, &options).ok()
         });
-        let fits: Vec<Fit> = fits.collect();
         let least = fits
             .into_iter()
             .min_by(|a, b| a.mean_square().total_cmp(&b.mean_square()))?;

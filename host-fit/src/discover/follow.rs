@@ -73,7 +73,7 @@ impl Finder<'_> {
         let mut all = self.finished(tried);
         progress(&format!("term {number}: the flow's lags beside it"));
         for candidate in self.leading(&mut all) {
-            let with = self.search.run(candidate.with, || None).best;
+            let with = self.search.run(candidate.with, None).best;
             let followed = Candidate::of(candidate.term, with);
             // At the noise level nothing can be better; equivalent alternatives are sought later.
             if self.at_the_floor(&followed) {
@@ -143,7 +143,7 @@ impl Finder<'_> {
             if other.size() > last.size() - RULES.twins || other.size() > reach {
                 break;
             }
-            let with = self.search.run(other.with.clone(), || None).best;
+            let with = self.search.run(other.with.clone(), None).best;
             let followed = Candidate::of(other.term.clone(), with);
             let better = followed.size() < other.size();
             last = if better { followed } else { other };

@@ -132,7 +132,7 @@ pub fn base_model(
     let root = Hypothesis::new(without_needless_law(&judge, root.judged.clone(), laws));
     progress("the same of second order");
     let second = second_order(&judge, &root, may_be_constant);
-    let mut found = search.run(root, || second);
+    let mut found = search.run(root, Some(&|| second.clone()));
     // Input coefficients of both signs (a zero, as of an inverse response) are outside first and second order: the search
     // starts again from such a model if it is clearly better than the best structure so far.
     let lead = |hypothesis: &&Hypothesis| {
@@ -143,7 +143,7 @@ pub fn base_model(
         && better.judged.size() + RULES.linear_better < found.best.judged.size()
     {
         let tried = found.tried;
-        found = search.run(better.clone(), || None);
+        found = search.run(better.clone(), None);
         found.tried += tried;
     }
     if let Some(plain) = plain_enough(&found) {
@@ -172,7 +172,7 @@ pub fn base_model(
                 ..Hypothesis::new(judged)
             };
             let tried = found.tried;
-            found = search.run(start, || None);
+            found = search.run(start, None);
             found.tried += tried;
         }
     }

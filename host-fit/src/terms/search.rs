@@ -96,6 +96,9 @@ pub(super) fn score(rmse: f64, cost: usize) -> f64 {
     rmse.ln() + RULES.price * cost as f64
 }
 
+/// Makes a second root of a search. Behind a reference: the search is compiled once for all its callers.
+pub(crate) type Second<'a> = &'a dyn Fn() -> Option<Hypothesis>;
+
 /// The result of a search.
 #[derive(Clone, Debug)]
 pub struct Found {
@@ -238,7 +241,7 @@ impl Search<'_> {
     /// follows the less promising candidates of the root and of the best hypothesis. Where the noise level is not
     /// reached, lags are searched anew beside the effects of the best hypothesis.
     #[must_use]
-    pub fn run(&self, root: Hypothesis, second: impl FnOnce() -> Option<Hypothesis>) -> Found {
+    pub fn run(&self, root: Hypothesis, second: Option<Second<'_>>) -> Found {
         self.run_within(root, second, &mut Effort::of_a_search())
     }
 
@@ -247,7 +250,7 @@ impl Search<'_> {
     pub fn run_within(
         &self,
         root: Hypothesis,
-        second: impl FnOnce() -> Option<Hypothesis>,
+        second: Option<Second<'_>>,
         effort: &mut Effort,
     ) -> Found {
         let (mut all, mut tried) = self.rounds(root, second, effort);
@@ -268,7 +271,7 @@ impl Search<'_> {
             && let Some(start) = self.without_lags(&found, &root)
         {
             (self.progress)("lags anew beside the effects");
-            let (anew, further) = self.rounds(start, || None, effort);
+            let (anew, further) = self.rounds(start, None, effort);
             tried += further;
             let other = &anew[best(&anew, |_| true)];
             if other.score() < found.score() - RULES.price {
@@ -290,11 +293,10 @@ impl Search<'_> {
     fn rounds(
         &self,
         root: Hypothesis,
-        second: impl FnOnce() -> Option<Hypothesis>,
+        mut second: Option<Second<'_>>,
         effort: &mut Effort,
     ) -> (Vec<Hypothesis>, usize) {
         let mut all = vec![root];
-        let mut second = Some(second);
         let mut tried = Vec::new();
         let (mut last, mut stalled, mut since) = (RULES.rounds, 0, None);
         let mut from_bound = 0;

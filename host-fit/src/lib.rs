@@ -75,6 +75,7 @@ pub mod terms;
 pub mod user_effect;
 
 mod linalg;
+mod order;
 mod parallel;
 
 pub use recordings as data;

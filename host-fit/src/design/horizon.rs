@@ -7,6 +7,7 @@
 
 use super::bench::Player;
 use super::rules::RULES;
+use crate::order;
 use crate::parallel;
 use crate::simulate::HostState;
 use model_core::control::HoldTimes;
@@ -126,7 +127,7 @@ impl HorizonSearch<'_> {
             let grown = parallel::each(&beam, grow).into_iter().flatten();
             let finite = |node: &Node| node.promise.is_finite();
             let mut grown: Vec<Node> = grown.filter(finite).collect();
-            grown.sort_by(|a, b| b.promise.total_cmp(&a.promise));
+            order::descending(&mut grown, |one| one.promise);
             let Some(first) = grown.first() else { break };
             if first.promise > best.0 {
                 best = (first.promise, first.completed.clone());

@@ -11,6 +11,7 @@ use super::horizon::{self, FlowState, Horizon};
 use super::rules::RULES;
 use super::train::{JudgedTrain, Played, Train, distinct};
 use crate::model::{Maximise, Model};
+use crate::order;
 use crate::parallel;
 use model_core::control::HoldTimes;
 use model_core::control::period::samples_at_least;
@@ -158,7 +159,7 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
     let moduli = [model.largest_pole(false)?, model.largest_pole(true)?];
     let mut candidates = search.grid();
     candidates.push(search.judge(&steady));
-    let best_first = |list: &mut Vec<JudgedTrain>| list.sort_by(|a, b| b.value.total_cmp(&a.value));
+    let best_first = |list: &mut Vec<JudgedTrain>| order::descending(list, |one| one.value);
     best_first(&mut candidates);
     // The best few are refined; they are rarely neighbours.
     let starts: Vec<JudgedTrain> = distinct(&candidates, RULES.refined);

@@ -9,6 +9,7 @@ use super::screening::{Context, Screened, diverse, reference};
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit};
 use crate::model::Model;
+use crate::order;
 use crate::parallel;
 use crate::terms::{self, Hypothesis};
 use std::sync::atomic::Ordering;
@@ -117,7 +118,7 @@ impl Finder<'_> {
     /// on the lowest-order base. On a high-order base the error is small with any term, because its lags
     /// imitate the right one.
     fn leading(&self, all: &mut [Candidate]) -> Vec<Candidate> {
-        all.sort_by(|a, b| a.size().total_cmp(&b.size()));
+        order::ascending(all, Candidate::size);
         let mut leading: Vec<Candidate> = Vec::new();
         let mut heirs = Heirs::of(RULES.settled);
         for one in all {
@@ -234,7 +235,7 @@ impl Finder<'_> {
             let rmse = judge.held_out(|_| &tried.brief.model).ok()?.rmse();
             Some((terms::size(rmse, &tried.brief.model), tried))
         });
-        rated.sort_by(|a, b| a.0.total_cmp(&b.0));
+        order::ascending(&mut rated, |one| one.0);
         let mut heirs = Heirs::of(RULES.finished);
         rated
             .retain(|(_, tried)| heirs.takes(kind(&tried.term, &tried.memory, &tried.brief.model)));

@@ -7,6 +7,7 @@ use super::place::{Entry, Place};
 use super::term::{Shape, Term};
 use crate::data::Record;
 use crate::model::Model;
+use crate::order;
 use crate::parallel;
 use crate::terms::{Chance, HeldOut, Noise, Screen, Search, Tangent};
 use crate::user_effect::Definition;
@@ -75,7 +76,7 @@ pub(super) fn reference(coordinate: &Coordinate, records: &[&Record]) -> Option<
 /// Quantiles of a coordinate with equal weights between them, and the index of the one nearest to the median.
 fn points(mut weighted: Vec<(f64, f64)>) -> Option<(Vec<f64>, usize)> {
     weighted.retain(|(x, weight)| x.is_finite() && *weight > 0.0);
-    weighted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    order::ascending(&mut weighted, |one| one.0);
     let mut whole = 0.0;
     let mut up_to = Vec::with_capacity(weighted.len());
     for (_, weight) in &weighted {
@@ -237,7 +238,7 @@ impl<'a> Context<'a> {
         let mut curves = self.each(coordinates, entries, |(term, with)| {
             self.screened(term, &with)
         });
-        curves.sort_by(|a, b| a.score.total_cmp(&b.score));
+        order::ascending(&mut curves, |one| one.score);
         curves
     }
 

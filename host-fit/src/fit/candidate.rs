@@ -6,6 +6,7 @@ use super::starts::starts;
 use super::{Fit, FitOptions, fit};
 use crate::data::Record;
 use crate::model::{Delay, Model};
+use crate::order;
 use crate::parallel;
 use model_core::effect::{Place, Spec};
 use model_core::recursion::Grading;
@@ -76,7 +77,7 @@ pub fn fit_with_effect(
             })
         });
         tried.extend(tried_briefly(regraded.collect(), records, options));
-        tried.sort_by(best_first);
+        order::ascending(&mut tried, Fit::mean_square);
     }
     let mut met = Vec::new();
     let leading = tried.iter().enumerate().filter(|(place, fit)| {
@@ -112,7 +113,7 @@ fn tried_briefly(models: Vec<Model>, records: &[&Record], options: &FitOptions) 
         ..*options
     };
     let mut fits = parallel::some(&models, |model| fit(model, records, &brief).ok());
-    fits.sort_by(best_first);
+    order::ascending(&mut fits, Fit::mean_square);
     fits
 }
 

@@ -4,7 +4,8 @@
 use super::RULES;
 use super::judge::Judged;
 use super::search::{Hypothesis, Search};
-use crate::fit::{FitOptions, fit, starts};
+use crate::fit::{Fit, FitOptions, fit, starts};
+use crate::order;
 use crate::parallel;
 use model_core::effect::Spec;
 
@@ -25,7 +26,7 @@ impl Search<'_> {
             };
             fit(&twice, &learning, &options).ok()
         });
-        brief.sort_by(|a, b| a.mean_square().total_cmp(&b.mean_square()));
+        order::ascending(&mut brief, Fit::mean_square);
         brief.truncate(RULES.followed);
         let both = parallel::some(&brief, |begun| self.judge.refitted(&begun.model).ok());
         both.into_iter()

@@ -10,6 +10,7 @@ use super::table::Table;
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit};
 use crate::model::Model;
+use crate::order;
 use crate::parallel;
 use std::cmp::Ordering;
 
@@ -67,7 +68,7 @@ impl Search<'_> {
             })
         });
         let score = |other: &InPlace| score(other.held_out.rmse(), other.term.cost());
-        tried.sort_by(|a, b| score(a).total_cmp(&score(b)));
+        order::ascending(&mut tried, score);
         tried
     }
 

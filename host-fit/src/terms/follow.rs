@@ -10,6 +10,7 @@ use super::table::path_terms;
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit, settle_fixed_delay, starts};
 use crate::model::Model;
+use crate::order;
 use crate::parallel;
 
 impl Search<'_> {
@@ -33,7 +34,7 @@ impl Search<'_> {
             self.set_out_from(model, proposal, terms, first)
         });
         let better = |a: &Fit, b: &Fit| a.mean_square().total_cmp(&b.mean_square());
-        fits.sort_by(better);
+        order::ascending(&mut fits, Fit::mean_square);
         if many {
             fits.truncate(RULES.followed);
             let learning = self.judge.learning(0);

@@ -5,6 +5,7 @@ use super::screen::Screen;
 use super::table::{Candidate, Table};
 use super::term::Term;
 use crate::linalg::{dot, solve_symmetric};
+use crate::order;
 use crate::parallel;
 use model_core::effect::Place;
 
@@ -41,7 +42,7 @@ impl Screen<'_> {
                 all.push((score, left, scale, vec![c]));
             }
         }
-        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        order::ascending(&mut all, |one| one.0);
         let singles: Vec<(f64, usize)> = all
             .iter()
             .take(RULES.paired)
@@ -63,7 +64,7 @@ impl Screen<'_> {
                 }
             }
         }
-        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        order::ascending(&mut all, |one| one.0);
         let worth = all.into_iter().take_while(|(score, ..)| *score < 0.0);
         let proposals = worth.map(|(score, left, scale, set)| {
             let mut rest = scale.as_slice();

@@ -10,6 +10,7 @@ use super::table::{Table, has_jet_effect};
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, Known, fit, lean_base};
 use crate::model::{Model, Start};
+use crate::order;
 use crate::parallel;
 use crate::residual::NoiseSource;
 use crate::simulate::SimulateError;
@@ -528,7 +529,7 @@ impl Search<'_> {
             let cost: usize = proposal.terms.iter().map(Term::cost).sum();
             Some((score(rmse, parent.cost() + cost), at, fit))
         });
-        brief.sort_by(|a, b| a.0.total_cmp(&b.0));
+        order::ascending(&mut brief, |one| one.0);
         // Refitted in full in any case: the best without effects and the best on each screened model, for
         // which a brief fit says less. Proposals that converge to the same model are fitted once.
         let mut leading: Vec<(usize, Fit)> = Vec::new();

@@ -8,6 +8,7 @@ use super::term::Term;
 use crate::fit::{Known, channel_reference, sensitivities};
 use crate::linalg::dot;
 use crate::model::Model;
+use crate::order;
 use crate::parallel;
 use model_core::effect::{Place, Sign, Spec};
 use model_core::effects::{LEVEL_RATE, PATH_TERMS, SLOW_WAKE, ZERO_OFFSET};
@@ -76,7 +77,7 @@ impl Table {
     }
 
     fn sorted(mut candidates: Vec<Candidate>, columns: Vec<Vec<f64>>, chance: Chance) -> Self {
-        candidates.sort_by(|a, b| b.held_out.total_cmp(&a.held_out));
+        order::descending(&mut candidates, |one| one.held_out);
         Self {
             candidates,
             columns,
@@ -260,7 +261,7 @@ impl Screen<'_> {
                 })
             })
             .collect();
-        rated.sort_by(|a, b| b.learned.total_cmp(&a.learned));
+        order::descending(&mut rated, |one| one.learned);
         // Neighbouring lags are equivalent: only the best of each neighbourhood is kept.
         let mut kept: Vec<Candidate> = Vec::new();
         for candidate in rated {
@@ -362,7 +363,7 @@ impl Screen<'_> {
                 rated.push(one);
             }
         }
-        rated.sort_by(|a, b| b.learned.total_cmp(&a.learned));
+        order::descending(&mut rated, |one| one.learned);
         rated
     }
 
@@ -438,7 +439,7 @@ impl Screen<'_> {
                 );
             }
             rated.extend(self.rated(others, noise, &mut by_chance));
-            rated.sort_by(|a, b| b.learned.total_cmp(&a.learned));
+            order::descending(&mut rated, |one| one.learned);
         }
         let mut met = Vec::new();
         rated.retain(|one| {

@@ -75,6 +75,8 @@ pub mod terms;
 pub mod user_effect;
 
 mod linalg;
+mod order;
+mod parallel;
 
 pub use recordings as data;
 pub use recordings::output;

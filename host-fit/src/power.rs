@@ -11,6 +11,7 @@ use crate::data::Record;
 use crate::diagnose::RULES as NAMED;
 use crate::fit::channel_reference;
 use crate::model::Model;
+use crate::parallel;
 use crate::picture::significant;
 use crate::residual::NoiseSource;
 use crate::rules;
@@ -18,7 +19,6 @@ use crate::simulate::SimulateError;
 use crate::terms::{Bench, Judge, Known, Left, RULES as TERMS, Screen, Shown, Units, Unnamed};
 use model_core::effect::{Parameter, Spec};
 use model_core::effects::SPECS;
-use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -82,12 +82,10 @@ pub fn detectable(
         units: &bench.units,
         screen,
     };
-    let specs = SPECS.par_iter();
-    let found: Vec<Option<Detectable>> = specs
-        .filter(|spec| detector.screen.pointless(spec).is_none())
-        .map(|spec| detector.smallest(spec))
-        .collect();
-    Ok(found.into_iter().flatten().collect())
+    Ok(parallel::some(SPECS, |spec| {
+        let pointless = detector.screen.pointless(spec).is_some();
+        (!pointless).then(|| detector.smallest(spec)).flatten()
+    }))
 }
 
 /// The threshold for naming an effect.

@@ -6,6 +6,7 @@ use super::response::{Response, Shape};
 use super::series::Series;
 use super::starts::Start;
 use crate::linalg::{dot, solve_symmetric};
+use crate::order;
 
 /// Most Gauss–Newton steps.
 const STEPS: usize = 20;
@@ -158,7 +159,7 @@ impl Refiner<'_> {
         let by_cost = |a: &Fitted, b: &Fitted| a.projection.cost.total_cmp(&b.projection.cost);
         let mut judged: Vec<Fitted> = starts.iter().map(|start| self.judge(*start)).collect();
         judged.retain(|fitted| fitted.projection.cost.is_finite());
-        judged.sort_by(by_cost);
+        order::ascending(&mut judged, |fitted| fitted.projection.cost);
         let some = judged.into_iter().take(descents);
         let mut best = some
             .map(|fitted| self.descend(fitted.at, STEPS))

@@ -5,6 +5,7 @@ use super::arx;
 use super::projection::{Gram, Stretch};
 use super::response::{Response, Shape};
 use super::series::Series;
+use crate::order;
 
 /// Decimated samples per scan, all records together.
 const BUDGET: usize = 4000;
@@ -60,7 +61,7 @@ pub(super) fn starts(series: &[Series], longest_dead_time: usize) -> Starts {
         let second = grid.chain(arx::shapes(&thin));
         let keep = |shapes: Vec<Shape>, most: usize| {
             let mut found = scan(&thin, &shapes, limit);
-            found.sort_by(|a, b| a.0.total_cmp(&b.0));
+            order::ascending(&mut found, |one| one.0);
             let whole = |(_, shape, dead): (f64, Shape, usize)| Start {
                 shape: slower(shape, factor as f64),
                 dead_time: (dead * factor) as f64,

@@ -10,6 +10,7 @@ use super::plant::{Plant, Switching};
 use super::spread::mean;
 use crate::data::Record;
 use crate::linalg::{dot, dots, gram, solve_symmetric};
+use crate::order;
 
 /// Most samples for the grid search; longer records are decimated.
 const COARSE_SAMPLES: usize = 2_000;
@@ -275,7 +276,7 @@ pub(crate) fn coarse(series: &[Series], max_delay: f64, spacing: usize) -> Vec<P
             .filter(|(i, _)| is_valley(*i))
             .map(|(_, f)| f)
             .collect();
-        valleys.sort_by(|a, b| a.0.total_cmp(&b.0));
+        order::ascending(&mut valleys, |one| one.0);
         let best = valleys.into_iter().take(COARSE_STARTS);
         starts.extend(best.map(|(_, plant)| plant.slower(factor as f64)));
     }

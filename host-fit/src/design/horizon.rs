@@ -7,9 +7,10 @@
 
 use super::bench::Player;
 use super::rules::RULES;
+use crate::order;
+use crate::parallel;
 use crate::simulate::HostState;
 use model_core::control::HoldTimes;
-use rayon::prelude::*;
 
 /// Parameters of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,12 +124,10 @@ impl HorizonSearch<'_> {
                 grown.collect::<Vec<_>>()
             };
             // Kept in beam order, whatever the thread timing.
-            let mut grown: Vec<Node> = beam
-                .par_iter()
-                .flat_map_iter(grow)
-                .filter(|node| node.promise.is_finite())
-                .collect();
-            grown.sort_by(|a, b| b.promise.total_cmp(&a.promise));
+            let grown = parallel::each(&beam, grow).into_iter().flatten();
+            let finite = |node: &Node| node.promise.is_finite();
+            let mut grown: Vec<Node> = grown.filter(finite).collect();
+            order::descending(&mut grown, |one| one.promise);
             let Some(first) = grown.first() else { break };
             if first.promise > best.0 {
                 best = (first.promise, first.completed.clone());

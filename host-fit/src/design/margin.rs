@@ -10,8 +10,8 @@ use super::noise::Noisy;
 use super::proof::Attempt;
 use super::rules::RULES;
 use crate::model::{Delay, Model, Track};
+use crate::parallel;
 use closed_loop::{Controlled, ModelFlow};
-use rayon::prelude::*;
 use serde::Serialize;
 
 /// The errors, in the order of [`Margin::intervals`].
@@ -109,14 +109,11 @@ pub fn margin(model: &Model, law: &Track, noise: f64, seed: u64, planes: bool) -
         ..search
     };
     // Along the axes, downwards and upwards.
-    let axes: Vec<End> = (0..6)
-        .into_par_iter()
-        .map(|way| {
-            let mut direction = [0.0; 3];
-            direction[way / 2] = if way % 2 == 0 { -1.0 } else { 1.0 };
-            search.end(direction)
-        })
-        .collect();
+    let axes: Vec<End> = parallel::each(0..6, |way| {
+        let mut direction = [0.0; 3];
+        direction[way / 2] = if way % 2 == 0 { -1.0 } else { 1.0 };
+        search.end(direction)
+    });
     let interval = |error: usize| {
         let (low, high) = (axes[2 * error], axes[2 * error + 1]);
         ErrorInterval {
@@ -132,7 +129,8 @@ pub fn margin(model: &Model, law: &Track, noise: f64, seed: u64, planes: bool) -
         &[]
     };
     let plane = |[across, up]: &[usize; 2]| {
-        let contour = (0..RULES.margin_rays).into_par_iter().map(|ray| {
+        let rays: Vec<u32> = (0..RULES.margin_rays).collect();
+        let contour = parallel::each(rays, |ray| {
             let quarter = RULES.margin_rays / 4;
             let axis = match ray / quarter {
                 0 => 2 * across + 1,
@@ -152,7 +150,7 @@ pub fn margin(model: &Model, law: &Track, noise: f64, seed: u64, planes: bool) -
         });
         MarginPlane {
             errors: [ERRORS[*across], ERRORS[*up]],
-            contour: contour.collect(),
+            contour,
         }
     };
     Margin {

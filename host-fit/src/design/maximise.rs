@@ -11,9 +11,10 @@ use super::horizon::{self, FlowState, Horizon};
 use super::rules::RULES;
 use super::train::{JudgedTrain, Played, Train, distinct};
 use crate::model::{Maximise, Model};
+use crate::order;
+use crate::parallel;
 use model_core::control::HoldTimes;
 use model_core::control::period::samples_at_least;
-use rayon::prelude::*;
 use serde::Serialize;
 
 /// Requirements on a maximising law.
@@ -158,14 +159,13 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
     let moduli = [model.largest_pole(false)?, model.largest_pole(true)?];
     let mut candidates = search.grid();
     candidates.push(search.judge(&steady));
-    let best_first = |list: &mut Vec<JudgedTrain>| list.sort_by(|a, b| b.value.total_cmp(&a.value));
+    let best_first = |list: &mut Vec<JudgedTrain>| order::descending(list, |one| one.value);
     best_first(&mut candidates);
     // The best few are refined; they are rarely neighbours.
     let starts: Vec<JudgedTrain> = distinct(&candidates, RULES.refined);
-    let mut refined: Vec<JudgedTrain> = starts
-        .par_iter()
-        .map(|start| search.refine(start.clone(), request.pulses.clamp(1, 4)))
-        .collect();
+    let mut refined = parallel::each(starts, |start| {
+        search.refine(start, request.pulses.clamp(1, 4))
+    });
     refined.extend(distinct(&candidates, RULES.long_runs));
     refined.push(search.judge(&steady));
     let planned = request.horizon_s.map(|horizon_s| {
@@ -178,11 +178,10 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
     best_first(&mut refined);
 
     // The best are evaluated again over a long run, in which slow models settle and unstable ones diverge.
-    let tried: Vec<(f64, Option<Lasting>)> = refined
-        .par_iter()
-        .filter(|judged| judged.value.is_finite())
-        .map(|judged| (judged.mean, search.lasting(&judged.train)))
-        .collect();
+    let tried: Vec<(f64, Option<Lasting>)> = parallel::some(&refined, |judged| {
+        let finite = judged.value.is_finite();
+        finite.then(|| (judged.mean, search.lasting(&judged.train)))
+    });
     let steady_mean = search.long_run(&steady).map(|(judged, _)| judged.mean);
     let best = tried
         .iter()
@@ -282,7 +281,7 @@ impl TrainSearch {
                 });
             }
         }
-        trains.par_iter().map(|train| self.judge(train)).collect()
+        parallel::each(&trains, |train| self.judge(train))
     }
 
     /// The best command over a horizon of `length` samples from rest, and the limit cycle of the

@@ -12,13 +12,13 @@ use super::rules::RULES;
 use crate::data::Record;
 use crate::fit::{FitOptions, fit, fit_with_effect, starts};
 use crate::model::{Delay, Model};
+use crate::parallel;
 use crate::picture::significant;
 use crate::power::detectable;
 use crate::preparation::Preparation;
 use crate::simulate::SimulateError;
 use crate::terms::Units;
 use model_core::effect::{Place, Spec};
-use rayon::prelude::*;
 
 /// Half width of a 95 % interval in standard errors.
 const DEVIATES: f64 = 1.96;
@@ -65,14 +65,12 @@ pub fn possible_flows(
     let mut flows = intervals(&judge);
     flows.extend(unseen(&judge, model, &records, &units));
     let specs: Vec<&'static Spec> = judge.best.candidates().collect();
-    let largest: Vec<Vec<PossibleFlow>> = specs
-        .par_iter()
-        .filter(|spec| can_be_tried(&judge, spec))
-        .map(|spec| match spec.place {
+    let largest = parallel::some(&specs, |spec| {
+        can_be_tried(&judge, spec).then(|| match spec.place {
             Place::Delay => delay_laws(&judge, spec),
             Place::Jet | Place::Flow | Place::Sensor => largest_sizes(&judge, spec, &units),
         })
-        .collect();
+    });
     flows.extend(largest.into_iter().flatten());
     flows.extend(equivalents(&judge));
     for flow in &mut flows {
@@ -101,32 +99,29 @@ fn unseen(
 ) -> Vec<PossibleFlow> {
     // A model at the stability limit has no detectable sizes.
     let found = detectable(model, records, RULES.usual_by_chance).unwrap_or_default();
-    let flows = found
-        .par_iter()
-        .filter(|found| found.amplitude.is_some())
-        .filter_map(|found| {
-            let spec = judge
-                .best
-                .spec(&found.effect)
-                .filter(|spec| can_be_tried(judge, spec))?;
-            let inner: Vec<f64> = spec
-                .parameters
-                .iter()
-                .zip(&found.parameters)
-                .map(|(card, value)| value / units.value_out(card.unit, 1.0))
-                .collect();
-            let flow = judge.refitted(&with_effect(judge, spec, &inner))?;
-            Some(PossibleFlow {
-                name: format!(
-                    "{}{}, not seen",
-                    spec.name,
-                    in_words(spec, &found.parameters)
-                ),
-                p_value: flow.p_value,
-                model: flow.model,
-            })
-        });
-    flows.collect()
+    parallel::some(&found, |found| {
+        found.amplitude?;
+        let spec = judge
+            .best
+            .spec(&found.effect)
+            .filter(|spec| can_be_tried(judge, spec))?;
+        let inner: Vec<f64> = spec
+            .parameters
+            .iter()
+            .zip(&found.parameters)
+            .map(|(card, value)| value / units.value_out(card.unit, 1.0))
+            .collect();
+        let flow = judge.refitted(&with_effect(judge, spec, &inner))?;
+        Some(PossibleFlow {
+            name: format!(
+                "{}{}, not seen",
+                spec.name,
+                in_words(spec, &found.parameters)
+            ),
+            p_value: flow.p_value,
+            model: flow.model,
+        })
+    })
 }
 
 /// Characteristics of a step response: delay in samples, gain in y, time constants in samples.
@@ -166,20 +161,17 @@ fn intervals(judge: &RecordJudge) -> Vec<PossibleFlow> {
     let n = places.len();
     let deviations: Vec<f64> = (0..n).map(|i| judge.covariance[i * n + i].sqrt()).collect();
     // Gradients by central differences over a tenth of a standard error, within the linear range.
-    let gradients: Vec<Option<[f64; 4]>> = (0..n)
-        .into_par_iter()
-        .map(|i| {
-            let step = 0.1 * deviations[i];
-            let moved = |by: f64| {
-                let mut moved = values.clone();
-                moved[places[i]] += by;
-                step_figures(&judge.best.with_values(&moved), length)
-            };
-            let (above, below) = (moved(step)?, moved(-step)?);
-            let slope = |q: usize| (above[q] - below[q]) / (2.0 * step);
-            Some([slope(0), slope(1), slope(2), slope(3)])
-        })
-        .collect();
+    let gradients: Vec<Option<[f64; 4]>> = parallel::each(0..n, |i| {
+        let step = 0.1 * deviations[i];
+        let moved = |by: f64| {
+            let mut moved = values.clone();
+            moved[places[i]] += by;
+            step_figures(&judge.best.with_values(&moved), length)
+        };
+        let (above, below) = (moved(step)?, moved(-step)?);
+        let slope = |q: usize| (above[q] - below[q]) / (2.0 * step);
+        Some([slope(0), slope(1), slope(2), slope(3)])
+    });
     let mut flows = Vec::new();
     for (q, name) in FIGURES.iter().enumerate() {
         let slope = |i: usize| gradients[i].map_or(0.0, |g| g[q]);
@@ -490,17 +482,13 @@ fn equivalents(judge: &RecordJudge) -> Vec<PossibleFlow> {
                 .collect::<Vec<_>>()
         })
         .collect();
-    let found: Vec<Option<PossibleFlow>> = pairs
-        .par_iter()
-        .map(|(name, without, spec)| {
-            let fitted = fit_with_effect(without, spec, &records, &options).ok()?;
-            let flow = judge.as_it_is(fitted.model)?;
-            (flow.p_value >= RULES.not_excluded).then(|| PossibleFlow {
-                name: format!("{} in the place of {name}", spec.name),
-                p_value: flow.p_value,
-                model: flow.model,
-            })
+    parallel::some(&pairs, |(name, without, spec)| {
+        let fitted = fit_with_effect(without, spec, &records, &options).ok()?;
+        let flow = judge.as_it_is(fitted.model)?;
+        (flow.p_value >= RULES.not_excluded).then(|| PossibleFlow {
+            name: format!("{} in the place of {name}", spec.name),
+            p_value: flow.p_value,
+            model: flow.model,
         })
-        .collect();
-    found.into_iter().flatten().collect()
+    })
 }

@@ -10,12 +10,12 @@ use super::noise::Noisy;
 use super::possible::PossibleFlow;
 use super::rules::RULES;
 use crate::model::{Maximise, Model, Track};
+use crate::parallel;
 use crate::simulate::HostState;
 use closed_loop::{
     Controlled, Controller, Figures, ModelFlow, OpenLoop, Relay, Trace, TrackingController, run,
     span,
 };
-use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
 /// Group of a trial.
@@ -304,9 +304,10 @@ where
     );
     let (on_model, trace) = law.run(&noisy);
     let mut cases = vec![on_model];
-    let possible = trials.possible.par_iter();
-    cases.par_extend(possible.map(|flow| on_possible(law, flow, trials.noise, trials.seed)));
-    cases.par_extend(trials.stress.par_iter().map(|trial| law.run(trial).0));
+    cases.extend(parallel::each(trials.possible, |flow| {
+        on_possible(law, flow, trials.noise, trials.seed)
+    }));
+    cases.extend(parallel::each(trials.stress, |trial| law.run(trial).0));
     (cases, trace)
 }
 

@@ -13,8 +13,8 @@ use crate::data::Record;
 use crate::fit::{FitOptions, RULES as FIT, fit, sensitivities};
 use crate::linalg::{dot, inverse_where_known};
 use crate::model::Model;
+use crate::parallel;
 use crate::simulate::SimulateError;
-use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Free runs over the scored samples, one per record, y.
@@ -71,10 +71,9 @@ impl RecordJudge {
             })
             .collect();
         let indices: Vec<usize> = known.iter().map(|at| fitted.free[*at]).collect();
-        let linearised: Option<Vec<_>> = records
-            .par_iter()
-            .map(|record| sensitivities(&fitted.model, record, &indices))
-            .collect();
+        let linearised = parallel::all(&records, |record| {
+            sensitivities(&fitted.model, record, &indices)
+        });
         let Some(linearised) = linearised else {
             return Ok(None);
         };

@@ -5,8 +5,8 @@ use super::alternatives::Set;
 use super::ranking::Rival;
 use super::session::Session;
 use crate::model::Model;
+use crate::parallel;
 use crate::terms::{Found, Hypothesis, Judge, MostLikely, Term};
-use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -141,8 +141,7 @@ impl Session<'_> {
             subject.terms[index].effect()?;
             self.search.without(subject, index, &found.root)
         };
-        let places = (0..subject.terms.len()).into_par_iter();
-        let mut lesser: Vec<Option<Hypothesis>> = places.map(without).collect();
+        let mut lesser: Vec<Option<Hypothesis>> = parallel::each(0..subject.terms.len(), without);
         // Null models are often common to several effects: each is fitted once.
         let mut distinct: Vec<Hypothesis> = Vec::new();
         let mut effects: Vec<(String, Vec<usize>)> = Vec::new();
@@ -179,8 +178,7 @@ impl Session<'_> {
             effects.push((name, places));
         }
         let judge = self.judge();
-        let nulls = distinct.par_iter().map(|null| Null::of(judge, null));
-        let nulls: Vec<Option<Null>> = nulls.collect();
+        let nulls: Vec<Option<Null>> = parallel::each(&distinct, |null| Null::of(judge, null));
         let certificates = effects.into_iter().filter_map(|(name, places)| {
             let nulls: Vec<Null> = places.into_iter().filter_map(|at| nulls[at]).collect();
             Some((name, self.certificate(subject, own, &nulls, found)?))

@@ -2,12 +2,12 @@
 
 use super::{NotTried, RULES, Ranked, estimates};
 use crate::model::Model;
+use crate::parallel;
 use crate::terms::{
     Candidate, Chance, HeldOut, Hypothesis, Judged, Likelihood, Noise, Screen, Search, Table, Term,
     Units, p_value,
 };
 use model_core::effect::Spec;
-use rayon::prelude::*;
 
 /// Name of a longer memory in equivalence sets.
 pub const FLOW_MEMORY: &str = "flow-memory";
@@ -134,16 +134,15 @@ fn rated(
             best.push((name, candidate));
         }
     }
-    let mut rated: Vec<Rival> = best
-        .par_iter()
-        .enumerate()
-        .map(|(place, (name, candidate))| Rival {
+    let mut rated: Vec<Rival> = parallel::each(0..best.len(), |place| {
+        let (name, candidate) = &best[place];
+        Rival {
             name: name.clone(),
             spec: candidate.term.effect(),
             refitted: refit(place, name, candidate),
             promised: before * (1.0 - candidate.held_out).max(0.0).sqrt(),
-        })
-        .collect();
+        }
+    });
     // Candidates that the screening rejected are listed as tried.
     let useless = screen.model().candidates().filter(|spec| {
         screen.pointless(spec).is_none() && !best.iter().any(|(name, _)| name == spec.name)

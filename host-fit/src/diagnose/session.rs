@@ -8,11 +8,11 @@ use super::outcome::Conclusion;
 use super::ranking::{Rival, not_tried, ranked, rivals_and_chance};
 use super::{DiagnoseError, Diagnosis, Options, RULES, Rung, Verdict};
 use crate::model::Model;
+use crate::parallel;
 use crate::terms::{
     Chance, Found, HeldOut, Hypothesis, Judge, Judged, Likelihood, Search, Term, Units, p_value,
 };
 use model_core::effect::Spec;
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// A diagnosis in progress.
@@ -282,8 +282,7 @@ impl Session<'_> {
             let spec = hypothesis.terms[index].effect()?;
             Some((spec, self.search.without(hypothesis, index, root)?))
         };
-        let places = (0..hypothesis.terms.len()).into_par_iter();
-        let lesser: Vec<_> = places.filter_map(without).collect();
+        let lesser = parallel::some(0..hypothesis.terms.len(), without);
         let size = |one: &(_, Hypothesis)| one.1.judged.rmse();
         lesser
             .into_iter()

@@ -238,7 +238,7 @@ impl Session<'_> {
                 let (kept, lags) = lesser.terms.into_iter().partition(is_effect);
                 let mut from = Hypothesis::new(lesser.judged);
                 from.terms = lags;
-                let mut found = bases.run(from, || None).best;
+                let mut found = bases.run(from, None).best;
                 let mut terms: Vec<Term> = kept;
                 terms.append(&mut found.terms);
                 found.terms = terms;

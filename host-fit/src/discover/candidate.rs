@@ -3,6 +3,7 @@
 use super::RULES;
 use super::place::Place;
 use super::term::Term;
+use crate::order;
 use crate::terms::{self, Hypothesis, Judged};
 
 /// A fully fitted term with its model.
@@ -72,7 +73,7 @@ pub(super) fn best(all: &mut Vec<Candidate>) -> Option<Candidate> {
 
 /// Indices of the best candidate of each place, after sorting all from best to worst.
 pub(super) fn best_of_each_place(all: &mut [Candidate]) -> Vec<usize> {
-    all.sort_by(|a, b| a.size().total_cmp(&b.size()));
+    order::ascending(all, Candidate::size);
     let new = |i: &usize| {
         all[..*i]
             .iter()

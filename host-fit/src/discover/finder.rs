@@ -10,6 +10,7 @@ use super::{Options, RULES};
 use crate::diagnose::RULES as DIAGNOSE;
 use crate::experiment::Separation;
 use crate::model::Model;
+use crate::order;
 use crate::terms::{
     HeldOut, Hypothesis, Judge, Judged, Screen, Search, Table, Units, is_out, p_value, shares_won,
 };
@@ -179,7 +180,7 @@ impl Finder<'_> {
         };
         // One coordinate may enter one place in two forms: they are reported as one finding.
         let same = |other: &Term| other.is_like(term) || told(other) == told(term);
-        all.sort_by(|a, b| a.size().total_cmp(&b.size()));
+        order::ascending(&mut all, Candidate::size);
         let held_out: Vec<&HeldOut> = std::iter::once(&found)
             .chain(&all)
             .map(|one| &one.judged().held_out)

@@ -9,8 +9,9 @@ use super::screening::{Context, Screened, diverse, reference};
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit};
 use crate::model::Model;
+use crate::order;
+use crate::parallel;
 use crate::terms::{self, Hypothesis};
-use rayon::prelude::*;
 use std::sync::atomic::Ordering;
 
 /// A term beside a base, fitted for a few iterations.
@@ -69,12 +70,11 @@ impl Finder<'_> {
     ) -> Vec<Candidate> {
         let progress = self.search.progress;
         progress(&format!("term {number}: refitting {} curves", curves.len()));
-        let tried = curves.into_par_iter();
-        let tried = tried.filter_map(|(beside, curve)| self.tried(beside, curve));
-        let mut all = self.finished(tried.collect());
+        let tried = parallel::some(curves, |(beside, curve)| self.tried(beside, curve));
+        let mut all = self.finished(tried);
         progress(&format!("term {number}: the flow's lags beside it"));
         for candidate in self.leading(&mut all) {
-            let with = self.search.run(candidate.with, || None).best;
+            let with = self.search.run(candidate.with, None).best;
             let followed = Candidate::of(candidate.term, with);
             // At the noise level nothing can be better; equivalent alternatives are sought later.
             if self.at_the_floor(&followed) {
@@ -118,7 +118,7 @@ impl Finder<'_> {
     /// on the lowest-order base. On a high-order base the error is small with any term, because its lags
     /// imitate the right one.
     fn leading(&self, all: &mut [Candidate]) -> Vec<Candidate> {
-        all.sort_by(|a, b| a.size().total_cmp(&b.size()));
+        order::ascending(all, Candidate::size);
         let mut leading: Vec<Candidate> = Vec::new();
         let mut heirs = Heirs::of(RULES.settled);
         for one in all {
@@ -144,7 +144,7 @@ impl Finder<'_> {
             if other.size() > last.size() - RULES.twins || other.size() > reach {
                 break;
             }
-            let with = self.search.run(other.with.clone(), || None).best;
+            let with = self.search.run(other.with.clone(), None).best;
             let followed = Candidate::of(other.term.clone(), with);
             let better = followed.size() < other.size();
             last = if better { followed } else { other };
@@ -176,9 +176,8 @@ impl Finder<'_> {
 
     /// The best of some curves beside one model.
     pub(super) fn refitted(&self, beside: &Hypothesis, curves: Vec<Screened>) -> Vec<Candidate> {
-        let curves = curves.into_par_iter();
-        let tried = curves.filter_map(|curve| self.tried(beside, curve));
-        self.finished(tried.collect())
+        let tried = parallel::some(curves, |curve| self.tried(beside, curve));
+        self.finished(tried)
     }
 
     /// A model with the term, fitted for a few iterations; from 0 if the predicted values make the free run
@@ -213,7 +212,7 @@ impl Finder<'_> {
         if unknown {
             responses.extend(self.search.judge.other_gradings(model.grading));
         }
-        let fits = responses.into_par_iter().filter_map(|grading| {
+        let fits = parallel::some(responses, |grading| {
             let model = Model {
                 grading,
                 ..model.clone()
@@ -222,7 +221,7 @@ impl Finder<'_> {
         });
         let by_error = |a: &Fit, b: &Fit| a.mean_square().total_cmp(&b.mean_square());
         Some(Tried {
-            brief: fits.min_by(by_error)?,
+            brief: fits.into_iter().min_by(by_error)?,
             term,
             memory: beside.terms.clone(),
         })
@@ -232,21 +231,19 @@ impl Finder<'_> {
     /// term, move back.
     fn finished(&self, tried: Vec<Tried>) -> Vec<Candidate> {
         let judge = self.search.judge;
-        let rated = tried.into_par_iter().filter_map(|tried| {
+        let mut rated: Vec<(f64, Tried)> = parallel::some(tried, |tried| {
             let rmse = judge.held_out(|_| &tried.brief.model).ok()?.rmse();
             Some((terms::size(rmse, &tried.brief.model), tried))
         });
-        let mut rated: Vec<(f64, Tried)> = rated.collect();
-        rated.sort_by(|a, b| a.0.total_cmp(&b.0));
+        order::ascending(&mut rated, |one| one.0);
         let mut heirs = Heirs::of(RULES.finished);
         rated
             .retain(|(_, tried)| heirs.takes(kind(&tried.term, &tried.memory, &tried.brief.model)));
-        let finished = rated.into_par_iter().filter_map(|(_, tried)| {
+        parallel::some(rated, |(_, tried)| {
             let least = tried.memory.len();
             let with = self.search.finish(tried.memory, tried.brief, least)?;
             Some(Candidate::of(tried.term, with))
-        });
-        finished.collect()
+        })
     }
 }
 

@@ -6,8 +6,8 @@ use super::formula::FORMS;
 use super::outcome::Found;
 use super::screening::reference;
 use super::term::{Shape, Term};
+use crate::parallel;
 use crate::terms::{HeldOut, Hypothesis, Judged, p_value};
-use rayon::prelude::*;
 
 impl Finder<'_> {
     /// The terms, each as a formula if one fits equally well, and the model with them.
@@ -78,7 +78,7 @@ impl Finder<'_> {
             .iter()
             .filter(|form| !(pinned.is_some() && form.has_level()))
             .collect();
-        let fits = forms.into_par_iter().filter_map(|form| {
+        let mut fits: Vec<(Term, Judged)> = parallel::some(forms, |form| {
             let (parameters, _) = form.nearest(x, g, &weights, pinned.is_some())?;
             let term = Term {
                 shape: Shape::Formula {
@@ -92,7 +92,6 @@ impl Finder<'_> {
             let judged = judge.refitted(&with).ok()?;
             Some((term.in_model(judged.model()), judged))
         });
-        let mut fits: Vec<(Term, Judged)> = fits.collect();
         fits.retain(|(_, judged)| {
             judged.rmse() <= (1.0 + RULES.formula) * with_curve.rmse()
                 || p_value(&judged.held_out, &with_curve.held_out) >= RULES.level

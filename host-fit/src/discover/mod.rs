@@ -143,7 +143,7 @@ pub fn discover(
         .into_iter()
         .flatten()
         .collect();
-    let found = search.run(leanest[0].clone(), || None);
+    let found = search.run(leanest[0].clone(), None);
     let half = halfway(&found);
     let last = after_another_law(&found.best);
     let bases = leanest.iter().cloned().chain(given).chain([found.best]);

@@ -7,10 +7,11 @@ use super::place::{Entry, Place};
 use super::term::{Shape, Term};
 use crate::data::Record;
 use crate::model::Model;
+use crate::order;
+use crate::parallel;
 use crate::terms::{Chance, HeldOut, Noise, Screen, Search, Tangent};
 use crate::user_effect::Definition;
 use model_core::effects::ZERO_OFFSET;
-use rayon::prelude::*;
 
 /// A curve that was screened.
 pub(super) struct Screened {
@@ -75,7 +76,7 @@ pub(super) fn reference(coordinate: &Coordinate, records: &[&Record]) -> Option<
 /// Quantiles of a coordinate with equal weights between them, and the index of the one nearest to the median.
 fn points(mut weighted: Vec<(f64, f64)>) -> Option<(Vec<f64>, usize)> {
     weighted.retain(|(x, weight)| x.is_finite() && *weight > 0.0);
-    weighted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    order::ascending(&mut weighted, |one| one.0);
     let mut whole = 0.0;
     let mut up_to = Vec::with_capacity(weighted.len());
     for (_, weight) in &weighted {
@@ -237,7 +238,7 @@ impl<'a> Context<'a> {
         let mut curves = self.each(coordinates, entries, |(term, with)| {
             self.screened(term, &with)
         });
-        curves.sort_by(|a, b| a.score.total_cmp(&b.score));
+        order::ascending(&mut curves, |one| one.score);
         curves
     }
 
@@ -248,7 +249,7 @@ impl<'a> Context<'a> {
         entries: &[Entry],
         make: impl Fn((Term, Model)) -> Option<T> + Sync,
     ) -> Vec<T> {
-        let each = coordinates.into_par_iter().map(|coordinate| {
+        let each = parallel::each(coordinates, |coordinate| {
             let Some(series) = values_of(&coordinate, self.model, &self.learning) else {
                 return Vec::new();
             };
@@ -263,7 +264,7 @@ impl<'a> Context<'a> {
             let shown = entries.iter().filter_map(shown);
             shown.filter_map(&make).collect::<Vec<_>>()
         });
-        each.flatten().collect()
+        each.into_iter().flatten().collect()
     }
 
     /// A curve of zeros over the coordinate's range, and the model with it.

@@ -6,6 +6,7 @@ use super::formula::Form;
 use super::place::Entry;
 use crate::fit::Fit;
 use crate::model::Model;
+use crate::order;
 use crate::terms::Units;
 use crate::user_effect::{Definition, DefinitionError};
 use std::fmt::Write as _;
@@ -243,7 +244,7 @@ impl Term {
             (b.1 - (a.1 + (c.1 - a.1) * (b.0 - a.0) / (c.0 - a.0))).abs()
         };
         spare.retain(|i| !points[*i].2);
-        spare.sort_by(|a, b| off_line(a).total_cmp(&off_line(b)));
+        order::ascending(&mut spare, off_line);
         spare.truncate(points.len().saturating_sub(RULES.most_points));
         let mut index = 0;
         points.retain(|_| {

@@ -14,9 +14,9 @@ use crate::data::Record;
 use crate::fit::sensitivities;
 use crate::linalg::{Cholesky, dot};
 use crate::model::Model;
+use crate::parallel;
 use crate::terms::{Judge, Judged, Units};
 use crate::user_effect::Definition;
-use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -128,20 +128,15 @@ pub(super) fn trace(judge: &Judge, judged: &Judged, units: &Units) -> Option<Tra
         .collect::<Option<_>>()?;
     let knots: Vec<Vec<f64>> = records.iter().map(|r| knots(model, r)).collect();
     let free = judge.free(model);
-    let entries: Vec<Option<(Vec<Part>, Explained)>> = TRACED
-        .into_par_iter()
-        .map(|entry| {
-            let parts: Option<Vec<Part>> = (0..records.len())
-                .into_par_iter()
-                .map(|i| Part::of(entry, model, &free, records[i], &errors[i], &knots[i]))
-                .collect();
-            let parts = parts?;
-            let energy: f64 = errors.iter().map(|e| dot(e, e)).sum();
-            let samples: usize = errors.iter().map(Vec::len).sum();
-            let explained = explained(&parts, energy, samples as f64 / together)?;
-            Some((parts, explained))
-        })
-        .collect();
+    let entries: Vec<Option<(Vec<Part>, Explained)>> = parallel::each(&TRACED[..], |entry| {
+        let parts = parallel::all(0..records.len(), |i| {
+            Part::of(*entry, model, &free, records[i], &errors[i], &knots[i])
+        })?;
+        let energy: f64 = errors.iter().map(|e| dot(e, e)).sum();
+        let samples: usize = errors.iter().map(Vec::len).sum();
+        let explained = explained(&parts, energy, samples as f64 / together)?;
+        Some((parts, explained))
+    });
     let traced = entries.iter().flatten();
     let best = traced.map(|(_, e)| e.log_likelihood).reduce(f64::max)?;
     let weight = |entry: &Option<(Vec<Part>, Explained)>| {

@@ -12,11 +12,11 @@ pub use separation::Separation;
 
 use crate::model::Model;
 use crate::output::{OutputError, write_atomic};
+use crate::parallel;
 use crate::simulate::Signals;
 use command::{Openings, families, mutate};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 use std::path::Path;
 use thiserror::Error;
 
@@ -162,7 +162,7 @@ fn pick(
     plans: Vec<Openings>,
     score: &(dyn Fn(&Openings) -> f64 + Sync),
 ) -> Option<(Openings, f64)> {
-    let scores: Vec<f64> = plans.par_iter().map(score).collect();
+    let scores: Vec<f64> = parallel::each(&plans, score);
     plans
         .into_iter()
         .zip(scores)

@@ -6,9 +6,10 @@ use super::starts::starts;
 use super::{Fit, FitOptions, fit};
 use crate::data::Record;
 use crate::model::{Delay, Model};
+use crate::order;
+use crate::parallel;
 use model_core::effect::{Place, Spec};
 use model_core::recursion::Grading;
-use rayon::prelude::*;
 use std::cmp::Ordering;
 use thiserror::Error;
 
@@ -76,7 +77,7 @@ pub fn fit_with_effect(
             })
         });
         tried.extend(tried_briefly(regraded.collect(), records, options));
-        tried.sort_by(best_first);
+        order::ascending(&mut tried, Fit::mean_square);
     }
     let mut met = Vec::new();
     let leading = tried.iter().enumerate().filter(|(place, fit)| {
@@ -85,23 +86,19 @@ pub fn fit_with_effect(
         *place < RULES.followed || first_of_its_grading
     });
     let leading: Vec<&Fit> = leading.map(|(_, fit)| fit).collect();
-    let finished: Vec<Option<Fit>> = leading
-        .par_iter()
-        .map(|start| {
-            let lost_its_law = spec.parameters.is_empty()
-                && matches!(start.model.delay, Delay::Fixed { .. })
-                && !matches!(base.delay, Delay::Fixed { .. });
-            if lost_its_law {
-                return with_law_of(&start.model, base, records).ok();
-            }
-            let fitted = fit(&start.model, records, options).ok()?;
-            // A fixed delay has no derivative, and that of the base may imitate the effect.
-            settle_fixed_delay(fitted, records, options).ok()
-        })
-        .collect();
+    let finished = parallel::some(&leading, |start| {
+        let lost_its_law = spec.parameters.is_empty()
+            && matches!(start.model.delay, Delay::Fixed { .. })
+            && !matches!(base.delay, Delay::Fixed { .. });
+        if lost_its_law {
+            return with_law_of(&start.model, base, records).ok();
+        }
+        let fitted = fit(&start.model, records, options).ok()?;
+        // A fixed delay has no derivative, and that of the base may imitate the effect.
+        settle_fixed_delay(fitted, records, options).ok()
+    });
     finished
         .into_iter()
-        .flatten()
         .min_by(best_first)
         .ok_or_else(|| CandidateError::Unstable {
             effect: spec.name.to_owned(),
@@ -115,12 +112,8 @@ fn tried_briefly(models: Vec<Model>, records: &[&Record], options: &FitOptions) 
         iterations: RULES.brief,
         ..*options
     };
-    let fits: Vec<Option<Fit>> = models
-        .par_iter()
-        .map(|model| fit(model, records, &brief).ok())
-        .collect();
-    let mut fits: Vec<Fit> = fits.into_iter().flatten().collect();
-    fits.sort_by(best_first);
+    let mut fits = parallel::some(&models, |model| fit(model, records, &brief).ok());
+    order::ascending(&mut fits, Fit::mean_square);
     fits
 }
 

@@ -8,10 +8,10 @@ use super::rules::RULES;
 use crate::data::Record;
 use crate::dual::Dual;
 use crate::model::{Coordinate, Delay, Kind, Model, Rounding};
+use crate::parallel;
 use crate::simulate::{Signals, SimulateError, Simulator};
 use model_core::effect::Sign;
 use model_core::{Output, Real, pairs};
-use rayon::prelude::*;
 use std::ops::ControlFlow;
 
 /// Lanes of a run, one of them for the value: those of the first runs, and of the last one the fewest that are enough for
@@ -367,14 +367,12 @@ impl LeastSquares for FreeRunProblem<'_> {
                 None => sum,
             }
         };
-        let sums: Vec<f64> = (0..self.signals.len()).into_par_iter().map(each).collect();
+        let sums = parallel::each(0..self.signals.len(), each);
         sums.iter().sum()
     }
 
     fn linearise(&self, values: &[f64]) -> Option<Vec<Part>> {
-        let each = |record| self.part(values, record);
-        let all: Vec<_> = (0..self.signals.len()).into_par_iter().map(each).collect();
-        all.into_iter().collect()
+        parallel::all(0..self.signals.len(), |record| self.part(values, record))
     }
 
     fn reach(&self, values: &[f64]) -> Vec<(f64, f64)> {

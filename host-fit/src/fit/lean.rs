@@ -9,9 +9,9 @@ use super::starts::starts;
 use super::{Fit, FitOptions, fit};
 use crate::data::Record;
 use crate::model::{Delay, Model, Start, TransportLaw};
+use crate::parallel;
 use crate::simulate::SimulateError;
 use model_core::recursion::{Grading, LagConvention};
-use rayon::prelude::*;
 
 /// y_{k+1} = a·y_k + (b + c·y_k)·u_{k−h}, fitted to the records in free run,
 /// with the kind of delay law that `given` has.
@@ -24,10 +24,7 @@ pub fn lean_base(given: &Model, records: &[&Record]) -> Result<Fit, SimulateErro
         iterations: RULES.brief,
         ..FitOptions::default()
     };
-    let tried: Vec<_> = starts
-        .par_iter()
-        .map(|model| fit(model, records, &brief))
-        .collect();
+    let tried = parallel::each(&starts, |model| fit(model, records, &brief));
     let mut best: Option<Fit> = None;
     let mut refused = None;
     for attempt in tried {
@@ -140,10 +137,8 @@ pub fn settle_fixed_delay(
                 model.delay = Delay::Fixed { delays: shifted };
                 fit(&model, records, &brief).ok()
             };
-            let (up, down) = rayon::join(|| moved(step), || moved(-step));
-            let nearer = [up, down]
+            let nearer = parallel::some(&[step, -step][..], |step| moved(*step))
                 .into_iter()
-                .flatten()
                 .filter(|fit| fit.mean_square() < best.mean_square() * (1.0 - options.tolerance))
                 .min_by(|a, b| a.mean_square().total_cmp(&b.mean_square()));
             match nearer {
@@ -179,20 +174,16 @@ pub(super) fn with_law_of(
             std::iter::once(own).chain(others).collect()
         }
     };
-    let tried: Vec<Option<Fit>> = laws
-        .into_par_iter()
-        .map(|delay| {
-            let model = Model {
-                delay,
-                ..model.clone()
-            };
-            // A law with which the free run diverges is no starting point.
-            fit(&model, records, &FitOptions::default()).ok()
-        })
-        .collect();
+    let tried = parallel::some(laws, |delay| {
+        let model = Model {
+            delay,
+            ..model.clone()
+        };
+        // A law with which the free run diverges is no starting point.
+        fit(&model, records, &FitOptions::default()).ok()
+    });
     let best = tried
         .into_iter()
-        .flatten()
         .min_by(|a, b| a.mean_square().total_cmp(&b.mean_square()));
     match best {
         Some(best) => Ok(best),

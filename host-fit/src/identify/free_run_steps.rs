@@ -7,6 +7,7 @@ use super::free_run::FreeRun;
 use super::layout::Delays;
 use super::linearised::Linearised;
 use super::rules::RULES;
+use crate::order;
 use crate::search::{Around, Evaluator, Point, SearchStep, StopReason, Success};
 
 /// Steps tried around the best of the predicted lags.
@@ -170,7 +171,7 @@ fn predicted_minima(
         })
         .map(|i| (at(i), i as u16 + 1))
         .collect();
-    minima.sort_by(|a, b| a.0.total_cmp(&b.0));
+    order::ascending(&mut minima, |one| one.0);
     minima
         .into_iter()
         .take(RULES.minima)

@@ -3,7 +3,7 @@
 use super::colour::Deviations;
 use super::{Colour, EFFECTS, NoiseModel, Series, offset_and_drift, woodbury_of};
 use crate::linalg::{dot, dots};
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Grid of shares of coloured noise.
 const SHARES: [f64; 6] = [0.1, 0.25, 0.5, 0.75, 0.9, 0.98];
@@ -112,9 +112,9 @@ fn coloured(
         pole: (-1.0 / memory.exp()).exp(),
     };
     let evaluate = |points: Vec<[f64; 2]>| -> Vec<([f64; 2], Best)> {
-        let each = points.into_par_iter();
-        each.map(|point| (point, likelihood(errors, colour(point), least, price)))
-            .collect()
+        parallel::each(&points, |&point| {
+            (point, likelihood(errors, colour(point), least, price))
+        })
     };
     let better = |a: &([f64; 2], Best), b: &([f64; 2], Best)| {
         a.1.log_likelihood.total_cmp(&b.1.log_likelihood)

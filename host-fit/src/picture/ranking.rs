@@ -6,6 +6,7 @@ use super::legend::{Swatch, heading, nothing};
 use super::overlay::union;
 use super::palette::{BLUE, GRID, INK, MUTED, VERMILLION};
 use super::panel::{FOOT, Panel};
+use crate::order;
 
 /// One candidate.
 #[derive(Clone, Copy, Debug, Default)]
@@ -53,7 +54,7 @@ pub fn ranking(plot: &Ranking<'_>) -> String {
     let description = format!("{}: candidate effects by validation error", plot.title);
     draw(&description, |canvas| {
         let mut order: Vec<&Candidate<'_>> = plot.candidates.iter().collect();
-        order.sort_by(|a, b| a.rmse.total_cmp(&b.rmse));
+        order::ascending(&mut order, |one| one.rmse);
         order.truncate(MOST);
         if extent(order.iter().map(|c| c.rmse)).is_none() {
             return nothing(canvas, plot.title, "No candidate was tried.");

@@ -5,6 +5,7 @@ use super::RULES;
 use super::levels::two_levels;
 use super::reference::FirstOrder;
 use crate::data::Record;
+use crate::order;
 
 /// How a record begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -205,7 +206,7 @@ impl Beginning {
             let same = rests.iter().flatten();
             let same = same.filter(|(other, _)| other == command);
             let mut same: Vec<&Rest> = same.map(|(_, rest)| rest).collect();
-            same.sort_by(|a, b| a.level.total_cmp(&b.level));
+            order::ascending(&mut same, |one| one.level);
             let (Some(lowest), Some(highest)) = (same.first(), same.last()) else {
                 continue;
             };

@@ -3,7 +3,7 @@
 
 use super::RULES;
 use crate::data::Record;
-use rayon::prelude::*;
+use crate::parallel;
 
 /// y = level + gain·x with x_{k+1} = x_k + (1 − e^{−1/T})(u_{k−θ} − x_k), an initial state of each record aside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,10 +77,9 @@ impl FirstOrder {
             .flat_map(|time| delays.iter().map(|delay| (*delay, *time)))
             .collect();
         let least = |points: Vec<(f64, f64)>| {
-            let each = points
-                .into_par_iter()
-                .map(|(delay, time)| (residual(&thinned, delay, time).0, delay, time));
-            let all: Vec<(f64, f64, f64)> = each.collect();
+            let all = parallel::each(&points, |&(delay, time)| {
+                (residual(&thinned, delay, time).0, delay, time)
+            });
             all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
         };
         let (mut left, mut delay, mut time) = least(points)?;

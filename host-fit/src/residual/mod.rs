@@ -22,6 +22,7 @@ pub(crate) use trend::correlation;
 
 use crate::data::{Record, Use};
 use crate::model::Model;
+use crate::order;
 use crate::picture::{FailureBin, FailureView};
 use crate::simulate::SimulateError;
 use binned::{Binned, Source, coordinates};
@@ -183,7 +184,7 @@ pub fn examine(records: &[&Record], simulated: Vec<Vec<f64>>, delay: usize) -> F
     for found in &mut by {
         found.trend = trend::from_edge_to_edge(&errors, records, found);
     }
-    by.sort_by(|a, b| b.explained_fraction.total_cmp(&a.explained_fraction));
+    order::descending(&mut by, |one| one.explained_fraction);
     let each = errors.residual.iter().zip(&errors.lead);
     let judged = each.flat_map(|(e, lead)| e.iter().skip(*lead));
     let (n, sum, squares) =

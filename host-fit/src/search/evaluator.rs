@@ -4,10 +4,9 @@
 //! evaluated ahead; results after the first success in order are discarded, so that cache, count and decision
 //! equal those of one thread.
 
+use crate::parallel;
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-use rayon::prelude::*;
 
 use super::problem::{Evaluation, Problem};
 use super::stop::StopReason;
@@ -217,12 +216,7 @@ impl<'a, P: Problem> Evaluator<'a, P> {
         let problem: &P = self.problem;
         let ahead: Option<Vec<Evaluation>> =
             self.pool.as_ref().filter(|_| block.len() > 1).map(|pool| {
-                pool.install(|| {
-                    points
-                        .par_iter()
-                        .map(|p| problem.evaluate(p, incumbent))
-                        .collect()
-                })
+                pool.install(|| parallel::each(&points, |point| problem.evaluate(point, incumbent)))
             });
         let mut found = None;
         for (i, (point, key)) in block.iter().enumerate() {

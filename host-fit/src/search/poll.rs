@@ -6,6 +6,7 @@
 //! adds minus their sum. Abramson et al., SIAM J. Optim. 20(2), 2009;
 //! Audet et al., SIAM J. Optim. 24(4), 2014.
 
+use crate::order;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
@@ -138,7 +139,7 @@ fn order_along(steps: &mut [Vec<i64>], last: &[i64]) {
         let norm: f64 = step.iter().map(|a| (*a as f64).powi(2)).sum::<f64>().sqrt();
         if norm > 0.0 { dot / norm } else { 0.0 }
     };
-    steps.sort_by(|a, b| cosine(b).total_cmp(&cosine(a)));
+    order::descending(steps, |step| cosine(step));
 }
 
 #[cfg(test)]

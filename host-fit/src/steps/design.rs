@@ -1,6 +1,5 @@
 //! Design of a control law and its trials in closed loop.
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::prepared::prepared;
@@ -12,6 +11,7 @@ use crate::design::{
 };
 use crate::fit::RULES as FIT;
 use crate::model::{Law, Model};
+use crate::parallel;
 use crate::terms::Units;
 use closed_loop::Controlled;
 
@@ -334,7 +334,7 @@ pub fn passing_targets(
             reason,
         }
     };
-    (1..steps).into_par_iter().map(verdict).collect()
+    parallel::each((1..steps).collect::<Vec<u32>>(), verdict)
 }
 
 /// Placeholder type for runs without stress trials.

@@ -5,6 +5,7 @@ use crate::analysis::{Correlation, Residuals, correlations};
 use crate::baseline::BaselineFits;
 use crate::data::{Record, Use};
 use crate::indicators::{Indicators, Scores};
+use crate::order;
 use crate::picture::significant;
 use crate::residual::Failures;
 
@@ -131,7 +132,7 @@ pub(super) fn extended(
 pub(super) fn ranked<'a>(models: impl Iterator<Item = (&'a str, &'a Scores)>) -> Answer {
     let judged = models.filter_map(|(name, scores)| Some((name, scores.held_out()?)));
     let mut judged: Vec<(&str, &Indicators)> = judged.collect();
-    judged.sort_by(|a, b| a.1.rmse.total_cmp(&b.1.rmse));
+    order::ascending(&mut judged, |one| one.1.rmse);
     let Some((name, best)) = judged.first() else {
         return Answer::new(Tone::Warning, "there is no record to compare with");
     };

@@ -5,8 +5,9 @@ use super::RULES;
 use super::judge::Judged;
 use super::search::{Hypothesis, Search};
 use crate::fit::{Fit, FitOptions, fit, starts};
+use crate::order;
+use crate::parallel;
 use model_core::effect::Spec;
-use rayon::prelude::*;
 
 impl Search<'_> {
     /// `hypothesis` with a second copy of one of its effects, fitted from the best starting point of its
@@ -15,24 +16,21 @@ impl Search<'_> {
         let model = hypothesis.judged.model();
         let own = model.effects.iter().find(|added| added.name == spec.name)?;
         let learning = self.judge.learning(0);
-        let brief = starts(model, spec, &learning).into_par_iter().map(|start| {
+        let starts = starts(model, spec, &learning);
+        let mut brief = parallel::some(&starts, |start| {
             let mut twice = model.clone();
-            twice.add(spec, &start, own.reference);
+            twice.add(spec, start, own.reference);
             let options = FitOptions {
                 iterations: RULES.brief,
                 ..self.judge.options_for(&twice)
             };
             fit(&twice, &learning, &options).ok()
         });
-        let mut brief: Vec<Fit> = brief.collect::<Vec<_>>().into_iter().flatten().collect();
-        brief.sort_by(|a, b| a.mean_square().total_cmp(&b.mean_square()));
+        order::ascending(&mut brief, Fit::mean_square);
         brief.truncate(RULES.followed);
-        let judged = brief
-            .into_par_iter()
-            .map(|begun| self.judge.refitted(&begun.model).ok());
-        let judged: Vec<Option<Judged>> = judged.collect();
-        let both = judged.into_iter().flatten();
-        both.min_by(|a, b| a.rmse().total_cmp(&b.rmse()))
+        let both = parallel::some(&brief, |begun| self.judge.refitted(&begun.model).ok());
+        both.into_iter()
+            .min_by(|a, b| a.rmse().total_cmp(&b.rmse()))
     }
 }
 

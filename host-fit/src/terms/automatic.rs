@@ -12,10 +12,10 @@ use super::{Known, RULES};
 use crate::data::Record;
 use crate::excitation::bears_little;
 use crate::model::{Delay, Model};
+use crate::parallel;
 use crate::search::{Progress, Settings, StopReason};
 use crate::simulate::SimulateError;
 use model_core::effects::{ConstantDelay, SaturatingDelay};
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// From which level of y on, in inner units, a delay is tried as that of the attached flow …
@@ -118,11 +118,9 @@ pub fn base_model(
         true => linear::baselines(&given, &judge.learning(0)),
         false => Vec::new(),
     };
-    let linear = linear.into_par_iter();
-    let linear: Vec<Hypothesis> = linear
-        .filter_map(|model| judge.refitted(&model).ok())
-        .map(Hypothesis::new)
-        .collect();
+    let linear: Vec<Hypothesis> = parallel::some(&linear, |model| {
+        judge.refitted(model).ok().map(Hypothesis::new)
+    });
     let Some(root) = roots
         .iter()
         .min_by(by_score)
@@ -134,7 +132,7 @@ pub fn base_model(
     let root = Hypothesis::new(without_needless_law(&judge, root.judged.clone(), laws));
     progress("the same of second order");
     let second = second_order(&judge, &root, may_be_constant);
-    let mut found = search.run(root, || second);
+    let mut found = search.run(root, Some(&|| second.clone()));
     // Input coefficients of both signs (a zero, as of an inverse response) are outside first and second order: the search
     // starts again from such a model if it is clearly better than the best structure so far.
     let lead = |hypothesis: &&Hypothesis| {
@@ -145,7 +143,7 @@ pub fn base_model(
         && better.judged.size() + RULES.linear_better < found.best.judged.size()
     {
         let tried = found.tried;
-        found = search.run(better.clone(), || None);
+        found = search.run(better.clone(), None);
         found.tried += tried;
     }
     if let Some(plain) = plain_enough(&found) {
@@ -174,7 +172,7 @@ pub fn base_model(
                 ..Hypothesis::new(judged)
             };
             let tried = found.tried;
-            found = search.run(start, || None);
+            found = search.run(start, None);
             found.tried += tried;
         }
     }
@@ -186,10 +184,7 @@ pub fn base_model(
         let tried: Vec<Model> = averaged
             .flat_map(|law| AVERAGES.map(|window| with_average(own, law, window)))
             .collect();
-        let tried = tried
-            .into_par_iter()
-            .filter_map(|model| judge.refitted(&model).ok());
-        let tried: Vec<Judged> = tried.collect();
+        let tried = parallel::some(&tried, |model| judge.refitted(model).ok());
         let best = tried
             .into_iter()
             .min_by(|a, b| a.size().total_cmp(&b.size()));

@@ -11,6 +11,7 @@ use super::RULES;
 use super::screen::Screen;
 use crate::linalg::{dot, solve_symmetric};
 use crate::model::Model;
+use crate::order;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::ops::Range;
@@ -191,7 +192,7 @@ impl Chance {
         let best_of = |draw: usize| {
             let of_kind = |all: &Vec<&[Taken]>| {
                 let mut all: Vec<Taken> = all.iter().map(|taken| taken[draw]).collect();
-                all.sort_by(|a, b| b.learned.total_cmp(&a.learned));
+                order::descending(&mut all, |one| one.learned);
                 let kept = all.iter().take(RULES.kept_points);
                 kept.map(|taken| taken.held_out).fold(0.0, f64::max)
             };

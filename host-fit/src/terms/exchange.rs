@@ -10,7 +10,8 @@ use super::table::Table;
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit};
 use crate::model::Model;
-use rayon::prelude::*;
+use crate::order;
+use crate::parallel;
 use std::cmp::Ordering;
 
 /// An effect added to a model and fitted for a few iterations.
@@ -55,7 +56,7 @@ impl Search<'_> {
                 left <= RULES.promising * own && (!is_effect || effects <= RULES.in_its_place)
             })
             .collect();
-        let tried = leading.into_par_iter().filter_map(|candidate| {
+        let mut tried: Vec<InPlace> = parallel::some(leading, |candidate| {
             let proposal = screen.alone(&table, candidate)?;
             let fit = self.set_out(model, &proposal, RULES.brief)?;
             let held_out = self.judge.held_out(|_| &fit.model).ok()?;
@@ -66,9 +67,8 @@ impl Search<'_> {
                 fit,
             })
         });
-        let mut tried: Vec<InPlace> = tried.collect();
         let score = |other: &InPlace| score(other.held_out.rmse(), other.term.cost());
-        tried.sort_by(|a, b| score(a).total_cmp(&score(b)));
+        order::ascending(&mut tried, score);
         tried
     }
 
@@ -175,11 +175,9 @@ impl Search<'_> {
     pub(super) fn pruned(&self, mut hypothesis: Hypothesis, root: &Hypothesis) -> Hypothesis {
         let mut open: Vec<usize> = (0..hypothesis.terms.len()).collect();
         while !open.is_empty() && !self.interrupted() {
-            let without: Vec<Option<(usize, Hypothesis)>> = open
-                .par_iter()
-                .map(|index| Some((*index, self.as_well_without(&hypothesis, *index, root)?)))
-                .collect();
-            let needless: Vec<(usize, Hypothesis)> = without.into_iter().flatten().collect();
+            let needless: Vec<(usize, Hypothesis)> = parallel::some(&open, |index| {
+                Some((*index, self.as_well_without(&hypothesis, *index, root)?))
+            });
             open = needless.iter().map(|(index, _)| *index).collect();
             let by_score = |a: &(usize, Hypothesis), b: &(usize, Hypothesis)| {
                 a.1.score().total_cmp(&b.1.score())

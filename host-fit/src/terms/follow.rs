@@ -10,7 +10,8 @@ use super::table::path_terms;
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit, settle_fixed_delay, starts};
 use crate::model::Model;
-use rayon::prelude::*;
+use crate::order;
+use crate::parallel;
 
 impl Search<'_> {
     /// The first fit of a proposal, from the screening's prediction; from several starts if the error has
@@ -29,23 +30,21 @@ impl Search<'_> {
         // Only the best of many starts are fitted further.
         let many = all.len() > RULES.followed;
         let first = if many { iterations / 2 } else { iterations };
-        let fits = all
-            .into_par_iter()
-            .filter_map(|terms| self.set_out_from(model, proposal, terms, first));
-        let mut fits: Vec<Fit> = fits.collect();
+        let mut fits = parallel::some(all, |terms| {
+            self.set_out_from(model, proposal, terms, first)
+        });
         let better = |a: &Fit, b: &Fit| a.mean_square().total_cmp(&b.mean_square());
-        fits.sort_by(better);
+        order::ascending(&mut fits, Fit::mean_square);
         if many {
             fits.truncate(RULES.followed);
             let learning = self.judge.learning(0);
-            let further = fits.into_par_iter().map(|begun| {
+            fits = parallel::each(fits, |begun| {
                 let options = FitOptions {
                     iterations: iterations - first,
                     ..self.judge.options_for(&begun.model)
                 };
                 fit(&begun.model, &learning, &options).unwrap_or(begun)
             });
-            fits = further.collect();
         }
         fits.into_iter().min_by(better)
     }

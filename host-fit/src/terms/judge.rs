@@ -7,10 +7,10 @@ use crate::data::{Record, Use};
 use crate::fit::{Fit, FitOptions, LevelScatter, fit, pieces};
 use crate::linalg::dot;
 use crate::model::Model;
+use crate::parallel;
 use crate::residual::{NoiseSource, noise_floor};
 use crate::simulate::SimulateError;
 use model_core::recursion::Grading;
-use rayon::prelude::*;
 
 /// A model with its fits, one per fold, and its validation error.
 #[derive(Clone, Debug)]
@@ -242,10 +242,9 @@ impl Judge {
             .enumerate()
             .flat_map(|(fold, split)| split.judging.iter().map(move |judging| (fold, judging)))
             .collect();
-        let each = judged.par_iter().map(|(fold, judging)| {
+        let errors = parallel::each(&judged, |(fold, judging)| {
             Self::error(models(*fold), &judging.record, judging.scored_from())
         });
-        let errors: Vec<Result<Vec<f64>, SimulateError>> = each.collect();
         let mut errors: Vec<Vec<f64>> = errors.into_iter().collect::<Result<_, _>>()?;
         let Some(scatter) = &self.options.level_scatter else {
             return Ok(HeldOut::new(errors));
@@ -264,10 +263,9 @@ impl Judge {
     /// A missing channel, or a free run that diverges in another fold.
     pub fn judged_from(&self, first: Fit) -> Result<Judged, SimulateError> {
         let options = self.options_for(&first.model);
-        let others: Vec<Result<Fit, SimulateError>> = (1..self.folds.len())
-            .into_par_iter()
-            .map(|fold| fit(&first.model, &self.learning(fold), &options))
-            .collect();
+        let others = parallel::each(1..self.folds.len(), |fold| {
+            fit(&first.model, &self.learning(fold), &options)
+        });
         let mut fits = vec![first];
         for other in others {
             fits.push(other?);

@@ -2,8 +2,8 @@
 
 use super::search::{Hypothesis, Search};
 use crate::fit::rows;
+use crate::parallel;
 use model_core::effect::Place;
-use rayon::prelude::*;
 
 impl Search<'_> {
     /// The same structure with the delay law of the catalogue that fits best with it, those in `forgotten`
@@ -23,12 +23,11 @@ impl Search<'_> {
                 starts.extend(rows.into_iter().map(|row| (spec, row)));
             }
         }
-        let tried = starts.into_par_iter().filter_map(|(spec, parameters)| {
+        let tried = parallel::some(starts, |(spec, parameters)| {
             let mut with = model.clone();
             with.add(spec, &parameters, None);
             self.judge.refitted(&with).ok()
         });
-        let tried: Vec<_> = tried.collect();
         let best = (tried.into_iter()).min_by(|a, b| a.rmse().total_cmp(&b.rmse()))?;
         let pays = best.size() < hypothesis.judged.size();
         pays.then(|| Hypothesis {

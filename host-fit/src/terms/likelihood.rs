@@ -6,8 +6,8 @@ use crate::fit::sensitivities;
 use crate::linalg::{dot, inverse_where_known, symmetric_eigenvalues};
 use crate::model::{Coordinate, Model};
 use crate::noise::{Metric, NoiseModel, Series, Whitened};
+use crate::parallel;
 use crate::residual::{NoiseSource, noise_floor};
-use rayon::prelude::*;
 
 /// The range of a parameter in standard deviations of its prior.
 const RANGE: f64 = 4.0;
@@ -125,7 +125,7 @@ pub(super) fn normal_equations(
     records: &[Weighed],
 ) -> Option<NormalEquations> {
     let n = free.len();
-    let each = records.par_iter().map(|Weighed { record, metric }| {
+    let each = parallel::all(records, |Weighed { record, metric }| {
         let (run, columns) = sensitivities(model, record, free)?;
         let whitened = columns.iter().map(|c| metric.whiten(scored(record, c)));
         let columns: Vec<Whitened> = whitened.collect();
@@ -143,8 +143,7 @@ pub(super) fn normal_equations(
             gradient: own.dots(&columns),
             information,
         })
-    });
-    let each: Vec<NormalEquations> = each.collect::<Option<_>>()?;
+    })?;
     let mut sum = NormalEquations {
         log_likelihood: 0.0,
         gradient: vec![0.0; n],

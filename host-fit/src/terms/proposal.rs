@@ -5,8 +5,9 @@ use super::screen::Screen;
 use super::table::{Candidate, Table};
 use super::term::Term;
 use crate::linalg::{dot, solve_symmetric};
+use crate::order;
+use crate::parallel;
 use model_core::effect::Place;
-use rayon::prelude::*;
 
 /// Terms to add together, with their predicted gain.
 #[derive(Clone, Debug)]
@@ -41,7 +42,7 @@ impl Screen<'_> {
                 all.push((score, left, scale, vec![c]));
             }
         }
-        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        order::ascending(&mut all, |one| one.0);
         let singles: Vec<(f64, usize)> = all
             .iter()
             .take(RULES.paired)
@@ -63,7 +64,7 @@ impl Screen<'_> {
                 }
             }
         }
-        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        order::ascending(&mut all, |one| one.0);
         let worth = all.into_iter().take_while(|(score, ..)| *score < 0.0);
         let proposals = worth.map(|(score, left, scale, set)| {
             let mut rest = scale.as_slice();
@@ -152,20 +153,17 @@ impl<'t> Sets<'t> {
             kept.for_each(|i| used[*i] = true);
             used
         };
-        let rows: Vec<Vec<(f64, f64)>> = (0..count)
-            .into_par_iter()
-            .map(|i| {
-                let wanted = |j: usize| used[i] && used[j] && j <= i;
-                let cell = |j: usize| {
-                    if wanted(j) {
-                        both(&columns[i], &columns[j])
-                    } else {
-                        (0.0, 0.0)
-                    }
-                };
-                (0..count).map(cell).collect()
-            })
-            .collect();
+        let rows: Vec<Vec<(f64, f64)>> = parallel::each(0..count, |i| {
+            let wanted = |j: usize| used[i] && used[j] && j <= i;
+            let cell = |j: usize| {
+                if wanted(j) {
+                    both(&columns[i], &columns[j])
+                } else {
+                    (0.0, 0.0)
+                }
+            };
+            (0..count).map(cell).collect()
+        });
         let products = (0..count * count)
             .map(|cell| {
                 let (i, j) = (cell / count, cell % count);

@@ -17,8 +17,8 @@ use crate::data::Record;
 use crate::fit::{channel_reference, sensitivities};
 use crate::linalg::{dot, gram, solve_symmetric};
 use crate::model::{Delay, Model};
+use crate::parallel;
 use model_core::effect::Spec;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// First-order prediction for all parameters of one effect together.
@@ -76,11 +76,8 @@ impl<'a> Screen<'a> {
         let samples: usize = records.iter().map(|r| r.len()).sum();
         let stride = samples.div_ceil(RULES.longest_series).max(1);
         let indices = judge.free(model);
-        let each: Option<Vec<_>> = records
-            .par_iter()
-            .map(|record| sensitivities(model, record, &indices))
-            .collect();
-        let (runs, slopes): (Vec<Vec<f64>>, Vec<Vec<Vec<f64>>>) = each?.into_iter().unzip();
+        let each = parallel::all(&records, |record| sensitivities(model, record, &indices))?;
+        let (runs, slopes): (Vec<Vec<f64>>, Vec<Vec<Vec<f64>>>) = each.into_iter().unzip();
         let learned = (0..fold.learning.len())
             .map(|i| records[i].len().saturating_sub(from[i]) / stride)
             .sum();
@@ -310,13 +307,13 @@ impl<'a> Screen<'a> {
     /// First-order prediction of the best moves of the terms' lags.
     #[must_use]
     pub(super) fn moves_of(&self, terms: &[Term]) -> Moves {
-        let probed = terms.par_iter().enumerate().filter_map(|(index, term)| {
+        let probed = parallel::some(0..terms.len(), |index| {
+            let term = &terms[index];
             let mut column =
                 self.change(&term.moved_in(self.model, term.lag()? + RULES.lag_probe)?)?;
             let along = self.residualise(&mut column);
             Some((index, column, along))
         });
-        let probed: Vec<(usize, Vec<f64>, Vec<f64>)> = probed.collect();
         let columns: Vec<&[f64]> = probed.iter().map(|(_, column, _)| &column[..]).collect();
         let mut moves = Moves {
             steps: vec![0; terms.len()],

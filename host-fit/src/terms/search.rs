@@ -10,11 +10,12 @@ use super::table::{Table, has_jet_effect};
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, Known, fit, lean_base};
 use crate::model::{Model, Start};
+use crate::order;
+use crate::parallel;
 use crate::residual::NoiseSource;
 use crate::simulate::SimulateError;
 use model_core::effect::Spec;
 use model_core::effects::NUISANCES;
-use rayon::prelude::*;
 use std::cmp::Ordering;
 use std::sync::atomic::{AtomicBool, Ordering as Memory};
 
@@ -95,6 +96,9 @@ impl Hypothesis {
 pub(super) fn score(rmse: f64, cost: usize) -> f64 {
     rmse.ln() + RULES.price * cost as f64
 }
+
+/// Makes a second root of a search. Behind a reference: the search is compiled once for all its callers.
+pub(crate) type Second<'a> = &'a dyn Fn() -> Option<Hypothesis>;
 
 /// The result of a search.
 #[derive(Clone, Debug)]
@@ -199,16 +203,13 @@ impl Search<'_> {
         if !self.judge.on_off {
             // Graded commands identify the response to jets of part strength.
             let others = self.judge.other_gradings(judged.model().grading);
-            let others: Vec<Judged> = others
-                .into_par_iter()
-                .filter_map(|grading| {
-                    let other = Model {
-                        grading,
-                        ..judged.model().clone()
-                    };
-                    self.judge.refitted(&other).ok()
-                })
-                .collect();
+            let others = parallel::some(others, |grading| {
+                let other = Model {
+                    grading,
+                    ..judged.model().clone()
+                };
+                self.judge.refitted(&other).ok()
+            });
             let better = others
                 .into_iter()
                 .min_by(|a, b| a.rmse().total_cmp(&b.rmse()));
@@ -241,7 +242,7 @@ impl Search<'_> {
     /// follows the less promising candidates of the root and of the best hypothesis. Where the noise level is not
     /// reached, lags are searched anew beside the effects of the best hypothesis.
     #[must_use]
-    pub fn run(&self, root: Hypothesis, second: impl FnOnce() -> Option<Hypothesis>) -> Found {
+    pub fn run(&self, root: Hypothesis, second: Option<Second<'_>>) -> Found {
         self.run_within(root, second, &mut Effort::of_a_search())
     }
 
@@ -250,7 +251,7 @@ impl Search<'_> {
     pub fn run_within(
         &self,
         root: Hypothesis,
-        second: impl FnOnce() -> Option<Hypothesis>,
+        second: Option<Second<'_>>,
         effort: &mut Effort,
     ) -> Found {
         let (mut all, mut tried) = self.rounds(root, second, effort);
@@ -271,7 +272,7 @@ impl Search<'_> {
             && let Some(start) = self.without_lags(&found, &root)
         {
             (self.progress)("lags anew beside the effects");
-            let (anew, further) = self.rounds(start, || None, effort);
+            let (anew, further) = self.rounds(start, None, effort);
             tried += further;
             let other = &anew[best(&anew, |_| true)];
             if other.score() < found.score() - RULES.price {
@@ -293,11 +294,10 @@ impl Search<'_> {
     fn rounds(
         &self,
         root: Hypothesis,
-        second: impl FnOnce() -> Option<Hypothesis>,
+        mut second: Option<Second<'_>>,
         effort: &mut Effort,
     ) -> (Vec<Hypothesis>, usize) {
         let mut all = vec![root];
-        let mut second = Some(second);
         let mut tried = Vec::new();
         let (mut last, mut stalled, mut since) = (RULES.rounds, 0, None);
         let mut from_bound = 0;
@@ -518,22 +518,18 @@ impl Search<'_> {
         pool: &[(usize, Proposal)],
         width: usize,
     ) -> Vec<Hypothesis> {
-        let brief: Vec<Option<(f64, usize, Fit)>> = pool
-            .par_iter()
-            .enumerate()
-            .map(|(at, (index, proposal))| {
-                if self.interrupted() {
-                    return None;
-                }
-                let parent = &all[*index];
-                let fit = self.set_out(parent.judged.model(), proposal, RULES.brief)?;
-                let rmse = self.judge.held_out(|_| &fit.model).ok()?.rmse();
-                let cost: usize = proposal.terms.iter().map(Term::cost).sum();
-                Some((score(rmse, parent.cost() + cost), at, fit))
-            })
-            .collect();
-        let mut brief: Vec<(f64, usize, Fit)> = brief.into_iter().flatten().collect();
-        brief.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut brief: Vec<(f64, usize, Fit)> = parallel::some(0..pool.len(), |at| {
+            if self.interrupted() {
+                return None;
+            }
+            let (index, proposal) = &pool[at];
+            let parent = &all[*index];
+            let fit = self.set_out(parent.judged.model(), proposal, RULES.brief)?;
+            let rmse = self.judge.held_out(|_| &fit.model).ok()?.rmse();
+            let cost: usize = proposal.terms.iter().map(Term::cost).sum();
+            Some((score(rmse, parent.cost() + cost), at, fit))
+        });
+        order::ascending(&mut brief, |one| one.0);
         // Refitted in full in any case: the best without effects and the best on each screened model, for
         // which a brief fit says less. Proposals that converge to the same model are fitted once.
         let mut leading: Vec<(usize, Fit)> = Vec::new();
@@ -552,7 +548,7 @@ impl Search<'_> {
                 leading.push((at, fit));
             }
         }
-        let finished = leading.into_par_iter().map(|(at, fit)| {
+        let finished = parallel::each(leading, |(at, fit)| {
             let (index, proposal) = &pool[at];
             let terms = [all[*index].terms.clone(), proposal.terms.clone()].concat();
             let from_given = all[*index].from_given;
@@ -563,7 +559,7 @@ impl Search<'_> {
             });
             finished.collect::<Vec<_>>()
         });
-        finished.collect::<Vec<_>>().concat()
+        finished.concat()
     }
 
     /// The best of `finished` with another response to jets of part strength, if that lowers the error. Only
@@ -576,8 +572,8 @@ impl Search<'_> {
             return None;
         }
         let learning = self.judge.learning(0);
-        let others = self.judge.other_gradings(model.grading).into_par_iter();
-        let fits = others.filter_map(|grading| {
+        let others = self.judge.other_gradings(model.grading);
+        let fits = parallel::some(others, |grading| {
             let other = Model {
                 grading,
                 ..model.clone()
@@ -588,7 +584,6 @@ impl Search<'_> {
             };
             fit(&other, &learning, &options).ok()
         });
-        let fits: Vec<Fit> = fits.collect();
         let least = fits
             .into_iter()
             .min_by(|a, b| a.mean_square().total_cmp(&b.mean_square()))?;

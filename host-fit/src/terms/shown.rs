@@ -6,7 +6,7 @@ use super::term::Term;
 use crate::fit::Known;
 use crate::linalg::{dot, dots};
 use crate::model::Model;
-use rayon::prelude::*;
+use crate::parallel;
 use std::ops::Range;
 
 /// Two columns are linearly dependent if the residual share of their energy is below this.
@@ -55,10 +55,8 @@ impl Unnamed {
             columns.remove(path);
         }
         let learned = |i: usize| &columns[i][..screen.learned];
-        let lower = (0..columns.len()).into_par_iter();
-        let mut products: Vec<Vec<f64>> = lower
-            .map(|i| dots(learned(i), (0..=i).map(learned)))
-            .collect();
+        let mut products =
+            parallel::each(0..columns.len(), |i| dots(learned(i), (0..=i).map(learned)));
         for i in 0..products.len() {
             let upper: Vec<f64> = products[i + 1..].iter().map(|row| row[i]).collect();
             products[i].extend(upper);

@@ -8,10 +8,11 @@ use super::term::Term;
 use crate::fit::{Known, channel_reference, sensitivities};
 use crate::linalg::dot;
 use crate::model::Model;
+use crate::order;
+use crate::parallel;
 use model_core::effect::{Place, Sign, Spec};
 use model_core::effects::{LEVEL_RATE, PATH_TERMS, SLOW_WAKE, ZERO_OFFSET};
 use model_core::recursion::Grading;
-use rayon::prelude::*;
 
 /// Number of lags whose derivatives one run computes, two each.
 const LAGS_AT_ONCE: usize = 4;
@@ -76,7 +77,7 @@ impl Table {
     }
 
     fn sorted(mut candidates: Vec<Candidate>, columns: Vec<Vec<f64>>, chance: Chance) -> Self {
-        candidates.sort_by(|a, b| b.held_out.total_cmp(&a.held_out));
+        order::descending(&mut candidates, |one| one.held_out);
         Self {
             candidates,
             columns,
@@ -131,7 +132,8 @@ impl Screen<'_> {
             .into_iter()
             .filter(|lag| !self.model.product_lags.contains(lag))
             .collect();
-        let each = lags.par_chunks(LAGS_AT_ONCE).map(|lags| {
+        let chunks: Vec<&[u16]> = lags.chunks(LAGS_AT_ONCE).collect();
+        let each = parallel::each(chunks, |lags| {
             let terms = lags.iter().map(|lag| Term::Memory(*lag));
             let model = terms.fold(self.model.clone(), |m, term| term.added_to(&m, &[]));
             // The coordinate vector is d, a, b, c by columns; the first input's c is at its end.
@@ -156,7 +158,7 @@ impl Screen<'_> {
             let of = |(i, lag): (usize, &u16)| (*lag, [column(2 * i), column(2 * i + 1)]);
             lags.iter().enumerate().map(of).collect()
         });
-        each.flatten().collect()
+        each.into_iter().flatten().collect()
     }
 
     /// Changes by a second lag of the flow.
@@ -165,13 +167,12 @@ impl Screen<'_> {
         if !order(&self.model.state_lags) {
             return Vec::new();
         }
-        let changes = RULES.second_lags.into_par_iter().filter_map(|samples| {
-            let term = Term::Inertia(samples);
+        parallel::some(&RULES.second_lags[..], |samples| {
+            let term = Term::Inertia(*samples);
             let mut column = self.change(&term.added_to(self.model, &[]))?;
             self.residualise(&mut column);
             Some((term, column))
-        });
-        changes.collect()
+        })
     }
 
     /// Changes by terms in the jet path and the reading, from all starting values of their cards.
@@ -179,13 +180,12 @@ impl Screen<'_> {
         let absent = |spec: &&'static Spec| !self.model.has_effect(spec.name);
         let terms = PATH_TERMS.into_iter().filter(absent).flat_map(path_terms);
         let terms: Vec<Term> = terms.collect();
-        let changes = terms.into_par_iter().filter_map(|term| {
+        parallel::some(terms, |term| {
             let mut column = self.change(&term.added_to(self.model, &[]))?;
             self.residualise(&mut column);
             let (scale, ..) = self.regress(&[&column])?;
             Self::is_feasible(&term, scale[0]).then_some((term, column))
-        });
-        changes.collect()
+        })
     }
 
     /// Changes by a slow wake, per unit of its strength.
@@ -193,14 +193,13 @@ impl Screen<'_> {
         if self.model.has_effect(SLOW_WAKE.name) {
             return Vec::new();
         }
-        let changes = RULES.wakes_s.into_par_iter().filter_map(|time_constant| {
-            let term = Term::Wake(time_constant);
+        parallel::some(&RULES.wakes_s[..], |time_constant| {
+            let term = Term::Wake(*time_constant);
             let mut column = self.change(&term.added_to(self.model, &[RULES.slope]))?;
             column.iter_mut().for_each(|x| *x /= RULES.slope);
             self.residualise(&mut column);
             Some((term, column))
-        });
-        changes.collect()
+        })
     }
 
     /// Changes by a rate that depends on the level, without jets and under them.
@@ -262,7 +261,7 @@ impl Screen<'_> {
                 })
             })
             .collect();
-        rated.sort_by(|a, b| b.learned.total_cmp(&a.learned));
+        order::descending(&mut rated, |one| one.learned);
         // Neighbouring lags are equivalent: only the best of each neighbourhood is kept.
         let mut kept: Vec<Candidate> = Vec::new();
         for candidate in rated {
@@ -333,7 +332,7 @@ impl Screen<'_> {
         noise: Option<&Noise>,
         by_chance: &mut Vec<(String, Vec<Taken>)>,
     ) -> Vec<Rated> {
-        let rated = terms.into_par_iter().map(|term| {
+        let all = parallel::some(terms, |term| {
             let with = term.added_to(self.model, &[]);
             let mut column = match noise {
                 Some(_) => self.change(&with)?,
@@ -357,15 +356,14 @@ impl Screen<'_> {
             };
             Some((rated, feasible, taken))
         });
-        let all: Vec<_> = rated.collect();
         let mut rated = Vec::new();
-        for (one, feasible, taken) in all.into_iter().flatten() {
+        for (one, feasible, taken) in all {
             by_chance.extend(taken.map(|taken| (one.term.name(), taken)));
             if feasible {
                 rated.push(one);
             }
         }
-        rated.sort_by(|a, b| b.learned.total_cmp(&a.learned));
+        order::descending(&mut rated, |one| one.learned);
         rated
     }
 
@@ -441,7 +439,7 @@ impl Screen<'_> {
                 );
             }
             rated.extend(self.rated(others, noise, &mut by_chance));
-            rated.sort_by(|a, b| b.learned.total_cmp(&a.learned));
+            order::descending(&mut rated, |one| one.learned);
         }
         let mut met = Vec::new();
         rated.retain(|one| {
@@ -450,10 +448,9 @@ impl Screen<'_> {
             met.push(key);
             first
         });
-        let judged = rated.into_par_iter().map(|one| self.held_out(one));
-        let judged: Vec<Option<_>> = judged.collect();
+        let judged = parallel::some(rated, |one| self.held_out(one));
         let mut kept = Vec::new();
-        for (mut candidate, column) in judged.into_iter().flatten() {
+        for (mut candidate, column) in judged {
             candidate.columns = vec![columns.len()];
             columns.push(column);
             kept.push(candidate);

@@ -1,7 +1,6 @@
 //! Standard checks of a model: residual correlations with their 95 % bands, the residual spectrum, step responses, poles.
 
 mod correlation;
-pub(crate) mod fourier;
 mod response;
 mod spectrum;
 

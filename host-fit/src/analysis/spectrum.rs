@@ -1,6 +1,7 @@
 //! Power spectral density of residuals.
 
-use super::{Residuals, fourier};
+use super::Residuals;
+use realfft::RealFftPlanner;
 use std::f64::consts::TAU;
 
 /// One-sided power spectral densities, in the unit of y squared per Hz. Their integrals over frequency are mean squares.
@@ -32,6 +33,7 @@ pub fn spectrum(residuals: &Residuals) -> Spectrum {
         .map(|k| 0.5 - 0.5 * (TAU * k as f64 / length as f64).cos())
         .collect();
     let weight: f64 = window.iter().map(|w| w * w).sum();
+    let transform = RealFftPlanner::new().plan_fft_forward(length);
     let density = |signals: &[Vec<f64>]| {
         let mut sum = vec![0.0; length / 2 + 1];
         let mut segments = 0.0;
@@ -41,13 +43,16 @@ pub fn spectrum(residuals: &Residuals) -> Spectrum {
                     continue;
                 };
                 let mean = part.iter().sum::<f64>() / length as f64;
-                let input: Vec<f64> = part
+                let mut input: Vec<f64> = part
                     .iter()
                     .zip(&window)
                     .map(|(v, w)| (v - mean) * w)
                     .collect();
-                for (sum, line) in sum.iter_mut().zip(fourier::energies(&input)) {
-                    *sum += line;
+                let mut lines = transform.make_output_vec();
+                // Cannot fail: planned for this length.
+                let _ = transform.process(&mut input, &mut lines);
+                for (sum, line) in sum.iter_mut().zip(&lines) {
+                    *sum += line.norm_sqr();
                 }
                 segments += 1.0;
             }

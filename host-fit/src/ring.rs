@@ -37,7 +37,8 @@ impl<T: Real> Past<T> for Ring<T> {
         if lag > mask {
             return T::ZERO;
         }
-        self.samples[self.newest.wrapping_sub(lag) & mask]
+        let at = self.newest.wrapping_sub(lag) & mask;
+        self.samples.get(at).copied().unwrap_or(T::ZERO)
     }
 }
 

@@ -175,13 +175,8 @@ impl<T: Real> Bilinear<'_, T> {
         {
             return self.graded(*drive, known, horizon, y, arriving(0));
         }
-        let mut next = self.constant + known.free;
-        for (a, lag) in pairs(self.a, self.state_lags) {
-            let lag = self.convention.behind_newest(*lag);
-            if lag < horizon {
-                next = next + *a * y.back(lag);
-            }
-        }
+        let start = self.constant + known.free;
+        let mut next = self.added(start, self.a, self.state_lags, horizon, y);
         for l in 0..self.b.len() {
             let jet = arriving(l);
             // Skipped only if value and derivatives are exactly zero.
@@ -206,18 +201,34 @@ impl<T: Real> Bilinear<'_, T> {
         y: &impl Past<T>,
     ) -> T {
         // Only the first input has precomputed sums.
-        let (mut gain, horizon) = if l == 0 {
+        let (start, horizon) = if l == 0 {
             (start + known.gain, horizon)
         } else {
             (start, usize::MAX)
         };
-        for (c, lag) in pairs(self.column(l), self.product_lags) {
+        self.added(start, self.column(l), self.product_lags, horizon, y)
+    }
+
+    /// `start` + Σ_i x_i y_{k−τ_i} over the lags below `horizon`, in order.
+    #[inline(always)]
+    fn added(
+        &self,
+        start: T,
+        mut x: &[T],
+        mut lags: &[u16],
+        horizon: usize,
+        y: &impl Past<T>,
+    ) -> T {
+        let mut sum = start;
+        // Slices without their first items cost less than two iterators, whose ends are told apart at every turn.
+        while let ([first, x_after @ ..], [lag, lags_after @ ..]) = (x, lags) {
             let lag = self.convention.behind_newest(*lag);
             if lag < horizon {
-                gain = gain + *c * y.back(lag);
+                sum = sum + *first * y.back(lag);
             }
+            (x, lags) = (x_after, lags_after);
         }
-        gain
+        sum
     }
 
     /// [`next`](Self::next) for one input and a grading other than proportional.

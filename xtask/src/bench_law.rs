@@ -5,6 +5,6 @@ use crate::shell::{run, scenario};
 
 pub(crate) const TASK: Task = Task {
     name: "bench-law",
-    does: "the designed law against relay, PI, Smith predictor and open loop: one table",
-    run: |_| run(&mut scenario("bench-law")),
+    does: "the designed law against relay, PI, Smith predictor and open loop: one table; --beyond: only the plants with physics that its model lacks",
+    run: |arguments| run(scenario("bench-law").args(arguments)),
 };

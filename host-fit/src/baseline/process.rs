@@ -6,6 +6,7 @@ use super::response::{Response, Shape};
 use super::series::{Scaling, Series, command_before};
 use super::starts::{Start, starts};
 use crate::data::Record;
+use crate::picture::readable_time;
 use serde::Serialize;
 use std::fmt;
 
@@ -214,12 +215,10 @@ struct Seconds(f64);
 
 impl fmt::Display for Seconds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (value, unit) = match self.0 {
-            0.0 => return f.write_str("0 s"),
-            s if s < 1e-3 => (1e6 * s, "µs"),
-            s if s < 1.0 => (1e3 * s, "ms"),
-            s => (s, "s"),
-        };
+        if self.0 == 0.0 {
+            return f.write_str("0 s");
+        }
+        let (value, unit) = readable_time(self.0);
         let digits = (2.0 - value.log10().floor()).clamp(0.0, 2.0) as usize;
         write!(f, "{value:.digits$} {unit}")
     }

@@ -13,7 +13,7 @@ use crate::data::Record;
 use crate::fit::{FitOptions, fit, fit_with_effect, starts};
 use crate::model::{Delay, Model};
 use crate::parallel;
-use crate::picture::significant;
+use crate::picture::{significant, time};
 use crate::power::detectable;
 use crate::preparation::Preparation;
 use crate::simulate::SimulateError;
@@ -443,10 +443,10 @@ fn delay_laws(judge: &RecordJudge, spec: &'static Spec) -> Vec<PossibleFlow> {
         models.push(best.model.with_values(&moved));
     }
     let judged = models.into_iter().filter_map(|model| {
-        let said = variation(&model) * 1e3 * model.sample_period_s;
+        let said = variation(&model) * model.sample_period_s;
         let flow = judge.as_it_is(model)?;
         (flow.p_value >= RULES.not_excluded).then(|| PossibleFlow {
-            name: format!("{} that varies by {} ms", spec.name, significant(said, 2)),
+            name: format!("{} that varies by {}", spec.name, time(said, 2)),
             p_value: flow.p_value,
             model: flow.model,
         })

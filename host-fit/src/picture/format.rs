@@ -1,5 +1,29 @@
 //! Formatting of numbers for readers.
 
+/// A time, s, as a number with the unit in which it is read.
+#[must_use]
+pub fn readable_time(seconds: f64) -> (f64, &'static str) {
+    match seconds.abs() {
+        s if s >= 1.0 => (seconds, "s"),
+        s if s >= 1e-3 || s == 0.0 => (1e3 * seconds, "ms"),
+        _ => (1e6 * seconds, "µs"),
+    }
+}
+
+/// A time, s, with `digits` significant digits and its unit.
+///
+/// ```
+/// use host_fit::picture::time;
+/// assert_eq!(time(0.029_4, 2), "29 ms");
+/// assert_eq!(time(29.0, 2), "29 s");
+/// assert_eq!(time(0.000_25, 2), "250 µs");
+/// ```
+#[must_use]
+pub fn time(seconds: f64, digits: usize) -> String {
+    let (value, unit) = readable_time(seconds);
+    format!("{} {unit}", significant(value, digits))
+}
+
 /// `value` with `digits` significant digits, no trailing zeros, a true minus sign and
 /// powers of ten outside 10⁻⁴…10⁶; an en dash when it is not finite.
 ///

@@ -13,7 +13,7 @@ use crate::excitation::says_little;
 use crate::experiment::Separation;
 use crate::indicators::{Scores, score};
 use crate::model::{Model, Training};
-use crate::picture::significant;
+use crate::picture::{significant, time};
 use crate::residual::NoiseSource;
 use crate::terms::HeldOutBy;
 use serde::{Serialize, Serializer};
@@ -327,7 +327,7 @@ fn where_it_enters(trace: &Trace) -> String {
 fn spoken(value: f64, unit: &str) -> String {
     match unit {
         "-" => format!("{} %", significant(100.0 * value, 2)),
-        "s" => format!("{} ms", significant(1000.0 * value, 2)),
+        "s" => time(value, 2),
         unit => format!("{} in {unit}", significant(value, 2)),
     }
 }

@@ -88,7 +88,7 @@ impl Unit {
     #[must_use]
     pub fn spoken(self, value: f64) -> (f64, &'static str) {
         match self {
-            Self::Second => (1000.0 * value, "ms"),
+            Self::Second if value.abs() < 1.0 => (1000.0 * value, "ms"),
             Self::None => (100.0 * value, "%"),
             Self::Y => (value, "in y"),
             unit => (value, unit.symbol()),

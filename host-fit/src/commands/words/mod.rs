@@ -14,7 +14,7 @@ use host_fit::diagnose::ParameterEstimate;
 use host_fit::identify::Refinement;
 use host_fit::indicators::{Indicators, Scores};
 use host_fit::model::{Delay, Law, Model, TransportLaw};
-use host_fit::picture::significant;
+use host_fit::picture::{significant, time};
 use host_fit::rules::Rulebook;
 use host_fit::steps::{
     Average, Beside, BoardConstants, Comparison, EffectEntry, Extension, Identification,
@@ -434,7 +434,7 @@ pub(crate) fn describe(model: &Model) -> String {
     text
 }
 
-/// The law with its values: times in ms, everything else in its unit.
+/// The law with its values in their units.
 fn law_in_words(law: &TransportLaw) -> String {
     let mut words = law
         .spec
@@ -443,7 +443,7 @@ fn law_in_words(law: &TransportLaw) -> String {
         .to_owned();
     for (parameter, value) in law.spec.parameters.iter().zip(&law.parameters) {
         let value = match parameter.unit {
-            Unit::Second => format!("{} ms", significant(1e3 * value, 3)),
+            Unit::Second => time(*value, 3),
             _ => significant(*value, 4),
         };
         words = words.replacen("{}", &value, 1);

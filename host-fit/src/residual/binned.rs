@@ -1,6 +1,6 @@
 //! Assignment of samples to the bins of each coordinate.
 
-use super::coordinate::{FailureCoordinate, Window};
+use super::coordinate::FailureCoordinate;
 use super::rules::RULES;
 use crate::data::Record;
 
@@ -75,16 +75,13 @@ pub(super) fn coordinates(source: &Source<'_>) -> Vec<Binned> {
         add(FailureCoordinate::LevelOfU, Folds::Blocks);
         add(FailureCoordinate::RateOfY, Folds::Blocks);
     }
-    for samples in RULES.windows {
-        let window = Window {
-            samples,
-            period_s: period,
-        };
+    for window_s in RULES.windows_s {
+        let samples = window_samples(window_s, period);
         if source.records.iter().any(|r| r.len() > 2 * samples) {
             let coordinate = if on_off {
-                FailureCoordinate::Blowing(window)
+                FailureCoordinate::Blowing { window_s }
             } else {
-                FailureCoordinate::MeanInput(window)
+                FailureCoordinate::MeanInput { window_s }
             };
             add(coordinate, Folds::Blocks);
         }
@@ -130,8 +127,8 @@ pub(super) fn values(
                 .map(|pair| (pair[1] - pair[0]) / period);
             std::iter::once(0.0).chain(slopes).collect()
         }
-        FailureCoordinate::Blowing(window) | FailureCoordinate::MeanInput(window) => {
-            moving_mean(&record.u, window.samples)
+        FailureCoordinate::Blowing { window_s } | FailureCoordinate::MeanInput { window_s } => {
+            moving_mean(&record.u, window_samples(*window_s, period))
         }
         FailureCoordinate::TimeInRecord => (0..record.len()).map(|k| k as f64 * period).collect(),
         FailureCoordinate::Channel(name) => record.channels.get(name).cloned().unwrap_or_default(),
@@ -142,6 +139,10 @@ pub(super) fn values(
         }
         FailureCoordinate::FrequencyBand => Vec::new(),
     }
+}
+
+fn window_samples(window_s: f64, period: f64) -> usize {
+    (window_s / period).round().max(1.0) as usize
 }
 
 /// Whether the input is piecewise constant.
@@ -352,10 +353,7 @@ mod tests {
             assert!((80..220).contains(&count), "{count}");
         }
         assert!(level.ranges.windows(2).all(|pair| pair[0].1 == pair[1].0));
-        let long = FailureCoordinate::Blowing(Window {
-            samples: 4000,
-            period_s: 0.001,
-        });
+        let long = FailureCoordinate::Blowing { window_s: 4.0 };
         assert!(all.iter().all(|b| b.coordinate != long), "too short");
     }
 }

@@ -21,10 +21,16 @@ pub enum FailureCoordinate {
     LevelOfU,
     /// Rate of change of the model's output, y/s; for graded commands.
     RateOfY,
-    /// Fraction of a window of the past in which the valve was open.
-    Blowing(Window),
-    /// Mean of the command over a window of the past; for graded commands.
-    MeanInput(Window),
+    /// Fraction of the last `window_s` seconds in which the valve was open.
+    Blowing {
+        /// Window length, s.
+        window_s: f64,
+    },
+    /// Mean of the command over the last `window_s` seconds; for graded commands.
+    MeanInput {
+        /// Window length, s.
+        window_s: f64,
+    },
     /// Time since the record began, s.
     TimeInRecord,
     /// A measured channel, in its own unit.
@@ -43,22 +49,6 @@ pub enum FailureCoordinate {
     FrequencyBand,
 }
 
-/// A stretch of the past.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Window {
-    /// Its samples, at least 1.
-    pub samples: usize,
-    /// Time between them, s.
-    pub period_s: f64,
-}
-
-impl std::fmt::Display for Window {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let seconds = self.samples as f64 * self.period_s;
-        write!(f, "{} s", significant(seconds, 3))
-    }
-}
-
 impl FailureCoordinate {
     /// Unit of its values; empty for a pure number and for channels.
     #[must_use]
@@ -69,8 +59,8 @@ impl FailureCoordinate {
             Self::LevelOfU => "u",
             Self::RateOfY => "y/s",
             Self::FrequencyBand => "Hz",
-            Self::Blowing(_)
-            | Self::MeanInput(_)
+            Self::Blowing { .. }
+            | Self::MeanInput { .. }
             | Self::Channel(_)
             | Self::PulseNumber
             | Self::PulseInCycle { .. } => "",
@@ -86,7 +76,9 @@ impl FailureCoordinate {
             | Self::Channel(_)
             | Self::PulseNumber
             | Self::PulseInCycle { .. } => true,
-            Self::Blowing(window) | Self::MeanInput(window) => window.samples >= RULES.slow_window,
+            Self::Blowing { window_s } | Self::MeanInput { window_s } => {
+                *window_s >= RULES.slow_window_s
+            }
             Self::SinceRisingEdge
             | Self::SinceFallingEdge
             | Self::LevelOfY
@@ -135,8 +127,8 @@ impl FailureCoordinate {
             }
             Self::LevelOfU
             | Self::RateOfY
-            | Self::Blowing(_)
-            | Self::MeanInput(_)
+            | Self::Blowing { .. }
+            | Self::MeanInput { .. }
             | Self::Channel(_) => format!("at {self} between {low} and {high}"),
         }
     }
@@ -160,8 +152,8 @@ impl fmt::Display for FailureCoordinate {
             Self::LevelOfY => f.write_str("level of y"),
             Self::LevelOfU => f.write_str("level of u"),
             Self::RateOfY => f.write_str("rate of change of y"),
-            Self::Blowing(window) => write!(f, "blowing in the last {window}"),
-            Self::MeanInput(window) => write!(f, "mean input over the last {window}"),
+            Self::Blowing { window_s } => write!(f, "blowing in the last {window_s} s"),
+            Self::MeanInput { window_s } => write!(f, "mean input over the last {window_s} s"),
             Self::TimeInRecord => f.write_str("time in the record"),
             Self::Channel(name) => write!(f, "channel {name}"),
             Self::PulseNumber => f.write_str("pulse number"),
@@ -183,19 +175,12 @@ impl Serialize for FailureCoordinate {
 #[cfg(test)]
 mod tests {
     use super::FailureCoordinate as C;
-    use super::Window;
 
     #[test]
     fn names_and_stretches_read_well() {
-        let of = |samples| {
-            C::Blowing(Window {
-                samples,
-                period_s: 0.001,
-            })
-        };
-        let long = of(4000);
+        let long = C::Blowing { window_s: 4.0 };
         assert_eq!(long.to_string(), "blowing in the last 4 s");
-        assert!(long.is_slow() && !of(250).is_slow());
+        assert!(long.is_slow() && !C::Blowing { window_s: 0.25 }.is_slow());
         assert_eq!(
             long.stretch(0.25, 1.0),
             "at blowing in the last 4 s between 0.25 and 1"

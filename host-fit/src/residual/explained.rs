@@ -52,7 +52,8 @@ struct JudgedSample {
 impl Errors {
     pub(super) fn block(&self, record: usize) -> usize {
         let length = self.residual.get(record).map_or(0, Vec::len);
-        RULES.block.clamp(1, (length / RULES.fewest_blocks).max(1))
+        let block = (RULES.block_s / self.period_s).round() as usize;
+        block.clamp(1, (length / RULES.fewest_blocks).max(1))
     }
 
     /// Σ (e² − σ²).

@@ -13,7 +13,7 @@ mod spectrum;
 mod trend;
 mod words;
 
-pub use coordinate::{FailureCoordinate, Window};
+pub use coordinate::FailureCoordinate;
 pub use explained::Dependence;
 pub use noise::NoiseSource;
 pub use rules::{RULES, Rules};

@@ -17,7 +17,7 @@ rules! {
     event_deviations: f64 = 4.0, "standard deviations", "convention; tested by the same tests";
 
     /// Block length of folds and standard errors, longer than the memory of the flow.
-    block: usize = 250, "samples", "judgement: the window of ỹ in eq. (1) of the paper";
+    block_s: f64 = 0.25, "s", "judgement: the window of ỹ in eq. (1) of the paper";
     /// Fewest blocks of a record.
     fewest_blocks: usize = 10, "", "convention";
     /// Number of cross-validation folds over blocks.
@@ -37,9 +37,9 @@ rules! {
     /// Bins of a coordinate with many values.
     bins: usize = 30, "", "judgement: 300 samples a bin in a record of 10 s";
     /// Windows of past blowing: time scales of the flow, of a plenum, of a wall.
-    windows: [usize; 3] = [250, 1000, 4000], "samples", "judgement: the order of the time constants of a flow, a plenum and a wall at 1 kHz";
+    windows_s: [f64; 3] = [0.25, 1.0, 4.0], "s", "judgement: the order of the time constants of a flow, a plenum and a wall";
     /// A window at least this long changes more slowly than y, so that a gain may depend on it.
-    slow_window: usize = 1000, "samples", "judgement: four windows of ỹ";
+    slow_window_s: f64 = 1.0, "s", "judgement: four windows of ỹ";
     /// Longest cycle of pulses that is tried.
     longest_cycle: usize = 8, "pulses", "judgement; the missing-pulse plants drop one in 3 to 5";
     /// An input that changes at more samples than this share is not piecewise constant.
@@ -58,8 +58,8 @@ rules! {
     /// Pulse number is correlated with time: it must explain this much more than time to be preferred.
     pulses_are_a_clock: f64 = 1.3, "times", "the plants of `table_of_plants`";
 
-    /// Segment length of spectra, where the records hold enough of them.
-    piece: usize = 1024, "samples", "a power of two";
+    /// Segment length of spectra.
+    piece_s: f64 = 1.024, "s", "a power of two at 1 kHz";
     /// Fewest segments of a spectrum.
     fewest_pieces: usize = 6, "", "three for training and three for testing";
     /// A band's excess over the noise must be this many standard errors above 0.

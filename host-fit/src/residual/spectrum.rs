@@ -18,8 +18,7 @@ struct Piece {
 /// Difference between the spectrum of the error above the noise and that of y: an error with the spectrum of
 /// y is at no particular frequency.
 pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
-    let all: usize = errors.residual.iter().map(Vec::len).sum();
-    let length = (all / RULES.fewest_pieces).clamp(64, RULES.piece.max(64));
+    let length = ((RULES.piece_s / errors.period_s) as usize).clamp(64, 4096);
     let length = 1 << length.ilog2();
     let mut limits = vec![0.5];
     while *limits.last()? < length as f64 / 2.0 {

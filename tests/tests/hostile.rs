@@ -272,6 +272,50 @@ fn names_are_shown_and_do_not_act() {
 }
 
 /// What a rig file says goes into constants of single precision.
+/// The data are not there either: what is told first shows that nothing was read before.
+#[test]
+fn an_output_that_cannot_be_written_is_refused_before_anything_is_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let (model, data, nowhere) = (path("m.toml"), path("data"), path("none/out"));
+    let own = ["--effect", "plenum-droop"];
+    for (command, inputs, outputs) in [
+        ("identify", &[&data][..], &["-o", "--report"][..]),
+        (
+            "diagnose",
+            &[&model, &data],
+            &["-o", "--report", "--experiment"],
+        ),
+        ("discover", &[&model, &data], &["-o", "--report", "--trace"]),
+        ("extend", &[&model, &data], &["-o"]),
+        ("design", &[&model], &["-o", "--csv"]),
+    ] {
+        for option in outputs {
+            let mut program = std::process::Command::new(scenarios::program());
+            program
+                .arg(command)
+                .args(inputs)
+                .args([option, &nowhere.as_str()]);
+            if command == "extend" {
+                program.args(own);
+            }
+            if command == "design" {
+                program.args(["--target", "0.5"]);
+            }
+            if *option != "-o" && matches!(command, "identify" | "design") {
+                program.args(["-o", &path("kept.toml")]);
+            }
+            let output = program.output().expect("it runs");
+            let error = String::from_utf8_lossy(&output.stderr);
+            assert!(
+                error.contains("none/out cannot be written"),
+                "{command} {option}: {error}"
+            );
+            assert_eq!(output.status.code(), Some(1), "{command} {option}");
+        }
+    }
+}
+
 #[test]
 fn a_rig_that_single_precision_cannot_hold_is_refused() {
     let room = Room::new();

@@ -56,7 +56,8 @@ impl Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
-    check_outputs(args.output.iter().chain(&args.report))?;
+    let outputs = args.output.iter().chain(&args.report);
+    check_outputs(outputs.chain(&args.experiment))?;
     let (mut model, set) = args.from.load()?;
     args.define(&mut model)?;
     let mut finding = steps::diagnose(&model, &set, &args.options(), &console.watch())?;

@@ -75,7 +75,8 @@ impl Args {
 /// Runs the command.
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let outputs = args.output.iter().chain(&args.report);
-    check_outputs(outputs.chain(&args.effect_out).chain(&args.trace))?;
+    let outputs = outputs.chain(&args.effect_out).chain(&args.trace);
+    check_outputs(outputs.chain(&args.experiment))?;
     let (mut model, set) = args.from.load()?;
     let options = args.prepare(&mut model)?;
     let mut found = steps::discover(&model, &set, &options, &console.watch())?;

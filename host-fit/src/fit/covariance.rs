@@ -114,7 +114,7 @@ fn pieces(samples: usize, count: usize) -> impl Iterator<Item = Range<usize>> {
 }
 
 /// The product of two square matrices, row-major.
-pub(super) fn product(
+fn product(
     n: usize,
     left: impl Fn(usize, usize) -> f64,
     right: impl Fn(usize, usize) -> f64,

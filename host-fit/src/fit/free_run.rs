@@ -1,7 +1,7 @@
 //! Fits to the free-run error ε of eq. (9): exact sensitivities by dual numbers for smooth parameters,
 //! secants for parameters that act in steps, and standard errors robust to correlated residuals.
 
-use super::covariance::{covariance, product};
+use super::covariance::covariance;
 use super::level_scatter::LevelScatter;
 use super::levenberg::{FitStop, LeastSquares, Part, minimise};
 use super::rules::RULES;
@@ -510,8 +510,18 @@ fn in_values(searched: &[f64], axes: &[Searched], values: &[f64]) -> Vec<f64> {
         Some(index) if axes[i].index == index => -1.0,
         _ => 0.0,
     };
-    let half = product(n, slope, |k, j| searched[k * n + j]);
-    product(n, |i, k| half[i * n + k], |k, j| slope(j, k))
+    // Only what a coordinate depends on is summed: an unknown variance is NaN, and 0 · NaN is NaN.
+    let along = |i: usize, value: &dyn Fn(usize) -> f64| -> f64 {
+        let own = (0..n).map(|k| (k, slope(i, k)));
+        let own = own.filter(|(_, slope)| *slope != 0.0);
+        own.map(|(k, slope)| slope * value(k)).sum()
+    };
+    let cells = (0..n * n).map(|cell| (cell / n, cell % n));
+    let half: Vec<f64> = cells
+        .clone()
+        .map(|(i, j)| along(i, &|k| searched[k * n + j]))
+        .collect();
+    cells.map(|(i, j)| along(j, &|k| half[i * n + k])).collect()
 }
 
 /// The coordinate that changes against the one with index `index`: a_1 against every other a_i. On
@@ -558,6 +568,39 @@ mod tests {
             fitted.model.a
         );
         assert!(fitted.standard_error(1).is_some_and(|error| error < 1e-4));
+    }
+
+    /// A limit that no reading reaches is unknown; all else is known.
+    #[test]
+    fn an_unknown_coordinate_takes_no_other_interval_with_it() {
+        let u: Vec<f64> = (0..6000)
+            .map(|k| f64::from(u8::from(k / 170 % 2 == 1)))
+            .collect();
+        let mut model = Model {
+            a: vec![0.98],
+            b: vec![0.02],
+            c: vec![0.0],
+            delay: Delay::Fixed { delays: vec![12] },
+            ..Model::default()
+        };
+        let spec = model.spec("sensor-saturation").expect("in the catalogue");
+        model.add(spec, &[-5.0, 5.0], None);
+        let mut record = Record::new("r", Use::Identify, 0.001, u, vec![1.0; 6000]);
+        record.y = model.free_run(&record).expect("stable");
+        for (k, y) in record.y.iter_mut().enumerate() {
+            *y += 0.01 * f64::from((k * 7919 % 13) as u8) - 0.06;
+        }
+        let fitted = fit(&model, &[&record], &FitOptions::default()).expect("a fit");
+        let known = |name: &str| {
+            let own = fitted.model.coordinates();
+            let index = own.iter().position(|own| own.name == name);
+            fitted.standard_error(index.expect("a coordinate"))
+        };
+        assert_eq!(known("sensor-saturation.upper_limit"), None);
+        for name in ["a1", "b1", "c11"] {
+            let error = known(name);
+            assert!(error.is_some_and(|error| error > 0.0), "{name}: {error:?}");
+        }
     }
 
     /// A fixed delay is a whole number of samples at the start, where the free run has a kink; its derivative

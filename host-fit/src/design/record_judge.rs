@@ -272,7 +272,7 @@ mod tests {
     fn with_pickup(model: &Model, gain: f64) -> Model {
         let mut model = model.clone();
         let spec = spec("electrical-pickup").expect("in the catalogue");
-        model.add(spec, &[gain], None);
+        model.add(spec, &[gain, 0.0], None);
         model
     }
 

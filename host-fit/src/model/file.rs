@@ -440,7 +440,10 @@ impl EffectTable {
             value.as_float().or_else(integer).filter(|v| v.is_finite())
         };
         let parameters = spec.parameters.iter().map(|parameter| {
-            let value = self.parameters.get(parameter.name).and_then(number);
+            let value = match self.parameters.get(parameter.name) {
+                Some(value) => number(value),
+                None => parameter.left_out,
+            };
             let value = value.ok_or_else(|| {
                 let problem = format!(
                     "parameter `{}` ({}) is missing or no finite number",
@@ -483,6 +486,20 @@ mod tests {
             model.add(spec, &values, None);
         }
         model
+    }
+
+    /// Files of version 0.2.0 have a pickup without delay.
+    #[test]
+    fn a_parameter_that_may_be_left_out_has_its_value() {
+        let mut model = example();
+        let spec = model.spec("electrical-pickup").expect("in the catalogue");
+        model.add(spec, &[0.07, 0.0], None);
+        let text = model.to_toml();
+        let shorter = text.replace("delay = 0.0\n", "");
+        assert_ne!(shorter, text);
+        assert_eq!(Model::from_toml(&shorter, "m").expect("readable"), model);
+        let wrong = text.replace("delay = 0.0\n", "delay = \"none\"\n");
+        assert!(Model::from_toml(&wrong, "m").is_err());
     }
 
     #[test]

@@ -218,7 +218,7 @@ mod tests {
         let echo = left("echo-path", &[0.1, 0.142]);
         assert!(echo[1] > 0.02 && echo[2] < 1e-3, "{echo:?}");
         // No lag of y acts before y moves.
-        let pickup = left("electrical-pickup", &[0.1]);
+        let pickup = left("electrical-pickup", &[0.1, 0.0]);
         assert!(pickup.len() == 5 && pickup[4] > 0.2, "{pickup:?}");
     }
 }

@@ -53,6 +53,8 @@ pub struct Parameter {
     pub influence: Influence,
     /// Its physically possible sign.
     pub sign: Sign,
+    /// Its value where a model file does not have it; `None` if a file must have it.
+    pub left_out: Option<f64>,
 }
 
 impl Parameter {
@@ -77,6 +79,16 @@ impl Parameter {
             } else {
                 Sign::Either
             },
+            left_out: None,
+        }
+    }
+
+    /// The same, but model files may leave it out: it then has this value.
+    #[must_use]
+    pub const fn or_else(self, value: f64) -> Self {
+        Self {
+            left_out: Some(value),
+            ..self
         }
     }
 

@@ -148,7 +148,8 @@ impl Beginning {
             _ => &relaxes,
         };
         if !moves(best) {
-            return at_rest(held, window);
+            // What does not move by then stays at rest until an edge is felt.
+            return at_rest(held, felt(edge).min(record.len()));
         }
         // An answer to an edge at the first sample, of a command of two levels.
         let other = two_levels(set).and_then(|levels| levels.into_iter().find(|u| *u != first));
@@ -301,6 +302,25 @@ mod tests {
             y[k] = y[k - 1] + (now - y[k - 1]) / 30.0;
         }
         y
+    }
+
+    #[test]
+    fn a_record_rests_until_its_first_edge_is_felt() {
+        let command = |first: usize| -> Vec<f64> {
+            (0..2000)
+                .map(|k| f64::from(u8::from(k >= first && (k - first) % 300 < 150)))
+                .collect()
+        };
+        let records = [400, 700, 900].map(|first| {
+            let u = command(first);
+            let y = response(&u);
+            Record::new("r", Use::Identify, 0.001, u, y)
+        });
+        let reference = FirstOrder::fitted(&records).unwrap();
+        for (record, first) in records.iter().zip([400, 700, 900]) {
+            let own = Beginning::of(record, &records, Some(&reference));
+            assert_eq!((own.rest, own.follow), (first + 6, 0));
+        }
     }
 
     #[test]

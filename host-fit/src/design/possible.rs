@@ -87,7 +87,7 @@ fn can_be_tried(judge: &RecordJudge, spec: &Spec) -> bool {
         .effect_names()
         .iter()
         .any(|name| name == spec.name);
-    !present && spec.channel.is_none() && spec.needs.unmet(on_off).is_none()
+    !present && spec.channel.is_none() && spec.needs.unmet(on_off, f64::INFINITY).is_none()
 }
 
 /// The model with each effect at its detectable size, everything else refitted.

@@ -410,7 +410,9 @@ impl<'a> Screen<'a> {
         if let Err(error) = channel_reference(spec, &self.records) {
             return Some(error.to_string());
         }
-        spec.needs.unmet(self.judge.on_off).map(str::to_owned)
+        let dead_time = self.model.delay.present(0.0, self.model.sample_period_s);
+        let unmet = spec.needs.unmet(self.judge.on_off, dead_time);
+        unmet.map(str::to_owned)
     }
 }
 

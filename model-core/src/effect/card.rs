@@ -210,13 +210,21 @@ pub enum Needs {
     Nothing,
     /// An input with more than two levels.
     GradedInput,
+    /// A flow that answers the command later than the sensor.
+    DeadTime,
 }
 
+/// Dead time, in samples, up to which the answer of the flow is taken for one of the sensor.
+const AT_ONCE: f64 = 2.0;
+
 impl Needs {
-    /// Why the effect is not identifiable with this kind of input; none if it is.
+    /// Why the effect is not identifiable with this kind of input and this dead time, in samples; none if it is.
     #[must_use]
-    pub fn unmet(self, on_off: bool) -> Option<&'static str> {
+    pub fn unmet(self, on_off: bool, dead_time: f64) -> Option<&'static str> {
         match self {
+            Self::DeadTime if dead_time <= AT_ONCE => {
+                Some("the response begins within two samples of the command, as a pickup does")
+            }
             Self::GradedInput if on_off => {
                 Some("the input has two levels only, which any static curve maps on two")
             }
@@ -432,8 +440,10 @@ mod tests {
 
     #[test]
     fn needs_say_what_is_missing() {
-        assert_eq!(Needs::Nothing.unmet(true), None);
-        assert!(Needs::GradedInput.unmet(true).is_some());
-        assert_eq!(Needs::GradedInput.unmet(false), None);
+        assert_eq!(Needs::Nothing.unmet(true, 0.0), None);
+        assert!(Needs::GradedInput.unmet(true, 30.0).is_some());
+        assert_eq!(Needs::GradedInput.unmet(false, 30.0), None);
+        assert!(Needs::DeadTime.unmet(true, 1.0).is_some());
+        assert_eq!(Needs::DeadTime.unmet(true, 30.0), None);
     }
 }

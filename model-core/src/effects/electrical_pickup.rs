@@ -1,7 +1,7 @@
 //! Direct coupling of the valve's current into the sensor's cable.
 
 use crate::effect::{
-    Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
+    Amplitude, Effect, Instant, Needs, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
@@ -41,6 +41,7 @@ impl<T: Real> Physics<T> for ElectricalPickup<T> {
             Parameter::new("delay", Unit::Second, [0.0, 0.002], &[0.0005]).or_else(0.0),
         ],
         amplitude: Some(Amplitude::new("gain", "an electrical pickup").linear()),
+        needs: Needs::DeadTime,
         source: "common-impedance coupling",
         ..Spec::PLAIN
     };

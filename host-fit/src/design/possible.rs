@@ -79,7 +79,8 @@ pub fn possible_flows(
     Ok(flows)
 }
 
-/// Whether an effect is not in the model and would be visible on the records.
+/// Whether an effect is not in the model and would be visible on the records. What only the dead time hides may be there
+/// all the same.
 fn can_be_tried(judge: &RecordJudge, spec: &Spec) -> bool {
     let on_off = judge.records().iter().all(|record| record.is_on_off());
     let present = judge

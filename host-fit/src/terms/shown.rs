@@ -201,6 +201,25 @@ mod tests {
         (model, records)
     }
 
+    /// Its delay would imitate the first samples of the response.
+    #[test]
+    fn a_pickup_is_no_candidate_where_the_flow_answers_at_once() {
+        let (model, records) = linear();
+        let bench = Bench::of(&model, &records).expect("records to learn from");
+        let pickup = spec("electrical-pickup").expect("in the catalogue");
+        let reason = |delay: u16| {
+            let delays = vec![delay];
+            let model = Model {
+                delay: Delay::Fixed { delays },
+                ..bench.given.clone()
+            };
+            let screen = Screen::new(&bench.judge, &model).expect("a stable model");
+            screen.pointless(pickup)
+        };
+        assert_eq!(reason(30), None);
+        assert!(reason(1).is_some());
+    }
+
     #[test]
     fn an_echo_hides_behind_two_lags_and_not_behind_one() {
         let (model, records) = linear();

@@ -180,12 +180,18 @@ mod tests {
         each.flatten().collect()
     }
 
-    fn agree<T: Real>(spec: &'static Spec) {
-        let parameters = middle::<T>(spec);
-        let own = AnyEffect::<T, Ring<T>>::new(spec.name, &parameters, &setting())
+    /// Three quarters through each range, where other branches are taken than at the starts.
+    fn far<T: Real>(spec: &Spec) -> Vec<T> {
+        let each = spec.parameters.iter();
+        each.map(|p| T::from_f64(p.low + 0.75 * (p.high - p.low)))
+            .collect()
+    }
+
+    fn agree<T: Real>(spec: &'static Spec, parameters: &[T]) {
+        let own = AnyEffect::<T, Ring<T>>::new(spec.name, parameters, &setting())
             .expect("in the catalogue");
         let form = form(spec.name).unwrap_or_else(|| panic!("{} has no form", spec.name));
-        let written = UserEffect::of(&form.value, spec.place, &parameters, &setting());
+        let written = UserEffect::of(&form.value, spec.place, parameters, &setting());
         let (own, written) = (run(&own), run(&written));
         for (i, (own, written)) in own.iter().zip(&written).enumerate() {
             let equal = own == written || own.is_nan() && written.is_nan();
@@ -197,8 +203,12 @@ mod tests {
     fn every_form_is_its_effect_bit_for_bit() {
         for spec in SPECS.iter().chain(NUISANCES) {
             if spec.place != Place::Delay {
-                agree::<f64>(spec);
-                agree::<f32>(spec);
+                for parameters in [middle::<f64>(spec), far(spec)] {
+                    agree(spec, &parameters);
+                }
+                for parameters in [middle::<f32>(spec), far(spec)] {
+                    agree(spec, &parameters);
+                }
             }
         }
     }

@@ -234,38 +234,6 @@ high = 0.5
 starts = [0.05]
 "#;
 
-    const LATE_PICKUP: &str = r#"
-name = "own-late-pickup"
-place = "sensor"
-summary = "the command shows in the reading at once"
-expression = """
-let samples = delay / period;
-let first = min(max(samples, 0), 1);
-let second = min(max(samples - 1, 0), 1);
-reading + gain * (u + first * (last - u) + second * (before - last))"""
-[[parameter]]
-name = "gain"
-unit = "y"
-low = -0.5
-high = 0.5
-starts = [0.05]
-[[parameter]]
-name = "delay"
-unit = "s"
-low = 0.0
-high = 0.002
-starts = [0.0005]
-[[state]]
-name = "before"
-update = "last"
-[[state]]
-name = "last"
-update = "now"
-[[state]]
-name = "now"
-update = "u"
-"#;
-
     const VALVE: &str = r#"
 name = "own-valve"
 place = "jet"
@@ -422,8 +390,7 @@ starts = [0.1]
 
     #[test]
     fn effects_of_the_catalogue_written_again_give_the_same_bits() {
-        let cases: [(&str, &str, &[f64]); 4] = [
-            ("electrical-pickup", LATE_PICKUP, &[0.07, 0.0013]),
+        let cases: [(&str, &str, &[f64]); 3] = [
             ("valve-lag", VALVE, &[0.012, 0.033]),
             ("echo-path", ECHO, &[-0.31, 0.0477]),
             ("amplitude-saturation", CUBIC, &[0.8]),
@@ -438,7 +405,6 @@ starts = [0.1]
     fn derivatives_are_those_of_finite_differences() {
         for (own, parameters) in [
             (PICKUP, &[0.07][..]),
-            (LATE_PICKUP, &[0.07, 0.0013]),
             (VALVE, &[0.012, 0.033]),
             (ECHO, &[-0.31, 0.0477]),
             (CUBIC, &[0.8]),

@@ -223,7 +223,7 @@ impl Needs {
     pub fn unmet(self, on_off: bool, dead_time: f64) -> Option<&'static str> {
         match self {
             Self::DeadTime if dead_time <= AT_ONCE => {
-                Some("the response begins within two samples of the command, as a pickup does")
+                Some("the flow answers the command within two samples, as the sensor does")
             }
             Self::GradedInput if on_off => {
                 Some("the input has two levels only, which any static curve maps on two")
@@ -443,7 +443,7 @@ mod tests {
         assert_eq!(Needs::Nothing.unmet(true, 0.0), None);
         assert!(Needs::GradedInput.unmet(true, 30.0).is_some());
         assert_eq!(Needs::GradedInput.unmet(false, 30.0), None);
-        assert!(Needs::DeadTime.unmet(true, 1.0).is_some());
-        assert_eq!(Needs::DeadTime.unmet(true, 30.0), None);
+        assert!(Needs::DeadTime.unmet(true, AT_ONCE).is_some());
+        assert_eq!(Needs::DeadTime.unmet(true, AT_ONCE + 0.1), None);
     }
 }

@@ -160,12 +160,13 @@ pub(super) fn with_law_of(
         Delay::Fixed { .. } => vec![model.delay.clone()],
         Delay::Law(law) => {
             let with = |parameters: Vec<f64>, factor: f64| {
-                Delay::Law(TransportLaw {
+                let first = Delay::Law(TransportLaw {
                     parameters,
                     factors: vec![factor],
                     interpolated: true,
                     ..*law
-                })
+                });
+                first.for_inputs_of(&model.delay)
             };
             let factor = law.factors.first().copied().unwrap_or(1.0);
             let own = with(law.parameters.clone(), factor);

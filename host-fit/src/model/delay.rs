@@ -140,6 +140,42 @@ impl Delay {
         }
     }
 
+    /// This delay for as many inputs as `other` has: they follow the first one as theirs do.
+    #[must_use]
+    pub(crate) fn for_inputs_of(&self, other: &Self) -> Self {
+        match (self, other) {
+            (Self::Law(own), _) => {
+                let first = |factors: &[f64]| factors.first().copied().unwrap_or(1.0);
+                let (others, factor) = (other.factors(), first(&own.factors));
+                // Inputs behind one without a delay follow it as one.
+                let ratio = |f: &f64| match first(&others) {
+                    0.0 => 1.0,
+                    first => f / first,
+                };
+                Self::Law(TransportLaw {
+                    factors: others.iter().map(|f| factor * ratio(f)).collect(),
+                    ..own.clone()
+                })
+            }
+            (Self::Fixed { delays }, Self::Fixed { delays: others }) => {
+                let first = |delays: &[u16]| delays.first().copied().unwrap_or(0);
+                let (own, other) = (first(delays), first(others));
+                let later = |h: &u16| h.saturating_sub(other).saturating_add(own);
+                Self::Fixed {
+                    delays: others.iter().map(later).collect(),
+                }
+            }
+            (Self::Fixed { delays }, Self::Law(law)) => {
+                let own = f64::from(delays.first().copied().unwrap_or(0));
+                let first = law.factors.first().copied().unwrap_or(1.0);
+                let scaled = |f: &f64| (own * f / first).round().clamp(0.0, 65_535.0) as u16;
+                Self::Fixed {
+                    delays: law.factors.iter().map(scaled).collect(),
+                }
+            }
+        }
+    }
+
     /// The longest delay, samples, at a sample period of `period_s` s. A separately delayed edge ends within
     /// a sample, not on it.
     #[must_use]
@@ -200,5 +236,15 @@ mod tests {
             delays: vec![49, 98],
         };
         assert_eq!(fixed.factors(), [1.0, 2.0]);
+        // A delay for the inputs of another one.
+        let own = constant.for_inputs_of(&fixed);
+        assert_eq!(own.factors(), [1.0, 2.0]);
+        let own = Delay::Fixed { delays: vec![9] }.for_inputs_of(&fixed);
+        assert_eq!(
+            own,
+            Delay::Fixed {
+                delays: vec![9, 58]
+            }
+        );
     }
 }

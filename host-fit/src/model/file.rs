@@ -211,12 +211,13 @@ impl Model {
         text.unwrap_or_default()
     }
 
-    /// Writes the model file, whole or not at all.
+    /// Writes the model file, whole or not at all, and only if it can be read back.
     ///
     /// # Errors
-    /// [`ModelError::Output`].
+    /// [`ModelError::Output`], and those of [`load`](Self::load) for a model that contradicts itself.
     pub fn save(&self, path: &Path) -> Result<(), ModelError> {
         let text = self.to_toml();
+        Self::from_toml(&text, &path.display().to_string())?;
         output::write_atomic(path, |file| file.write_all(text.as_bytes()))?;
         Ok(())
     }

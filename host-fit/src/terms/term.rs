@@ -402,7 +402,7 @@ const PATH_SETTLED: usize = 4000;
 pub(super) fn take_delay_law(model: &mut Model, law: &Delay) {
     let level = |delay: &Delay| delay.present(RULES.middle, model.sample_period_s);
     let later = level(&model.delay) - level(law);
-    model.delay = law.clone();
+    model.delay = law.for_inputs_of(&model.delay);
     model.delay_later(later);
 }
 

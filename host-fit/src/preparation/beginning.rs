@@ -36,6 +36,24 @@ impl Rest {
         }
     }
 
+    /// Whether `y`, of which this is the level, rests there rather than relax towards `end`: at none of these time constants
+    /// does that leave about as little.
+    fn is_settled(&self, y: &[f64], end: f64, times: [f64; 3]) -> bool {
+        let n = y.len() as f64;
+        let constant = self.error.powi(2) * n * (n - 1.0).max(1.0);
+        let least = RULES.motion_over_noise * self.error.powi(2) * n;
+        times.into_iter().all(|time| {
+            let shape = |k: usize| (-(k as f64) / time).exp();
+            let (mut product, mut square, mut whole) = (0.0, 0.0, 0.0);
+            for (k, y) in y.iter().enumerate() {
+                product += shape(k) * (y - end);
+                square += shape(k).powi(2);
+                whole += (y - end).powi(2);
+            }
+            whole - product * product / square - constant > least
+        })
+    }
+
     /// Whether both are the same but for noise: within three standard errors.
     fn is_at_level_of(&self, other: &Self) -> bool {
         (self.level - other.level).abs() <= 3.0 * self.error.hypot(other.error)
@@ -92,7 +110,13 @@ impl Beginning {
         // An edge at the first sample is felt before one that the record shows.
         let known_edge = (held - first).abs() > 1e-9 * first.abs().max(1e-9);
         let edge = if known_edge { 0 } else { change };
-        let felt = |edge: usize| edge + (RULES.surely_before * dead_time).floor() as usize;
+        // What is switched beside the command may act at once.
+        let other = record.channels.values().filter_map(|v| first_switch(v));
+        let other = other.min().unwrap_or(record.len());
+        let felt = |edge: usize| {
+            let felt = edge + (RULES.surely_before * dead_time).floor() as usize;
+            felt.min(other)
+        };
         let enough = (RULES.times_of_rest * time + 2.0 * dead_time).ceil() as usize;
         let window = felt(edge).min(record.len()).min(enough.max(5));
         if window < RULES.fewest_at_rest {
@@ -151,6 +175,18 @@ impl Beginning {
             // What does not move by then stays at rest until an edge is felt.
             return at_rest(held, felt(edge).min(record.len()));
         }
+        // An answer to the record's own first edge that comes sooner than the reference has it, as that of a second order.
+        let sooner = [0.0, 0.15, 0.3, 0.45].map(|share| edge as f64 + share * dead_time);
+        let sooner = sooner.into_iter().flat_map(|at| {
+            let answer = move |k: usize, time: f64| 1.0 - (-(k as f64 - at).max(0.0) / time).exp();
+            times.map(|time| Shape::of(y, |k| answer(k, time)))
+        });
+        if edge >= RULES.fewest_at_rest
+            && edge < window
+            && least(sooner.collect()).is_some_and(|own| own.left < RULES.answer * relaxes.left)
+        {
+            return at_rest(held, edge);
+        }
         // An answer to an edge at the first sample, of a command of two levels.
         let other = two_levels(set).and_then(|levels| levels.into_iter().find(|u| *u != first));
         if let (Some((at, answer)), Some(other)) = (&answers_early, other)
@@ -187,42 +223,62 @@ impl Beginning {
 
     /// Takes rests that are too short to be sure of for what they are: where records rest at different levels under the
     /// same command, or one rests elsewhere than the response to its command ends, something is still on its way. Those
-    /// that show less than a motion takes begin in mid-run then, unless three of them, and more than half of all, rest at
-    /// the level of their middle one as far as noise lets it be known: two may agree by chance.
+    /// that show less than a motion takes begin in mid-run then, unless they last a time constant and lie too still to be on
+    /// their way there (their zero has moved), or three of them, and more than half of all, rest at the level of their
+    /// middle one as far as noise lets it be known: two may agree by chance.
     pub(super) fn reconcile(beginnings: &mut [Self], records: &[Record], reference: &FirstOrder) {
-        let rests: Vec<Option<(f64, Rest)>> = records
+        let time = reference.time_constant;
+        let times = [0.5, 1.0, 2.0].map(|factor| factor * time);
+        let rests: Vec<Option<(f64, Rest, &[f64])>> = records
             .iter()
             .zip(&*beginnings)
             .map(|(record, own)| {
                 let y = &record.y[..own.rest.min(record.y.len())];
-                (own.rest > 0).then(|| (own.command, Rest::of(y)))
+                (own.rest > 0).then(|| (own.command, Rest::of(y), y))
             })
             .collect();
-        let apart = RULES.rests_apart * range_of_y(records);
-        let enough = RULES.times_of_rest * reference.time_constant;
-        for ((own, record), rest) in beginnings.iter_mut().zip(records).zip(&rests) {
-            let Some((command, rest)) = rest else {
-                continue;
-            };
+        let under = |command: f64| {
             let same = rests.iter().flatten();
-            let same = same.filter(|(other, _)| other == command);
-            let mut same: Vec<&Rest> = same.map(|(_, rest)| rest).collect();
-            order::ascending(&mut same, |one| one.level);
-            let (Some(lowest), Some(highest)) = (same.first(), same.last()) else {
+            let mut same: Vec<(Rest, &[f64])> = same
+                .filter(|(other, ..)| *other == command)
+                .map(|(_, rest, y)| (*rest, *y))
+                .collect();
+            order::ascending(&mut same, |(rest, _)| rest.level);
+            // Pairs would differ by chance the more often the more records there are; few differ from their middle one.
+            let middle = same[(same.len() - 1) / 2].0;
+            (same, middle)
+        };
+        let apart = RULES.rests_apart * range_of_y(records);
+        // A response to the command alone does not say where records end in which another input is switched.
+        let mut channels = records.iter().flat_map(|record| record.channels.values());
+        let alone = !channels.any(|channel| first_switch(channel).is_some());
+        for ((own, record), rest) in beginnings.iter_mut().zip(records).zip(&rests) {
+            let Some((command, rest, y)) = rest else {
                 continue;
             };
-            // Pairs would differ by chance the more often the more records there are; few differ from their middle one.
-            let middle = same[(same.len() - 1) / 2];
-            let alike = same.iter().filter(|other| other.is_at_level_of(middle));
-            let alike = alike.count();
-            let with_most = rest.is_at_level_of(middle) && alike >= 3 && 2 * alike > same.len();
+            let (same, middle) = under(*command);
+            let ends = [middle.level, reference.at_rest(*command)];
+            let is_settled = |rest: &Rest, y: &[f64]| {
+                let long = |times: f64| y.len() as f64 >= times * time;
+                let still = || ends.iter().all(|end| rest.is_settled(y, *end, times));
+                long(RULES.times_of_rest) || (long(1.0) && still())
+            };
+            let alike = same.iter();
+            let alike = alike
+                .filter(|(other, _)| other.is_at_level_of(&middle))
+                .count();
+            let with_most = rest.is_at_level_of(&middle) && alike >= 3 && 2 * alike > same.len();
+            let unsettled = same.iter().filter(|(rest, y)| !is_settled(rest, y));
+            let levels = unsettled.map(|(rest, _)| rest.level);
+            let [low, high] = levels.fold([middle.level; 2], |[low, high], level| {
+                [low.min(level), high.max(level)]
+            });
             // Three times the rms that the reference leaves: it describes no flow exactly.
             let from_end = (rest.level - reference.at_rest(*command)).abs();
-            let is_elsewhere = from_end > apart + 3.0 * reference.left_rms;
-            let on_its_way = highest.level - lowest.level > apart || is_elsewhere;
-            if (own.rest as f64) < enough && on_its_way && !with_most {
-                let (dead_time, time) = (reference.dead_time, reference.time_constant);
-                *own = Self::in_mid_run(record, own.command, dead_time, time);
+            let is_elsewhere = alone && from_end > apart + 3.0 * reference.left_rms;
+            let on_its_way = high - low > apart || is_elsewhere;
+            if !is_settled(rest, y) && on_its_way && !with_most {
+                *own = Self::in_mid_run(record, own.command, reference.dead_time, time);
             }
         }
     }
@@ -283,6 +339,14 @@ impl Beginning {
     }
 }
 
+/// The sample at which a channel changes first, if it is switched: it keeps each value for many samples.
+fn first_switch(channel: &[f64]) -> Option<usize> {
+    let changes = channel.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    let is_switched = changes * RULES.switched < channel.len();
+    let changed = || channel.iter().position(|value| *value != channel[0]);
+    is_switched.then(changed)?
+}
+
 /// The distance from the least y of all records to the largest.
 pub(super) fn range_of_y(records: &[Record]) -> f64 {
     let all = || records.iter().flat_map(|r| r.y.iter().copied());
@@ -321,6 +385,40 @@ mod tests {
             let own = Beginning::of(record, &records, Some(&reference));
             assert_eq!((own.rest, own.follow), (first + 6, 0));
         }
+    }
+
+    /// Rests of more than a time constant that lie still do so at their own zero; what moves is on its way.
+    #[test]
+    fn a_zero_that_moved_is_no_motion() {
+        let command: Vec<f64> = (0..900)
+            .map(|k| f64::from(u8::from(k % 300 > 60)))
+            .collect();
+        let noise = |k: usize| {
+            let drawn = (k as u32).wrapping_mul(2_654_435_761) >> 8;
+            0.01 * (f64::from(drawn) / f64::from(1 << 24) - 0.5)
+        };
+        let records = [0.0, 0.1, -0.1].map(|zero| {
+            let y = response(&command).into_iter().enumerate();
+            let y = y.map(|(k, y)| y + zero + noise(k)).collect();
+            Record::new("r", Use::Identify, 0.001, command.clone(), y)
+        });
+        let reference = FirstOrder::fitted(&records).unwrap();
+        let rests = Beginning {
+            command: 0.0,
+            rest: 67,
+            follow: 0,
+        };
+        let mut beginnings = [rests; 3];
+        Beginning::reconcile(&mut beginnings, &records, &reference);
+        assert_eq!(beginnings, [rests; 3]);
+        // The second relaxes to where the first rests.
+        let mut relaxing = records.clone();
+        for (k, y) in relaxing[1].y.iter_mut().enumerate() {
+            *y += 0.3 * (-(k as f64) / 30.0).exp() - 0.1;
+        }
+        Beginning::reconcile(&mut beginnings, &relaxing, &reference);
+        assert_eq!(beginnings[2], rests);
+        assert!(beginnings[1].follow > 0, "{beginnings:?}");
     }
 
     #[test]

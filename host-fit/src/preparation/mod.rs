@@ -62,9 +62,10 @@ impl Preparation {
             .zip(&beginnings)
             .map(|(record, beginning)| beginning.filled_in(record))
             .collect();
-        let moving_zero = MovingZero::of(&prepared, &beginnings, command.off);
+        let left = reference.as_ref().map_or(f64::INFINITY, |r| r.varying_rms);
+        let moving_zero = MovingZero::of(&prepared, &beginnings, command.off, left);
         if let Some(moving) = &moving_zero {
-            rest::tare(&mut prepared, &beginnings, command.off, moving.share);
+            rest::tare(&mut prepared, &beginnings, command.off, moving);
         }
         follow(&mut prepared, &beginnings);
         let zero = rest::level_of_rest(&prepared, &beginnings, command.off)

@@ -20,6 +20,8 @@ pub struct FirstOrder {
     pub explained: f64,
     /// What it leaves, y rms.
     pub left_rms: f64,
+    /// What of that is not the same throughout a record, y rms.
+    pub varying_rms: f64,
 }
 
 /// A record with neighbouring samples averaged.
@@ -99,15 +101,25 @@ impl FirstOrder {
         }
         let explained = 1.0 - left / whole;
         let (_, level, gain) = residual(&thinned, delay, time);
+        let scale = stride as f64;
+        let varying = records.iter().map(|record| {
+            let of = moments(&Thinned::of(record, 1), delay * scale, time * scale);
+            let (sum, square) = (
+                of.y - gain * of.x,
+                of.yy - 2.0 * gain * of.xy + gain * gain * of.xx,
+            );
+            square - sum * sum / of.one
+        });
+        let rms = |squares: f64, samples: usize| (squares.max(0.0) / samples.max(1) as f64).sqrt();
         let usable = gain.is_finite() && level.is_finite() && explained > RULES.related;
         usable.then_some(Self {
-            dead_time: delay * stride as f64,
-            time_constant: time * stride as f64,
+            dead_time: delay * scale,
+            time_constant: time * scale,
             gain,
             level,
             explained,
-            left_rms: (left / thinned.iter().map(|r| r.y.len()).sum::<usize>().max(1) as f64)
-                .sqrt(),
+            left_rms: rms(left, thinned.iter().map(|r| r.y.len()).sum()),
+            varying_rms: rms(varying.sum(), total),
         })
     }
 

@@ -17,6 +17,8 @@ rules! {
 
     /// A record rests until its first edge and this much of the dead time longer; what answers sooner answers an edge before it.
     surely_before: f64 = 0.6, "dead times", "delays that follow the state differ by less on the bundled flows";
+    /// A channel that keeps each value for so many samples on average is switched; a record rests until it is.
+    switched: usize = 20, "samples", "judgement: measured quantities change at almost every sample";
     /// So many time constants are enough to tell rest from motion.
     times_of_rest: f64 = 3.0, "time constants", "5 % are left of a motion";
     /// Fewer samples do not tell rest from motion.
@@ -42,16 +44,13 @@ rules! {
     /// Graded commands further from 0 than this have an operating point of their own.
     operating_point: f64 = 0.25, "times their range", "judgement";
 
-    /// The level of rest is the mean of y before the first response, taken in pieces that are independent of each other …
-    quiet_piece: usize = 50, "samples", "judgement";
-    /// … if there are so many of them …
-    quiet_pieces: usize = 5, "pieces", "judgement";
-    /// … and 0 unless it is off by so much.
+    /// The level of rest is 0 unless its mean is off by so much.
     off_zero: f64 = 5.0, "standard errors", "convention";
-    /// The zero moves if records rest further apart than this, and than chance.
-    moving_zero: f64 = 0.03, "share of the range of y", "judgement: what slow noise makes of the mean of half a second stays below it";
-    /// … or, where its standard errors are known, more than so many of them, …
-    moving_zero_noise: f64 = 4.0, "standard errors of y", "in 30 sets slow noise reached 2.9";
+    /// Noise that is slower than a rest is no more than the standard errors of y; where they are not stated, no more than what
+    /// the reference response leaves, and this.
+    slow_noise: f64 = 0.0075, "share of the range of y", "judgement: what slow noise makes of the mean of half a second stays below four times it";
+    /// The zero moves if records rest further apart than so much noise, and than chance, …
+    moving_zero_noise: f64 = 4.0, "noise rms", "in 30 sets slow noise reached 2.9";
     /// … or if the F-test of their scatter against what noise makes of a rest gives this p-value; slow noise is what of the
     /// variance the rests do not show within themselves, …
     moving_zero_p: f64 = 0.01, "p-value", "convention; in 34 sets whose zero does not move p was spread evenly from 0.07 to 1";

@@ -14,7 +14,9 @@ use crate::fit::{
     pieces, restart_after,
 };
 use crate::model::{Model, Start};
+use crate::preparation::Preparation;
 use crate::simulate::SimulateError;
+use crate::terms::Units;
 use model_core::effect::Spec;
 use serde::Serialize;
 use strsim::levenshtein;
@@ -131,6 +133,15 @@ pub fn extend(
     interrupt: &AtomicBool,
 ) -> Result<Extended, ExtendError> {
     let specs = effects_for(model, names)?;
+    // Cards are written for y of order 1 and 1 ms a sample, as for a diagnosis.
+    let prepared = Preparation::of(records);
+    let units = Units::of(model, &prepared);
+    let records: Vec<Record> = prepared
+        .records
+        .iter()
+        .map(|r| units.record_in(r))
+        .collect();
+    let (model, records) = (&units.model_in(model), records.as_slice());
     let learning: Vec<&Record> = records.iter().filter(|r| r.role == Use::Identify).collect();
     if learning.is_empty() {
         return Err(ExtendError::NothingToLearnFrom);
@@ -209,17 +220,17 @@ pub fn extend(
         (Err(error), Err(_)) => return Err(error),
     };
     let parameters = specs.iter().map(|spec| {
-        let own = crate::diagnose::estimates(&fitted, spec, &crate::terms::Units::NONE);
+        let own = crate::diagnose::estimates(&fitted, spec, &units);
         (spec.name.to_owned(), own)
     });
     Ok(Extended {
         structure,
         parameters: parameters.collect(),
-        identify_rmse: fitted.mean_square().sqrt(),
+        identify_rmse: units.y * fitted.mean_square().sqrt(),
         model: Model {
             // A control law belongs to the model it was designed for.
             law: None,
-            ..fitted.model
+            ..units.model_out(&fitted.model)
         },
     })
 }

@@ -1,11 +1,12 @@
 //! Preparation of every search: records in inner units and a judge over them.
 
+use super::RULES;
 use super::judge::Judge;
 use super::units::Units;
 use crate::data::Record;
 use crate::fit::{FitOptions, restart_after};
 use crate::model::Model;
-use crate::preparation::{MovingZero, Preparation};
+use crate::preparation::{MovingZero, Preparation, RULES as PREPARATION};
 
 /// Records in inner units, the judge over them, and the given model.
 pub struct Bench {
@@ -42,7 +43,13 @@ impl Bench {
             ..FitOptions::default()
         };
         let given = units.model_in(given);
-        let restarted = restart_after(&given, &inner);
+        // A given model without an input that the records need may remember for ever where the rig does not.
+        let shortest = records.iter().map(Record::len).min().unwrap_or(0) as f64;
+        let forgets = prepared.reference.is_some_and(|reference| {
+            reference.explained > RULES.self_regulates
+                && reference.time_constant * PREPARATION.times_of_rest < shortest
+        });
+        let restarted = restart_after(&given, &inner).filter(|_| !forgets);
         let mut judge = Judge::new(&inner, restarted, options)?;
         judge.full_is_one = prepared.full_is_known;
         Some(Self {

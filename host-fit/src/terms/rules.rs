@@ -8,6 +8,9 @@ rules! {
 
     /// Penalty per parameter of a term, as a share of the validation rms error.
     price: f64 = 0.004, "share of the rms error", "null cases of six families: a superfluous parameter gains 0.001 to 0.003 on coloured noise of 20 repeats";
+    /// Free runs are not restarted, whatever the given model's poles, where the first-order reference explains this much with a
+    /// time constant well within the records.
+    self_regulates: f64 = 0.5, "share of the variance", "judgement: half";
     /// A model within this factor of the noise level is searched no further.
     at_the_floor: f64 = 1.005, "times the noise level", "two standard deviations of the error of three records of 10 s";
     /// If the best model is above this factor of the noise level, the second-best is followed as well.

@@ -156,7 +156,7 @@ fn chosen(
     let mut effort = Effort::of_a_search();
     let mut found = search.run_within(
         root,
-        Some(&|| search.second_root(&given_inside, &origin)),
+        Some(&|| search.second_roots(&given_inside, &origin)),
         &mut effort,
     );
     // A structure that is not made of the search's terms may still hold what they do
@@ -191,7 +191,7 @@ fn chosen(
             let set_out = root.clone();
             let anew = search.run_within(
                 root,
-                Some(&|| search.second_root(&with_law, &set_out)),
+                Some(&|| search.second_roots(&with_law, &set_out)),
                 &mut effort,
             );
             if anew.best.score() < found.best.score() {

@@ -66,6 +66,13 @@ pub fn fit_with_effect(
         let fresh = fresh_starts(base, records);
         models.extend(fresh.iter().map(|base| with(base, &[])));
     }
+    if base.measured_inputs().any(|input| input.name == spec.name) {
+        // A base that had to do without an input has a wrong delay and time constant.
+        let few = starts(base, spec, records);
+        let few = few.iter().step_by((few.len() / RULES.input_starts).max(1));
+        let fresh = fresh_starts(base, records);
+        models.extend(few.flat_map(|own| fresh.iter().map(move |base| with(base, own))));
+    }
     let mut tried = tried_briefly(models, records, options);
     if spec.place == Place::Jet {
         // The response to jets of part strength can only be identified if an effect causes them.

@@ -25,7 +25,8 @@ pub use parameters::{Coordinate, Kind};
 pub use prepared::{AnyDelay, Prepared, Rounding};
 pub use rules::{RULES, Rules};
 
-use crate::user_effect::Definition;
+use crate::data::Record;
+use crate::user_effect::{Definition, measured_inputs};
 use model_core::average::WINDOW;
 use model_core::effect::{Place, Spec, Unit};
 use model_core::effects::{ConstantDelay, NUISANCES, SPECS};
@@ -264,6 +265,36 @@ impl Model {
         self.definitions.retain(|known| known.spec().name != name);
         self.definitions.push(definition);
         Ok(())
+    }
+
+    /// The model that knows each measured channel of `records` as an effect that can be added: a second input.
+    #[must_use]
+    pub(crate) fn with_measured_inputs(&self, records: &[Record]) -> Self {
+        let mut model = self.clone();
+        for input in measured_inputs(records) {
+            if model.definition(input.spec().name).is_none() {
+                model.definitions.push(input);
+            }
+        }
+        model
+    }
+
+    /// The effects among its candidates that are inputs measured beside the command.
+    pub(crate) fn measured_inputs(&self) -> impl Iterator<Item = &'static Spec> {
+        let inputs = self
+            .definitions
+            .iter()
+            .filter(|own| own.is_measured_input());
+        inputs.map(|own| own.spec())
+    }
+
+    /// Forgets definitions that neither the model has an effect of nor `given` knows.
+    pub(crate) fn forget_unused(&mut self, given: &Self) {
+        let used = |definition: &&'static Definition| {
+            let name = definition.spec().name;
+            given.definition(name).is_some() || self.effects.iter().any(|own| own.name == name)
+        };
+        self.definitions = self.definitions.iter().copied().filter(used).collect();
     }
 
     /// Whether data with this sample period, s, match the model's.

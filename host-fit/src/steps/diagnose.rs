@@ -151,7 +151,9 @@ pub fn diagnose(
     let (mut judged_rmse, mut channel) = (None, None);
     let (diagnosis, failures, detectable, beyond) = watched(onlooker, "diagnosis", || {
         let progress = |what: &str| onlooker.now(what);
-        let mut diagnosis = search(model, &records, options, onlooker.interrupt(), &progress)?;
+        let knowing = model.with_measured_inputs(&records);
+        let mut diagnosis = search(&knowing, &records, options, onlooker.interrupt(), &progress)?;
+        diagnosis.model.forget_unused(model);
         judged_rmse = as_written(&mut diagnosis, model, &records);
         let failures = where_it_fails(&diagnosis.model, &records);
         channel = followed_channel(&diagnosis, failures.as_ref().ok());

@@ -125,8 +125,10 @@ pub fn extend(
         parameters,
         ..
     } = watched(onlooker, "refitting everything", || {
-        refit(model, &records, effects, onlooker.interrupt())
+        let knowing = model.with_measured_inputs(&records);
+        refit(&knowing, &records, effects, onlooker.interrupt())
     })?;
+    extended.forget_unused(model);
     let (scores_after, diverged) = score_new(&extended, &records)?;
     if scores_before.is_none()
         && let Some(diverged) = diverged.into_iter().next()

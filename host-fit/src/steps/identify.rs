@@ -453,11 +453,14 @@ fn with_effects(
         model.define(definition)?;
     }
     if !request.effects.is_empty() {
+        let given = model.clone();
+        model = model.with_measured_inputs(records);
         effects_for(&model, &request.effects)?;
         model = watched(onlooker, "refitting with the effects", || {
             extend(&model, records, &request.effects, onlooker.interrupt())
         })?
         .model;
+        model.forget_unused(&given);
     }
     let (scores, diverged) = score_new(&model, records)?;
     if let Some(diverged) = diverged.into_iter().next() {

@@ -248,7 +248,10 @@ fn fall(diagnosis: &Diagnosis, with: &str) -> String {
 fn behaviour(diagnosis: &Diagnosis) -> String {
     let each = diagnosis.missing.iter().map(|name| {
         let text = shown(name, diagnosis.parameters.get(name));
-        text.unwrap_or_else(|| format!("the behaviour of `{name}`"))
+        // An effect of the user's own says it in its summary.
+        let summary = || diagnosis.model.spec(name).map(|spec| spec.summary);
+        text.or_else(|| summary().map(str::to_owned))
+            .unwrap_or_else(|| format!("the behaviour of `{name}`"))
     });
     each.collect::<Vec<_>>().join("; and ")
 }

@@ -132,7 +132,7 @@ pub fn base_model(
     let root = Hypothesis::new(without_needless_law(&judge, root.judged.clone(), laws));
     progress("the same of second order");
     let second = second_order(&judge, &root, may_be_constant);
-    let mut found = search.run(root, Some(&|| second.clone()));
+    let mut found = search.run(root, Some(&|| second.iter().cloned().collect()));
     // Input coefficients of both signs (a zero, as of an inverse response) are outside first and second order: the search
     // starts again from such a model if it is clearly better than the best structure so far.
     let lead = |hypothesis: &&Hypothesis| {

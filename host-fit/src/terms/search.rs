@@ -8,7 +8,7 @@ use super::proposal::Proposal;
 use super::screen::Screen;
 use super::table::{Table, has_jet_effect};
 use super::term::Term;
-use crate::fit::{Fit, FitOptions, Known, fit, lean_base};
+use crate::fit::{Fit, FitOptions, Known, fit, fit_with_effect, lean_base};
 use crate::model::{Model, Start};
 use crate::order;
 use crate::parallel;
@@ -97,8 +97,8 @@ pub(super) fn score(rmse: f64, cost: usize) -> f64 {
     rmse.ln() + RULES.price * cost as f64
 }
 
-/// Makes a second root of a search. Behind a reference: the search is compiled once for all its callers.
-pub(crate) type Second<'a> = &'a dyn Fn() -> Option<Hypothesis>;
+/// Makes further roots of a search. Behind a reference: the search is compiled once for all its callers.
+pub(crate) type Second<'a> = &'a dyn Fn() -> Vec<Hypothesis>;
 
 /// The result of a search.
 #[derive(Clone, Debug)]
@@ -235,6 +235,41 @@ impl Search<'_> {
             from_given: true,
             ..Hypothesis::new(judged)
         })
+    }
+
+    /// Further roots: the structure of `given`, and `root` with each input that was measured beside the command. Without
+    /// such an input the lowest order has taken a wrong delay and time constant, from which few iterations do not return, so
+    /// both are fitted from fresh starts.
+    pub(crate) fn second_roots(&self, given: &Model, root: &Hypothesis) -> Vec<Hypothesis> {
+        let base = root.judged.model();
+        let learning = self.judge.learning(0);
+        let inputs = base.measured_inputs().filter_map(|spec| {
+            if !self.effects || self.interrupted() || base.has_effect(spec.name) {
+                return None;
+            }
+            (self.progress)(&format!("{} from fresh starts", spec.name));
+            let fit = fit_with_effect(base, spec, &learning, &FitOptions::default()).ok()?;
+            let mut model = fit.model;
+            model.delay_between_samples();
+            model.start = base.start;
+            let judged = self.judge.refitted(&model).ok()?;
+            let added = judged.model().effects.iter();
+            let added = added.rev().find(|added| added.name == spec.name)?;
+            let term = Term::Effect {
+                spec,
+                parameters: added.parameters.clone(),
+                grading: model.grading,
+                reference: added.reference,
+            };
+            Some(Hypothesis {
+                terms: vec![term],
+                ..Hypothesis::new(judged)
+            })
+        });
+        self.second_root(given, root)
+            .into_iter()
+            .chain(inputs)
+            .collect()
     }
 
     /// Searches from `root`, and from `second` unless the first round reaches the noise level, until no

@@ -37,8 +37,8 @@ impl Units {
         time: 1.0,
     };
 
-    /// The units of prepared records for a search that starts from `model`. Effects of the user are written
-    /// in the user's units, which are then kept.
+    /// The units of prepared records for a search that starts from `model`. Effects of the user that do not
+    /// scale are written in the user's units, which are then kept.
     #[must_use]
     pub fn of(model: &Model, prepared: &Preparation) -> Self {
         // A model's definition of a full jet is kept, because its jet effects are written for it.
@@ -47,7 +47,7 @@ impl Units {
         } else {
             model.command
         };
-        if !model.definitions.is_empty() {
+        if !model.definitions.iter().all(|own| own.scales()) {
             return Self {
                 command: model.command,
                 ..Self::NONE

@@ -9,11 +9,13 @@
 mod expression;
 mod fault_place;
 pub(crate) mod form;
+mod input;
 mod interpreter;
 pub(crate) mod program;
 mod rust;
 mod source;
 
+pub(crate) use input::measured_inputs;
 pub use interpreter::{UserEffect, UserState};
 pub(crate) use rust::{line_lengths, number, rust_module};
 pub use rust::{module_name, type_name};
@@ -166,6 +168,18 @@ impl Definition {
     #[must_use]
     pub fn spec(&'static self) -> &'static Spec {
         &self.spec
+    }
+
+    /// Whether its parameters scale with the units of y and time, as those of the catalogue do; its ranges and starting
+    /// values are then for y of order 1 and 1 ms a sample.
+    #[must_use]
+    pub fn scales(&self) -> bool {
+        self.source.scales
+    }
+
+    /// Whether it is an input that was measured beside the command.
+    pub(crate) fn is_measured_input(&self) -> bool {
+        self.scales() && self.spec.channel.is_some()
     }
 
     /// Its operations at a sample.

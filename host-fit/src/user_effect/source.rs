@@ -17,6 +17,9 @@ pub(crate) struct Source {
     reference: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     channel: Option<String>,
+    /// Whether no number in its expressions has a unit of y or time, so that it also holds in other units.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub(super) scales: bool,
     expression: String,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     state: Vec<SourceState>,

@@ -9,6 +9,7 @@ use super::ranking::{Rival, not_tried, ranked, rivals_and_chance};
 use super::{DiagnoseError, Diagnosis, Options, RULES, Rung, Verdict};
 use crate::model::Model;
 use crate::parallel;
+use crate::residual::NoiseSource;
 use crate::terms::{
     Chance, Found, HeldOut, Hypothesis, Judge, Judged, Likelihood, Search, Term, Units, p_value,
 };
@@ -166,11 +167,6 @@ impl Session<'_> {
         (search.progress)("the evidence of the models");
         let likelihood = Likelihood::of(judge, last.judged.model());
         let likelihood = likelihood.as_ref();
-        let posterior = sets
-            .iter()
-            .take(if claims { way.proven } else { 0 })
-            .map(|set| likelihood.map_or_else(Vec::new, |all| set.posterior(all, &last.judged)))
-            .collect();
         let subject = if !order.is_empty() {
             &last
         } else if !named.is_bare() {
@@ -179,6 +175,23 @@ impl Session<'_> {
             &found.best
         };
         let certificates = self.certificates(subject, &sets, &others, &found);
+        // Where the noise level is unknown an error says little by its size: a name stands only if records that chose nothing
+        // do not speak against it.
+        let in_the_dark = judge.noise_source == NoiseSource::Scatter;
+        let contradicted = in_the_dark
+            && order.iter().take(way.proven).any(|spec| {
+                let certificate = certificates.get(spec.name);
+                certificate.is_some_and(|certificate| certificate.log_e < 0.0)
+            });
+        let (verdict, claims) = match claims && contradicted {
+            true => (Verdict::PartlyExplained, false),
+            false => (verdict, claims),
+        };
+        let posterior = sets
+            .iter()
+            .take(if claims { way.proven } else { 0 })
+            .map(|set| likelihood.map_or_else(Vec::new, |all| set.posterior(all, &last.judged)))
+            .collect();
         let mut ranking = ranked(units, context.judged.rmse(), &others, &chance, likelihood);
         for entry in &mut ranking {
             // The ranking shows the parameters of the final model, and only the ambiguities that remain

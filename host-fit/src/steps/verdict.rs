@@ -176,15 +176,22 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
             .next(add(names))
         }
         Verdict::PartlyExplained => {
+            let own = |name| diagnosis.certificates.get(name);
+            let contradicted = diagnosis.noise_source == NoiseSource::Scatter
+                && diagnosis.stand_ins.iter().filter_map(own).any(|one| one.log_e < 0.0);
+            let why = match contradicted {
+                true => "records that did not choose them are predicted better without them",
+                false => "too much variance stays unexplained",
+            };
             Answer::new(Tone::Warning, "something is missing; its cause is not identified")
                 .evidence(format!(
                     "With {} as surrogates the {error} falls {}.",
                     joined(&diagnosis.stand_ins),
                     from_to(first, last, diagnosis)
                 ))
-                .confidence(
-                    "Surrogates describe the error and are not claimed as its cause: too much variance stays unexplained.",
-                )
+                .confidence(format!(
+                    "Surrogates describe the error and are not claimed as its cause: {why}."
+                ))
                 .next(discover)
         }
         Verdict::Unexplained => {

@@ -151,7 +151,7 @@ pub fn diagnose(
     let (mut judged_rmse, mut channel) = (None, None);
     let (diagnosis, failures, detectable, beyond) = watched(onlooker, "diagnosis", || {
         let progress = |what: &str| onlooker.now(what);
-        let knowing = model.with_measured_inputs(&records);
+        let knowing = model.with_leading_inputs(&records);
         let mut diagnosis = search(&knowing, &records, options, onlooker.interrupt(), &progress)?;
         diagnosis.model.forget_unused(model);
         judged_rmse = as_written(&mut diagnosis, model, &records);

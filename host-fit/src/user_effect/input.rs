@@ -2,9 +2,96 @@
 
 use super::Definition;
 use crate::data::Record;
+use crate::fit::RULES;
+use crate::model::Model;
+use crate::order;
+use crate::parallel;
+use crate::preparation::FirstOrder;
+use crate::residual::correlation;
 use std::collections::BTreeMap;
 
-/// For each channel of all `records` that varies and that no effect of the catalogue reads, the effect that adds its
+/// Channels are ranked among so many, by averages of all records to so many samples: for the time it takes.
+const RANKED: usize = 256;
+const RANKED_SAMPLES: usize = 2000;
+
+/// Those of [`measured_inputs`] that a diagnosis of `given` tries: where there are many, those of which a first-order lag with
+/// dead time explains most of what `given` leaves.
+#[must_use]
+pub(crate) fn leading_inputs(given: &Model, records: &[Record]) -> Vec<&'static Definition> {
+    let inputs = measured_inputs(records);
+    if inputs.len() <= RULES.inputs {
+        return inputs;
+    }
+    let samples: usize = records.iter().map(Record::len).sum();
+    let stride = samples.div_ceil(RANKED_SAMPLES).max(1);
+    let thinned = |series: &[f64]| -> Vec<f64> {
+        let each = series.chunks(stride);
+        each.map(|c| c.iter().sum::<f64>() / c.len() as f64)
+            .collect()
+    };
+    let left: Vec<Vec<f64>> = records
+        .iter()
+        .map(|record| match given.free_run(record) {
+            Ok(run) => {
+                let left: Vec<f64> = record.y.iter().zip(&run).map(|(y, run)| y - run).collect();
+                thinned(&left)
+            }
+            Err(_) => thinned(&record.y),
+        })
+        .collect();
+    let inputs = &inputs[..inputs.len().min(RANKED)];
+    let mut ranked = parallel::each(inputs, |input| {
+        let channel = input.spec().channel.unwrap_or_default();
+        let follows: Vec<Record> = records
+            .iter()
+            .zip(&left)
+            .map(|(record, left)| {
+                let u = record.channels.get(channel).map(|values| thinned(values));
+                let period = record.sample_period_s * stride as f64;
+                Record::new(
+                    &record.name,
+                    record.role,
+                    period,
+                    u.unwrap_or_default(),
+                    left.clone(),
+                )
+            })
+            .collect();
+        (
+            FirstOrder::fitted(&follows).map_or(0.0, |found| found.explained),
+            *input,
+        )
+    });
+    order::descending(&mut ranked, |(explained, _)| *explained);
+    ranked
+        .into_iter()
+        .take(RULES.inputs)
+        .map(|(_, input)| input)
+        .collect()
+}
+
+/// Whether a channel is y, the command or a clock in other units.
+fn is_known(records: &[Record], name: &str) -> bool {
+    let all =
+        |of: &dyn Fn(&Record) -> Vec<f64>| -> Vec<f64> { records.iter().flat_map(of).collect() };
+    let own = all(&|r| r.channels.get(name).cloned().unwrap_or_default());
+    let (low, high) = own
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+            (low.min(*v), high.max(*v))
+        });
+    // Correlations are of numbers of order one.
+    let own: Vec<f64> = own.iter().map(|v| (v - low) / (high - low)).collect();
+    let goes_with = |other: Vec<f64>| {
+        correlation(&own, &other).is_some_and(|(r, _)| r.abs() > RULES.same_quantity)
+    };
+    goes_with(all(&|r| r.y.clone()))
+        || goes_with(all(&|r| r.u.clone()))
+        || goes_with(all(&|r| (0..r.len()).map(|k| k as f64).collect()))
+}
+
+/// For each channel of all `records` that varies, that no effect of the catalogue reads, and that is not y, the command or a
+/// clock again, the effect that adds its
 /// response to the reading: a first-order lag with dead time of the channel's deviation from its first value, in parts of its
 /// range. The reading's zero is that of a record at rest, when the channel had that value.
 /// A channel whose name is no name of the language is left out.
@@ -26,7 +113,8 @@ pub(crate) fn measured_inputs(records: &[Record]) -> Vec<&'static Definition> {
     }
     ranges
         .into_iter()
-        .filter(|(name, _)| !known.contains(name))
+        .filter(|(name, [low, high])| high > low && !known.contains(name))
+        .filter(|(name, _)| !is_known(records, name))
         .filter_map(|(name, [low, high])| measured_input(name, high - low))
         .collect()
 }
@@ -80,7 +168,6 @@ starts = [0.0, 0.02, 0.08, 0.25]
 mod tests {
     use super::*;
     use crate::data::Use;
-    use crate::model::Model;
 
     fn record(names: &[&str]) -> Record {
         let u = vec![0.0; 900];
@@ -103,8 +190,50 @@ mod tests {
         let inputs = measured_inputs(&records);
         let names: Vec<&str> = inputs.iter().map(|input| input.spec().name).collect();
         assert_eq!(names, ["input-heater-2"]);
+        // The reading in another unit, a copy of the command, a clock.
+        for (k, record) in records.iter_mut().enumerate() {
+            assert_eq!(k, 0);
+            record.u = (0..900)
+                .map(|k| f64::from(u8::from(k % 200 > 100)))
+                .collect();
+            record.y = (0..900).map(|k| (f64::from(k) / 50.0).sin()).collect();
+            let y = record.y.iter().map(|y| 32.0 + 1.8 * y).collect();
+            record.channels.insert("fahrenheit".to_owned(), y);
+            let u = record.u.iter().map(|u| 100.0 * u).collect();
+            record.channels.insert("percent".to_owned(), u);
+            let clock = (0..900).map(f64::from).collect();
+            record.channels.insert("row".to_owned(), clock);
+        }
+        let names: Vec<&str> = measured_inputs(&records)
+            .iter()
+            .map(|i| i.spec().name)
+            .collect();
+        assert_eq!(names, ["input-heater-2"]);
         // A record that lacks the channel.
         assert!(measured_inputs(&[records[0].clone(), record(&[])]).is_empty());
+    }
+
+    #[test]
+    fn of_many_channels_those_are_tried_that_explain_what_is_left() {
+        let mut record = record(&[]);
+        for i in 0..12_u32 {
+            let channel =
+                (0..900_u32).map(|k| f64::from(u8::from((k + 37 * i) / (60 + 7 * i) % 2 == 0)));
+            record.channels.insert(format!("c{i}"), channel.collect());
+        }
+        let mut s = 0.0;
+        record.y = record.channels["c7"]
+            .iter()
+            .map(|v| {
+                s += 0.05 * (v - s);
+                s
+            })
+            .collect();
+        let names: Vec<&str> = leading_inputs(&Model::default(), &[record])
+            .iter()
+            .map(|i| i.spec().name)
+            .collect();
+        assert_eq!((names.len(), names[0]), (RULES.inputs, "input-c7"));
     }
 
     #[test]

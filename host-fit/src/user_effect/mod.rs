@@ -15,7 +15,7 @@ pub(crate) mod program;
 mod rust;
 mod source;
 
-pub(crate) use input::measured_inputs;
+pub(crate) use input::{leading_inputs, measured_inputs};
 pub use interpreter::{UserEffect, UserState};
 pub(crate) use rust::{line_lengths, number, rust_module};
 pub use rust::{module_name, type_name};

@@ -40,11 +40,6 @@ rules! {
     most_starts: usize = 12, "", "judgement, on the campaign's rigs";
     /// Of those of a measured input so many are tried with every fresh start of the lowest order.
     input_starts: usize = 4, "", "24 records of a second input, 12 of them of one pulse each: four named it everywhere, a base found without it missed four";
-    /// So many measured channels are candidates of a diagnosis.
-    inputs: usize = 4, "channels", "judgement: for the time it takes";
-    /// A channel that goes with y, with the command or with time more than this is no input: the same quantity in another unit,
-    /// a copy of the command, a clock.
-    same_quantity: f64 = 0.95, "correlation", "judgement: a second heater behind its own lag stays below";
     /// Starting points of a delay law.
     law_starts: usize = 3, "", "judgement, on the campaign's rigs";
     /// Initial time constants of the lowest-order model.

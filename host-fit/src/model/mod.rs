@@ -25,8 +25,7 @@ pub use parameters::{Coordinate, Kind};
 pub use prepared::{AnyDelay, Prepared, Rounding};
 pub use rules::{RULES, Rules};
 
-use crate::data::Record;
-use crate::user_effect::{Definition, leading_inputs, measured_inputs};
+use crate::user_effect::Definition;
 use model_core::average::WINDOW;
 use model_core::effect::{Place, Spec, Unit};
 use model_core::effects::{ConstantDelay, NUISANCES, SPECS};
@@ -267,18 +266,9 @@ impl Model {
         Ok(())
     }
 
-    /// The model that knows each measured channel of `records` as an effect that can be added: a second input.
+    /// The model that knows `inputs` as effects that can be added, beside those it knows.
     #[must_use]
-    pub(crate) fn with_measured_inputs(&self, records: &[Record]) -> Self {
-        self.with_inputs(measured_inputs(records))
-    }
-
-    /// The model that knows the channels that explain most of what it leaves, a few, in the same way.
-    pub(crate) fn with_leading_inputs(&self, records: &[Record]) -> Self {
-        self.with_inputs(leading_inputs(self, records))
-    }
-
-    fn with_inputs(&self, inputs: Vec<&'static Definition>) -> Self {
+    pub(crate) fn with_inputs(&self, inputs: Vec<&'static Definition>) -> Self {
         let mut model = self.clone();
         for input in inputs {
             if model.definition(input.spec().name).is_none() {

@@ -19,6 +19,7 @@ use crate::model::{Model, Training};
 use crate::power::{Detectable, detectable};
 use crate::residual::{FailureCoordinate, Failures, NoiseSource, Where, where_it_fails};
 use crate::simulate::SimulateError;
+use crate::terms::leading_inputs;
 
 /// A diagnosis with its reports. Serialises to the keys of `diagnose --json`.
 #[derive(Clone, Debug)]
@@ -151,7 +152,7 @@ pub fn diagnose(
     let (mut judged_rmse, mut channel) = (None, None);
     let (diagnosis, failures, detectable, beyond) = watched(onlooker, "diagnosis", || {
         let progress = |what: &str| onlooker.now(what);
-        let knowing = model.with_leading_inputs(&records);
+        let knowing = model.with_inputs(leading_inputs(model, &records));
         let mut diagnosis = search(&knowing, &records, options, onlooker.interrupt(), &progress)?;
         diagnosis.model.forget_unused(model);
         judged_rmse = as_written(&mut diagnosis, model, &records);

@@ -13,6 +13,7 @@ use crate::extend::{Extended, StructureKept, extend as refit};
 use crate::indicators::{Indicators, Scores, score, score_new};
 use crate::model::Model;
 use crate::picture::significant;
+use crate::terms::measured_inputs;
 
 /// A model with effects added. Serialises to the keys of `extend --json`.
 #[derive(Clone, Debug, Serialize)]
@@ -125,7 +126,7 @@ pub fn extend(
         parameters,
         ..
     } = watched(onlooker, "refitting everything", || {
-        let knowing = model.with_measured_inputs(&records);
+        let knowing = model.with_inputs(measured_inputs(&records));
         refit(&knowing, &records, effects, onlooker.interrupt())
     })?;
     extended.forget_unused(model);

@@ -19,7 +19,7 @@ use crate::indicators::{Scores, one_step_norm, score, score_new};
 use crate::model::{Delay, Model, Start};
 use crate::preparation::Preparation;
 use crate::search::{Settings, StopReason};
-use crate::terms::{Frame, Units, base_model, baselines};
+use crate::terms::{Frame, Units, base_model, baselines, measured_inputs};
 use crate::user_effect::Definition;
 use model_core::effects::{NUISANCES, StateDependentDelay};
 use model_core::recursion::LagConvention;
@@ -454,7 +454,7 @@ fn with_effects(
     }
     if !request.effects.is_empty() {
         let given = model.clone();
-        model = model.with_measured_inputs(records);
+        model = model.with_inputs(measured_inputs(records));
         effects_for(&model, &request.effects)?;
         model = watched(onlooker, "refitting with the effects", || {
             extend(&model, records, &request.effects, onlooker.interrupt())

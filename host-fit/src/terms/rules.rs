@@ -11,6 +11,11 @@ rules! {
     /// Free runs are not restarted, whatever the given model's poles, where the first-order reference explains this much with a
     /// time constant well within the records.
     self_regulates: f64 = 0.5, "share of the variance", "judgement: half";
+    /// So many measured channels are candidates of a diagnosis.
+    inputs: usize = 4, "channels", "judgement: for the time it takes";
+    /// A channel that goes with y, with the command or with time more than this is no input: the same quantity in another unit,
+    /// a copy of the command, a clock.
+    same_quantity: f64 = 0.95, "correlation", "judgement: a second heater behind its own lag stays below";
     /// A model within this factor of the noise level is searched no further.
     at_the_floor: f64 = 1.005, "times the noise level", "two standard deviations of the error of three records of 10 s";
     /// If the best model is above this factor of the noise level, the second-best is followed as well.

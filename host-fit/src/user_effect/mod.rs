@@ -9,13 +9,11 @@
 mod expression;
 mod fault_place;
 pub(crate) mod form;
-mod input;
 mod interpreter;
 pub(crate) mod program;
 mod rust;
 mod source;
 
-pub(crate) use input::{leading_inputs, measured_inputs};
 pub use interpreter::{UserEffect, UserState};
 pub(crate) use rust::{line_lengths, number, rust_module};
 pub use rust::{module_name, type_name};

@@ -1,13 +1,13 @@
 //! A measured channel as a second input of the plant: a heater beside the first one, a fan, the ambient temperature.
 
-use super::Definition;
+use super::RULES;
 use crate::data::Record;
-use crate::fit::RULES;
 use crate::model::Model;
 use crate::order;
 use crate::parallel;
 use crate::preparation::FirstOrder;
 use crate::residual::correlation;
+use crate::user_effect::Definition;
 use std::collections::BTreeMap;
 
 /// Channels are ranked among so many, by averages of all records to so many samples: for the time it takes.

@@ -11,12 +11,12 @@ use crate::data::{Record, Use};
 use crate::diagnose::ParameterEstimate;
 use crate::fit::{
     CandidateError, Fit, FitOptions, RULES, channel_reference, fit, fit_with_effect, lean_base,
-    pieces, restart_after,
+    pieces,
 };
 use crate::model::{Model, Start};
 use crate::preparation::Preparation;
 use crate::simulate::SimulateError;
-use crate::terms::Units;
+use crate::terms::{Units, restarted};
 use model_core::effect::Spec;
 use serde::Serialize;
 use strsim::levenshtein;
@@ -136,11 +136,7 @@ pub fn extend(
     // Cards are written for y of order 1 and 1 ms a sample, as for a diagnosis.
     let prepared = Preparation::of(records);
     let units = Units::of(model, &prepared);
-    let records: Vec<Record> = prepared
-        .records
-        .iter()
-        .map(|r| units.record_in(r))
-        .collect();
+    let records = units.records_in(&prepared.records);
     let (model, records) = (&units.model_in(model), records.as_slice());
     let learning: Vec<&Record> = records.iter().filter(|r| r.role == Use::Identify).collect();
     if learning.is_empty() {
@@ -156,7 +152,7 @@ pub fn extend(
         ..FitOptions::default()
     };
     let cut: Vec<Record>;
-    let learning = match restart_after(model, records) {
+    let learning = match restarted(model, records, prepared.reference.as_ref()) {
         Some(samples) => {
             cut = learning
                 .iter()

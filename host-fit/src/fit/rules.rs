@@ -39,7 +39,7 @@ rules! {
     /// Most starting points of an effect.
     most_starts: usize = 12, "", "judgement, on the campaign's rigs";
     /// Of those of a measured input so many are tried with every fresh start of the lowest order.
-    input_starts: usize = 4, "", "24 records of a second input, 12 of them of one pulse each: four named it everywhere, a base found without it missed four";
+    input_starts: usize = 4, "", "judgement: both signs and several lags";
     /// Starting points of a delay law.
     law_starts: usize = 3, "", "judgement, on the campaign's rigs";
     /// Initial time constants of the lowest-order model.

@@ -387,6 +387,47 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_record_rests_until_another_input_is_switched() {
+        let u: Vec<f64> = (0..900)
+            .map(|k| f64::from(u8::from(k % 300 > 150)))
+            .collect();
+        let y = response(&u);
+        let mut record = Record::new("r", Use::Identify, 0.001, u, y);
+        let fan = (0..900).map(|k| f64::from(u8::from(k >= 80))).collect();
+        record.channels.insert("fan".to_owned(), fan);
+        // What changes at every sample is measured, not switched.
+        let wanders = (0..900).map(f64::from).collect();
+        record.channels.insert("wanders".to_owned(), wanders);
+        let records = [record];
+        let reference = FirstOrder::fitted(&records).unwrap();
+        let own = Beginning::of(&records[0], &records, Some(&reference));
+        assert_eq!((own.rest, own.follow), (80, 0));
+    }
+
+    /// The reference of a second order has a longer dead time than that of its first motion.
+    #[test]
+    fn a_record_that_answers_its_edge_sooner_than_the_reference_rests_until_the_edge() {
+        let u: Vec<f64> = (0..900)
+            .map(|k| f64::from(u8::from(k % 300 >= 20)))
+            .collect();
+        let record = Record::new("r", Use::Identify, 0.001, u.clone(), response(&u));
+        let records = [record];
+        let late = FirstOrder {
+            dead_time: 60.0,
+            ..FirstOrder::fitted(&records).unwrap()
+        };
+        let own = Beginning::of(&records[0], &records, Some(&late));
+        assert_eq!((own.rest, own.follow), (20, 0));
+        // One that relaxes from the start is in mid-run.
+        let mut relaxing = records.clone();
+        for (k, y) in relaxing[0].y.iter_mut().enumerate() {
+            *y = (-(k as f64) / 30.0).exp();
+        }
+        let own = Beginning::of(&relaxing[0], &relaxing, Some(&late));
+        assert!(own.follow > 0, "{own:?}");
+    }
+
     /// Rests of more than a time constant that lie still do so at their own zero; what moves is on its way.
     #[test]
     fn a_zero_that_moved_is_no_motion() {

@@ -406,8 +406,8 @@ mod tests {
         assert_eq!(tared[2], records[2]);
     }
 
-    /// Rests of a few dozen samples, without standard errors: how far noise may move a level is told by the scatter within the
-    /// rests, and by what the reference response leaves of the records.
+    /// Short rests without standard errors: the noise of a level is that within the rests, or slower noise as large as the
+    /// residual of the reference response.
     #[test]
     fn zeros_of_short_rests_are_told_where_the_records_show_no_slower_noise() {
         let short = Beginning {

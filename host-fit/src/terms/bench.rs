@@ -6,7 +6,7 @@ use super::units::Units;
 use crate::data::Record;
 use crate::fit::{FitOptions, restart_after};
 use crate::model::Model;
-use crate::preparation::{MovingZero, Preparation, RULES as PREPARATION};
+use crate::preparation::{FirstOrder, MovingZero, Preparation, RULES as PREPARATION};
 
 /// Records in inner units, the judge over them, and the given model.
 pub struct Bench {
@@ -31,11 +31,7 @@ impl Bench {
     pub fn of(given: &Model, records: &[Record]) -> Option<Self> {
         let prepared = Preparation::of(records);
         let units = Units::of(given, &prepared);
-        let inner: Vec<Record> = prepared
-            .records
-            .iter()
-            .map(|r| units.record_in(r))
-            .collect();
+        let inner = units.records_in(&prepared.records);
         let mid_run = !prepared.at_rest;
         let options = FitOptions {
             // Where records start at rest, a level is the sensor's offset, which is a term of the search.
@@ -43,13 +39,7 @@ impl Bench {
             ..FitOptions::default()
         };
         let given = units.model_in(given);
-        // A given model without an input that the records need may remember for ever where the rig does not.
-        let shortest = records.iter().map(Record::len).min().unwrap_or(0) as f64;
-        let forgets = prepared.reference.is_some_and(|reference| {
-            reference.explained > RULES.self_regulates
-                && reference.time_constant * PREPARATION.times_of_rest < shortest
-        });
-        let restarted = restart_after(&given, &inner).filter(|_| !forgets);
+        let restarted = restarted(&given, &inner, prepared.reference.as_ref());
         let mut judge = Judge::new(&inner, restarted, options)?;
         judge.full_is_one = prepared.full_is_known;
         Some(Self {
@@ -63,9 +53,26 @@ impl Bench {
     }
 }
 
+/// Samples after which free runs of `model` over `records` (both in the same units) are restarted: a rig that drifts. None
+/// where the first-order `reference` forgets its initial state well within the records: a model that lacks an input may
+/// remember for ever where the rig does not.
+pub(crate) fn restarted(
+    model: &Model,
+    records: &[Record],
+    reference: Option<&FirstOrder>,
+) -> Option<usize> {
+    let shortest = records.iter().map(Record::len).min()? as f64;
+    let forgets = reference.is_some_and(|reference| {
+        reference.explained > RULES.self_regulates
+            && reference.time_constant * PREPARATION.times_of_rest < shortest
+    });
+    restart_after(model, records).filter(|_| !forgets)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Start;
     use crate::residual::plants::{base, records};
 
     /// A constant that a linear fit left in the given model is no reason to fit one in every candidate.
@@ -78,5 +85,20 @@ mod tests {
         };
         let bench = Bench::of(&given, &records).expect("records to learn from");
         assert!(!bench.mid_run && !bench.judge.options.constant);
+    }
+
+    /// The poles of a model do not make a rig drift that its records show at rest again and again.
+    #[test]
+    fn a_rig_that_regulates_itself_is_not_restarted() {
+        let records = records(&[], &[], 3);
+        let integrating = Model {
+            start: Start::Measured,
+            a: vec![1.0],
+            c: vec![0.0],
+            ..base(&records)
+        };
+        let reference = FirstOrder::fitted(&records).expect("y follows u");
+        assert!(restarted(&integrating, &records, None).is_some());
+        assert_eq!(restarted(&integrating, &records, Some(&reference)), None);
     }
 }

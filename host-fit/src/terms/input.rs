@@ -7,8 +7,8 @@ use crate::order;
 use crate::parallel;
 use crate::preparation::FirstOrder;
 use crate::residual::correlation;
-use crate::user_effect::Definition;
-use std::collections::BTreeMap;
+use crate::user_effect::{Definition, channel_signal};
+use model_core::effects::SPECS;
 
 /// Channels are ranked among so many, by averages of all records to so many samples: for the time it takes.
 const RANKED: usize = 256;
@@ -70,74 +70,68 @@ pub(crate) fn leading_inputs(given: &Model, records: &[Record]) -> Vec<&'static 
         .collect()
 }
 
-/// Whether a channel is y, the command or a clock in other units.
-fn is_known(records: &[Record], name: &str) -> bool {
-    let all =
-        |of: &dyn Fn(&Record) -> Vec<f64>| -> Vec<f64> { records.iter().flat_map(of).collect() };
-    let own = all(&|r| r.channels.get(name).cloned().unwrap_or_default());
-    let (low, high) = own
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-            (low.min(*v), high.max(*v))
-        });
-    // Correlations are of numbers of order one.
-    let own: Vec<f64> = own.iter().map(|v| (v - low) / (high - low)).collect();
-    let goes_with = |other: Vec<f64>| {
-        correlation(&own, &other).is_some_and(|(r, _)| r.abs() > RULES.same_quantity)
-    };
-    goes_with(all(&|r| r.y.clone()))
-        || goes_with(all(&|r| r.u.clone()))
-        || goes_with(all(&|r| (0..r.len()).map(|k| k as f64).collect()))
+/// A signal of all records, one after the other.
+fn joined(records: &[Record], of: impl Fn(&Record) -> Vec<f64>) -> Vec<f64> {
+    records.iter().flat_map(of).collect()
 }
 
 /// For each channel of all `records` that varies, that no effect of the catalogue reads, and that is not y, the command or a
-/// clock again, the effect that adds its
-/// response to the reading: a first-order lag with dead time of the channel's deviation from its first value, in parts of its
-/// range. The reading's zero is that of a record at rest, when the channel had that value.
-/// A channel whose name is no name of the language is left out.
+/// clock again, the effect that adds its response to the reading: a first-order lag with dead time of the channel's deviation
+/// from its first value, in parts of its range. The reading's zero is that of a record at rest, when the channel had that value.
 #[must_use]
 pub(crate) fn measured_inputs(records: &[Record]) -> Vec<&'static Definition> {
-    let known = model_core::effects::SPECS.iter().filter_map(|s| s.channel);
-    let known: Vec<&str> = known.collect();
     let Some(first) = records.first() else {
         return Vec::new();
     };
-    let mut ranges: BTreeMap<&str, [f64; 2]> = BTreeMap::new();
-    for name in first.channels.keys() {
-        let all: Option<Vec<&Vec<f64>>> = records.iter().map(|r| r.channels.get(name)).collect();
-        let values = all.iter().flatten().flat_map(|values| values.iter());
-        let range = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
-            [low.min(*v), high.max(*v)]
-        });
-        ranges.insert(name, range);
-    }
-    ranges
-        .into_iter()
-        .filter(|(name, [low, high])| high > low && !known.contains(name))
-        .filter(|(name, _)| !is_known(records, name))
-        .filter_map(|(name, [low, high])| measured_input(name, high - low))
-        .collect()
+    let read = |name: &str| SPECS.iter().any(|spec| spec.channel == Some(name));
+    let everywhere = |name: &str| records.iter().all(|r| r.channels.contains_key(name));
+    let names = first.channels.keys();
+    let names = names.filter(|name| !read(name) && everywhere(name));
+    let known = [
+        joined(records, |r| r.y.clone()),
+        joined(records, |r| r.u.clone()),
+        joined(records, |r| (0..r.len()).map(|k| k as f64).collect()),
+    ];
+    let inputs = names.filter_map(|name| {
+        let own = joined(records, |r| r.channels[name].clone());
+        let low = own.iter().copied().fold(f64::INFINITY, f64::min);
+        let range = own.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
+        if !(range.is_finite() && range > 0.0) {
+            return None;
+        }
+        // Correlations are of numbers of order one.
+        let scaled: Vec<f64> = own.iter().map(|v| (v - low) / range).collect();
+        let is_again = |known: &Vec<f64>| {
+            correlation(&scaled, known).is_some_and(|(r, _)| r.abs() > RULES.same_quantity)
+        };
+        (!known.iter().any(is_again)).then(|| measured_input(name, range))?
+    });
+    inputs.collect()
 }
 
-/// The effect of the channel called `name`, which covers `range`.
-fn measured_input(name: &str, range: f64) -> Option<&'static Definition> {
-    let usable = range.is_finite() && range > 0.0;
-    let own = name.to_lowercase().replace('_', "-");
+/// The effect of the channel called `channel`, which covers `range`.
+fn measured_input(channel: &str, range: f64) -> Option<&'static Definition> {
+    let words = channel.to_lowercase();
+    let words = words.split(|c: char| !c.is_ascii_alphanumeric());
+    let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
+    let (name, signal) = (words.join("-"), channel_signal(channel));
+    let summary = format!("a response of y to the measured channel `{channel}`");
+    let [quoted, summary] = [channel.to_owned(), summary].map(toml::Value::String);
     let text = format!(
-        r#"name = "input-{own}"
+        r#"name = "input-{name}"
 place = "sensor"
-summary = "a response of y to the measured channel `{name}`"
+summary = {summary}
 source = "superposition: a measured disturbance behind a first-order lag with dead time"
-channel = "{name}"
+channel = {quoted}
 scales = true
 expression = "reading + gain * level"
 [[state]]
 name = "first"
-update = "if begun > 0.5 {{ first }} else {{ {name} }}"
+update = "if begun > 0.5 {{ first }} else {{ {signal} }}"
 [[state]]
 name = "level"
 update = """
-level + (1.0 - exp(-period / lag)) * (delayed(({name} - first) / {range:?}, dead_time) - level)"""
+level + (1.0 - exp(-period / lag)) * (delayed(({signal} - first) / {range:?}, dead_time) - level)"""
 [[state]]
 name = "begun"
 update = "1.0"
@@ -161,7 +155,8 @@ high = 0.5
 starts = [0.0, 0.02, 0.08, 0.25]
 "#
     );
-    usable.then(|| Definition::from_toml(&text, name).ok())?
+    // A name that is too long is none of an effect.
+    Definition::from_toml(&text, channel).ok()
 }
 
 #[cfg(test)]
@@ -183,7 +178,7 @@ mod tests {
 
     #[test]
     fn each_channel_that_varies_and_has_a_name_is_an_input() {
-        let mut records = [record(&["heater_2", "u_inf", "y", "still"])];
+        let mut records = [record(&["Heater 2", "u_inf", "still"])];
         records[0]
             .channels
             .insert("still".to_owned(), vec![1.0; 900]);
@@ -191,8 +186,7 @@ mod tests {
         let names: Vec<&str> = inputs.iter().map(|input| input.spec().name).collect();
         assert_eq!(names, ["input-heater-2"]);
         // The reading in another unit, a copy of the command, a clock.
-        for (k, record) in records.iter_mut().enumerate() {
-            assert_eq!(k, 0);
+        for record in &mut records {
             record.u = (0..900)
                 .map(|k| f64::from(u8::from(k % 200 > 100)))
                 .collect();

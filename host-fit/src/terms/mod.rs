@@ -36,6 +36,7 @@ mod units;
 pub use crate::fit::Known;
 pub use automatic::{Automatic, Frame, base_model};
 pub use bench::Bench;
+pub(crate) use bench::restarted;
 pub(crate) use certificate::MostLikely;
 pub use chance::Chance;
 pub(crate) use chance::Noise;

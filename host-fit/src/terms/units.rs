@@ -73,6 +73,12 @@ impl Units {
         }
     }
 
+    /// Records in inner units.
+    #[must_use]
+    pub fn records_in(&self, records: &[Record]) -> Vec<Record> {
+        records.iter().map(|r| self.record_in(r)).collect()
+    }
+
     /// A record in inner units.
     #[must_use]
     pub fn record_in(&self, record: &Record) -> Record {

@@ -21,7 +21,7 @@ pub use rust::{module_name, type_name};
 use model_core::effect::Spec;
 use program::Program;
 use source::Refusal;
-pub(crate) use source::Source;
+pub(crate) use source::{Source, channel_signal};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use thiserror::Error;

@@ -70,6 +70,15 @@ fn is_identifier(name: &str) -> bool {
         && syn::parse_str::<syn::Ident>(name).is_ok()
 }
 
+/// The name of a channel in expressions: its own, or `channel` where that is no name of the language.
+pub(crate) fn channel_signal(channel: &str) -> &str {
+    if is_identifier(channel) {
+        channel
+    } else {
+        "channel"
+    }
+}
+
 /// A name of an effect: words of small letters and digits joined by hyphens.
 fn is_effect_name(name: &str) -> bool {
     let word = |word: &str| {
@@ -131,7 +140,8 @@ impl Source {
             ]),
         }
         if let Some(channel) = &self.channel {
-            signals.push((channel, Op::Signal(Signal::Channel)));
+            let name = channel_signal(channel);
+            signals.push((name, Op::Signal(Signal::Channel)));
             signals.push(("reference", Op::Reference));
         }
         let mut name = |label: String, name: &str, op: Op| {

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
-use scenarios::strangers::{Options, Row, Step, json, run, table};
+use scenarios::strangers::{Options, Row, Step, by_kind, drawn, json, run, table};
 
 /// Every set beside the three baselines: samples scored, FIT, verdict, delay, seconds, and whether that is right.
 ///
@@ -17,6 +17,20 @@ struct Arguments {
     /// A folder of sets; repeatable.
     #[arg(long, value_name = "DIR")]
     folder: Vec<PathBuf>,
+    /// Draw so many sets from the seed, sixteen kinds in turn, and run those.
+    #[arg(long, value_name = "COUNT", conflicts_with = "folder")]
+    drawn: Option<usize>,
+    /// Seed of the drawn sets.
+    #[arg(long, default_value_t = 1, requires = "drawn")]
+    seed: u64,
+    /// Folder for the drawn sets, which stay there.
+    #[arg(
+        long,
+        value_name = "DIR",
+        default_value = "target/strangers",
+        requires = "drawn"
+    )]
+    draw_into: PathBuf,
     /// Only sets or cases whose name contains this; repeatable.
     #[arg(long, value_name = "WORD")]
     only: Vec<String>,
@@ -42,7 +56,16 @@ fn step(word: &str) -> Result<Step, String> {
 }
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let mut arguments = Arguments::parse();
+    if let Some(count) = arguments.drawn {
+        match drawn::draw(&arguments.draw_into, arguments.seed, count) {
+            Ok(folder) => arguments.folder.push(folder),
+            Err(error) => {
+                eprintln!("strangers: {error:#}");
+                return ExitCode::FAILURE;
+            }
+        }
+    }
     let options = Options {
         folders: arguments.folder,
         only: arguments.only,
@@ -67,6 +90,8 @@ fn main() -> ExitCode {
         Ok(rows) => {
             if arguments.json {
                 println!("{:#}", json(&rows));
+            } else if arguments.drawn.is_some() {
+                print!("{}", by_kind(&rows));
             } else {
                 print!("{}", table(&rows));
             }

@@ -17,7 +17,7 @@ pub(super) fn seconds<R>(rows: &[&R], of: impl Fn(&R) -> Option<f64>) -> String 
 }
 
 /// "95 of 100 (95 %, 89–98 %)": the share and Wilson's bounds with 95 % confidence.
-pub(super) fn bounded(hits: usize, all: usize) -> String {
+pub(crate) fn bounded(hits: usize, all: usize) -> String {
     const Z: f64 = 1.959_964;
     let (k, n) = (hits as f64, all as f64);
     let share = k / n;

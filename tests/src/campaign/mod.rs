@@ -18,6 +18,7 @@ pub mod terms;
 
 pub use calibration::calibration;
 pub use case::{Case, Given, Group, Sizes, cases};
+pub(crate) use counts::bounded;
 pub use ledger::{Entry, Ledger};
 pub use program::{Program, Spent};
 pub use row::{Found, PutIn, Row};

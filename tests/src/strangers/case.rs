@@ -69,6 +69,8 @@ pub struct Right {
     pub delay_samples: Option<[f64; 2]>,
     /// Range of every delay that `delay` measures, samples.
     pub edge_delay_samples: Option<[f64; 2]>,
+    /// What the interval of the dead time that `delay` measures must contain, to half a sample.
+    pub dead_time_samples: Option<f64>,
     /// Most state lags.
     pub n1_at_most: Option<usize>,
     /// Most product lags.

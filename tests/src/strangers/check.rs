@@ -14,6 +14,8 @@ const BELOW_BASELINE: f64 = 1.0;
 const SCORED: f64 = 0.5;
 /// Tolerances of two equal answers: points of FIT, and samples of delay.
 const SAME_FIT: f64 = 0.5;
+/// A sampled command and a sampled answer place an edge to this.
+const HALF_A_SAMPLE: f64 = 0.5;
 
 /// All output of the program for a case.
 #[derive(Debug, Default)]
@@ -95,6 +97,7 @@ pub(super) fn wrong(case: &Case, heard: &Heard) -> Vec<String> {
         wrong.extend(of_identify(&case.right, heard));
     }
     wrong.extend(of_delay(&case.right, heard));
+    wrong.extend(of_dead_time(&case.right, heard));
     wrong.extend(of_diagnose(&case.right, heard));
     if let (Some(most), Some(found)) = (case.right.terms_at_most, heard.found(Step::Discover)) {
         let terms = found.document["terms"].as_array().map_or(0, Vec::len);
@@ -306,6 +309,17 @@ fn of_delay(right: &Right, heard: &Heard) -> Vec<String> {
                 .join(", ")
         )],
     }
+}
+
+fn of_dead_time(right: &Right, heard: &Heard) -> Option<String> {
+    let (truth, answer) = (right.dead_time_samples?, heard.delay.as_ref()?);
+    let found = &answer.document["dead_time"];
+    let bound = |end: &str| found[end].as_f64();
+    let Some((low, high)) = bound("low_samples").zip(bound("high_samples")) else {
+        return Some("delay: no dead time".to_owned());
+    };
+    let outside = !(low - HALF_A_SAMPLE..=high + HALF_A_SAMPLE).contains(&truth);
+    outside.then(|| format!("delay: dead time {low:.1} to {high:.1} samples, {truth} is right"))
 }
 
 fn of_diagnose(right: &Right, heard: &Heard) -> Vec<String> {

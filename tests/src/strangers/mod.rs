@@ -8,12 +8,13 @@
 pub(crate) mod answer;
 mod case;
 mod check;
+pub mod drawn;
 mod folder;
 mod rehearsal;
 mod table;
 
 pub use case::{Case, Right, Step};
-pub use table::{json, table};
+pub use table::{by_kind, json, table};
 
 use host_fit::baseline::BaselineFits;
 use serde::Serialize;

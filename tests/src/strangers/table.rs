@@ -1,6 +1,7 @@
 //! The results as a Markdown table with the problems below, and as JSON.
 
 use super::Row;
+use crate::campaign::bounded;
 use serde_json::{Value, json as value};
 use std::fmt::Write;
 
@@ -60,6 +61,34 @@ pub fn table(rows: &[Row]) -> String {
     text
 }
 
+/// The shares of correct cases by kind, followed by the problems.
+#[must_use]
+pub fn by_kind(rows: &[Row]) -> String {
+    let mut kinds: Vec<(&str, Vec<&Row>)> = Vec::new();
+    for row in rows {
+        match kinds.iter_mut().find(|(kind, _)| *kind == row.kind) {
+            Some((_, own)) => own.push(row),
+            None => kinds.push((&row.kind, vec![row])),
+        }
+    }
+    kinds.push(("all", rows.iter().collect()));
+    let mut text = String::from("| records | right | longest, s |\n|---|---|---|\n");
+    for (kind, own) in kinds.iter().filter(|(_, own)| !own.is_empty()) {
+        let right = own.iter().filter(|row| row.is_right()).count();
+        let longest = own.iter().map(|row| row.seconds).fold(0.0, f64::max);
+        let right = bounded(right, own.len());
+        let _ = writeln!(text, "| {kind} | {right} | {longest:.1} |");
+    }
+    text.push('\n');
+    for row in rows {
+        let reasons = row.skipped.iter().chain(&row.wrong);
+        for reason in reasons {
+            let _ = writeln!(text, "- {}: {reason}", row.set);
+        }
+    }
+    text
+}
+
 /// All results as one document with the numbers of run and correct cases.
 #[must_use]
 pub fn json(rows: &[Row]) -> Value {
@@ -104,5 +133,37 @@ mod tests {
         assert!(text.contains("1 of 2 cases are right."), "{text}");
         assert!(text.contains("- a two: verdict unexplained"), "{text}");
         assert_eq!(json(&rows)["right"], 1);
+    }
+
+    #[test]
+    fn kinds_are_counted_in_the_order_of_their_first_case() {
+        let row = |set: &str, kind: &str, wrong: &[&str]| Row {
+            set: set.to_owned(),
+            kind: kind.to_owned(),
+            wrong: wrong.iter().map(|reason| (*reason).to_owned()).collect(),
+            seconds: 1.25,
+            ..Row::default()
+        };
+        let rows = [
+            row("000-b", "b", &[]),
+            row("001-a", "a", &["verdict unexplained"]),
+            row("002-b", "b", &[]),
+        ];
+        let text = by_kind(&rows);
+        let begins: Vec<&str> = text
+            .lines()
+            .skip(2)
+            .filter_map(|line| line.split(" (").next())
+            .collect();
+        assert_eq!(
+            begins,
+            [
+                "| b | 2 of 2",
+                "| a | 0 of 1",
+                "| all | 2 of 3",
+                "",
+                "- 001-a: verdict unexplained"
+            ]
+        );
     }
 }

@@ -1,0 +1,408 @@
+//! The kinds of records that strangers bring.
+
+use super::plant::Plant;
+use super::{chance, logarithmic, normal};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+/// Columns of a file.
+#[derive(Clone, Debug)]
+pub(super) struct Record {
+    pub(super) u: Vec<f64>,
+    pub(super) y: Vec<f64>,
+    /// Another measured channel with its name.
+    pub(super) channel: Option<(&'static str, Vec<f64>)>,
+}
+
+impl Record {
+    pub(super) fn is_switched(&self) -> bool {
+        self.u.iter().all(|u| *u == 0.0 || *u == 1.0)
+    }
+}
+
+/// Records of a rig and what is right of them.
+#[derive(Clone, Debug)]
+pub(super) struct Drawn {
+    pub(super) period_s: f64,
+    pub(super) records: Vec<Record>,
+    /// What the interval of `delay` has to contain, samples; none where the command has no edges to measure.
+    pub(super) dead_time: Option<f64>,
+    /// The channel that drives y as well.
+    pub(super) input: Option<&'static str>,
+    /// Further options of `import`.
+    pub(super) import: Vec<String>,
+    /// The rig in words.
+    pub(super) truth: String,
+}
+
+/// A kind, with its name in the table and in words.
+pub(super) struct Kind {
+    pub(super) name: &'static str,
+    pub(super) what: &'static str,
+    pub(super) draw: fn(&mut ChaCha8Rng) -> Drawn,
+}
+
+/// In the order in which they are drawn.
+pub(super) const KINDS: &[Kind] = &[
+    Kind {
+        name: "one-pulse",
+        what: "one step or one pulse",
+        draw: one_pulse,
+    },
+    Kind {
+        name: "second-order",
+        what: "two lags in series",
+        draw: |rng| of_lags(rng, 2),
+    },
+    Kind {
+        name: "third-order",
+        what: "three lags in series",
+        draw: |rng| of_lags(rng, 3),
+    },
+    Kind {
+        name: "valve-open",
+        what: "at rest with the command on",
+        draw: valve_open,
+    },
+    Kind {
+        name: "mid-run",
+        what: "begins in mid-run",
+        draw: mid_run,
+    },
+    Kind {
+        name: "thermostat",
+        what: "switched by a thermostat",
+        draw: thermostat,
+    },
+    Kind {
+        name: "graded",
+        what: "a command of many levels",
+        draw: graded,
+    },
+    Kind {
+        name: "quantised",
+        what: "a coarse converter",
+        draw: quantised,
+    },
+    Kind {
+        name: "two-records",
+        what: "two records",
+        draw: |rng| several(rng, 2, 0.0),
+    },
+    Kind {
+        name: "zeros-apart",
+        what: "three records with zeros apart",
+        draw: |rng| several(rng, 3, 3.0),
+    },
+    Kind {
+        name: "binary-sequence",
+        what: "a pseudo-random binary sequence",
+        draw: binary_sequence,
+    },
+    Kind {
+        name: "held-out",
+        what: "the tail of one run is held out",
+        draw: held_out,
+    },
+    Kind {
+        name: "coloured",
+        what: "noise with memory",
+        draw: coloured,
+    },
+    Kind {
+        name: "outliers",
+        what: "heavy-tailed noise",
+        draw: outliers,
+    },
+    Kind {
+        name: "measured-input",
+        what: "another input that is measured",
+        draw: measured_input,
+    },
+    Kind {
+        name: "unrelated-channel",
+        what: "a channel that has nothing to do with y",
+        draw: unrelated_channel,
+    },
+];
+
+/// A rig before its records are drawn.
+struct Rig {
+    period_s: f64,
+    plant: Plant,
+    /// Standard deviation of the noise.
+    noise: f64,
+    samples: usize,
+}
+
+impl Rig {
+    fn draw(rng: &mut ChaCha8Rng) -> Self {
+        let periods = [0.005, 0.02, 0.1, 0.5, 1.0, 2.0, 10.0, 30.0];
+        let sign = if chance(rng, 0.75) { 1.0 } else { -1.0 };
+        let gain = sign * logarithmic(rng, 0.03, 300.0);
+        let level = match chance(rng, 0.5) {
+            true => 0.0,
+            false => gain * rng.random_range(-8.0..8.0),
+        };
+        Self {
+            period_s: periods[rng.random_range(0..periods.len())],
+            plant: Plant {
+                lags: vec![rng.random_range(15.0..90.0)],
+                dead_time: f64::from(rng.random_range(0..350)) / 10.0,
+                gain,
+                level,
+                before: 0.0,
+            },
+            noise: gain.abs() * rng.random_range(0.002..0.01),
+            samples: rng.random_range(500..1500),
+        }
+    }
+
+    /// With a second lag, two times in five.
+    fn draw_any_order(rng: &mut ChaCha8Rng) -> Self {
+        let mut rig = Self::draw(rng);
+        if chance(rng, 0.4) {
+            rig.add_lag(rng);
+        }
+        rig
+    }
+
+    fn add_lag(&mut self, rng: &mut ChaCha8Rng) {
+        self.plant
+            .lags
+            .push(self.plant.lags[0] * rng.random_range(0.1..0.7));
+    }
+
+    /// A switched command that begins with `first`: first a rest, then pieces of 0.3 to 1.7 times `mean` time constants.
+    fn switched(&self, rng: &mut ChaCha8Rng, first: f64, mean: f64) -> Vec<f64> {
+        let mut u = vec![first; rng.random_range(20..100)];
+        let mut now = first;
+        while u.len() < self.samples {
+            now = 1.0 - now;
+            let length = rng.random_range(0.3..1.7) * mean * self.plant.lags[0];
+            u.extend(std::iter::repeat_n(now, length as usize + 5));
+        }
+        u.truncate(self.samples);
+        u
+    }
+
+    fn white(&self, y: Vec<f64>, rng: &mut ChaCha8Rng) -> Vec<f64> {
+        y.into_iter()
+            .map(|y| y + self.noise * normal(rng))
+            .collect()
+    }
+
+    /// The record of this command with white noise.
+    fn record(&self, u: Vec<f64>, rng: &mut ChaCha8Rng) -> Record {
+        let y = self.white(self.plant.answer(&u), rng);
+        Record {
+            u,
+            y,
+            channel: None,
+        }
+    }
+
+    fn of(&self, records: Vec<Record>) -> Drawn {
+        let plant = &self.plant;
+        let lags: Vec<String> = plant.lags.iter().map(|lag| format!("{lag:.1}")).collect();
+        let truth = format!(
+            "gain {:.4}, lags {} samples, dead time {} samples, level {:.4}, noise {:.4}, a sample each {} s",
+            plant.gain,
+            lags.join(" + "),
+            plant.dead_time,
+            plant.level,
+            self.noise,
+            self.period_s
+        );
+        Drawn {
+            period_s: self.period_s,
+            records,
+            dead_time: Some(plant.dead_time),
+            input: None,
+            import: Vec::new(),
+            truth,
+        }
+    }
+}
+
+fn one_pulse(rng: &mut ChaCha8Rng) -> Drawn {
+    let rig = Rig::draw(rng);
+    let rest = rng.random_range(10..200);
+    let length = match chance(rng, 0.5) {
+        true => rig.samples,
+        false => (rng.random_range(1.0..5.0) * rig.plant.lags[0]) as usize + 5,
+    };
+    let on = |sample| f64::from(u8::from((rest..rest + length).contains(&sample)));
+    let u = (0..rig.samples).map(on).collect();
+    rig.of(vec![rig.record(u, rng)])
+}
+
+fn of_lags(rng: &mut ChaCha8Rng, lags: usize) -> Drawn {
+    let mut rig = Rig::draw(rng);
+    while rig.plant.lags.len() < lags {
+        rig.add_lag(rng);
+    }
+    let u = rig.switched(rng, 0.0, 3.0);
+    rig.of(vec![rig.record(u, rng)])
+}
+
+fn valve_open(rng: &mut ChaCha8Rng) -> Drawn {
+    let mut rig = Rig::draw(rng);
+    rig.plant.before = 1.0;
+    let u = rig.switched(rng, 1.0, 3.0);
+    rig.of(vec![rig.record(u, rng)])
+}
+
+fn mid_run(rng: &mut ChaCha8Rng) -> Drawn {
+    let rig = Rig::draw_any_order(rng);
+    let u = rig.switched(rng, 0.0, 3.0);
+    let mut record = rig.record(u, rng);
+    let cut = (rng.random_range(0.5..3.0) * rig.plant.lags[0]) as usize + 40;
+    record.u.drain(..cut);
+    record.y.drain(..cut);
+    rig.of(vec![record])
+}
+
+fn thermostat(rng: &mut ChaCha8Rng) -> Drawn {
+    let rig = Rig::draw_any_order(rng);
+    let hysteresis = rng.random_range(0.02..0.1);
+    let (u, y) = (rig.plant).thermostat(rig.samples, hysteresis, rig.noise, rng);
+    let channel = None;
+    rig.of(vec![Record { u, y, channel }])
+}
+
+fn graded(rng: &mut ChaCha8Rng) -> Drawn {
+    let rig = Rig::draw(rng);
+    let mut u = vec![0.0; 30];
+    while u.len() < rig.samples {
+        let level = (100.0 * rng.random::<f64>()).round() / 100.0;
+        u.extend(std::iter::repeat_n(
+            level,
+            (1.5 * rig.plant.lags[0]) as usize,
+        ));
+    }
+    u.truncate(rig.samples);
+    let mut drawn = rig.of(vec![rig.record(u, rng)]);
+    drawn.dead_time = None;
+    drawn
+}
+
+fn quantised(rng: &mut ChaCha8Rng) -> Drawn {
+    let rig = Rig::draw_any_order(rng);
+    let u = rig.switched(rng, 0.0, 3.0);
+    let mut record = rig.record(u, rng);
+    let step = rig.plant.gain.abs() * rng.random_range(0.004..0.02);
+    for y in &mut record.y {
+        *y = (*y / step).round() * step;
+    }
+    rig.of(vec![record])
+}
+
+fn several(rng: &mut ChaCha8Rng, count: usize, apart: f64) -> Drawn {
+    let mut rig = Rig::draw_any_order(rng);
+    let level = rig.plant.level;
+    let record = |_| {
+        let u = rig.switched(rng, 0.0, 3.0);
+        rig.plant.level = level + apart * rig.noise * normal(rng);
+        rig.record(u, rng)
+    };
+    let records = (0..count).map(record).collect();
+    rig.of(records)
+}
+
+fn binary_sequence(rng: &mut ChaCha8Rng) -> Drawn {
+    let rig = Rig::draw(rng);
+    let piece = (0.4 * rig.plant.lags[0]).max(4.0) as usize;
+    let mut u = vec![0.0; 20];
+    while u.len() < rig.samples {
+        let now = f64::from(u8::from(chance(rng, 0.5)));
+        u.extend(std::iter::repeat_n(now, piece));
+    }
+    u.truncate(rig.samples);
+    rig.of(vec![rig.record(u, rng)])
+}
+
+fn held_out(rng: &mut ChaCha8Rng) -> Drawn {
+    let rig = Rig::draw_any_order(rng);
+    let u = rig.switched(rng, 0.0, 2.0);
+    let mut drawn = rig.of(vec![rig.record(u, rng)]);
+    let split = rng.random_range(0.55..0.75) * rig.samples as f64 * rig.period_s;
+    drawn.import = ["--hold-out-from".to_owned(), format!("{split:.3}")].to_vec();
+    drawn
+}
+
+fn coloured(rng: &mut ChaCha8Rng) -> Drawn {
+    let rig = Rig::draw_any_order(rng);
+    let u = rig.switched(rng, 0.0, 3.0);
+    // A lag of 2 to 20 samples, always faster than the rig.
+    let memory = (-1.0 / logarithmic(rng, 2.0, 20.0f64.min(0.5 * rig.plant.lags[0]))).exp();
+    let mut error = normal(rng);
+    let y = rig.plant.answer(&u).into_iter().map(|y| {
+        error = memory * error + (1.0 - memory * memory).sqrt() * normal(rng);
+        y + rig.noise * error
+    });
+    let (y, channel) = (y.collect(), None);
+    rig.of(vec![Record { u, y, channel }])
+}
+
+/// Student's t with three degrees of freedom, scaled to the noise's variance.
+fn outliers(rng: &mut ChaCha8Rng) -> Drawn {
+    let rig = Rig::draw_any_order(rng);
+    let u = rig.switched(rng, 0.0, 3.0);
+    let y = rig.plant.answer(&u).into_iter().map(|y| {
+        let squares: f64 = (0..3).map(|_| normal(rng).powi(2)).sum();
+        y + rig.noise * normal(rng) / squares.sqrt()
+    });
+    let (y, channel) = (y.collect(), None);
+    rig.of(vec![Record { u, y, channel }])
+}
+
+/// A quarter of the command's gain, and a lag and a dead time of its own.
+fn measured_input(rng: &mut ChaCha8Rng) -> Drawn {
+    let rig = Rig::draw(rng);
+    let u = rig.switched(rng, 0.0, 3.0);
+    let mut record = rig.record(u, rng);
+    let second = Plant {
+        lags: vec![rig.plant.lags[0] * rng.random_range(0.7..1.5)],
+        dead_time: f64::from(rng.random_range(0..350)) / 10.0,
+        gain: 0.25 * rig.plant.gain,
+        level: 0.0,
+        before: 0.0,
+    };
+    let fan = rig.switched(rng, 0.0, 4.0);
+    for (y, more) in record.y.iter_mut().zip(second.answer(&fan)) {
+        *y += more;
+    }
+    record.channel = Some(("fan", fan));
+    let mut drawn = rig.of(vec![record]);
+    drawn.truth += &format!(
+        "; fan: gain {:.4}, lag {:.1} samples, dead time {} samples",
+        second.gain, second.lags[0], second.dead_time
+    );
+    // An edge of the command is often answered together with one of the fan.
+    (drawn.dead_time, drawn.input) = (None, Some("fan"));
+    drawn
+}
+
+fn unrelated_channel(rng: &mut ChaCha8Rng) -> Drawn {
+    let rig = Rig::draw(rng);
+    let u = rig.switched(rng, 0.0, 3.0);
+    let mut record = rig.record(u, rng);
+    let period = rng.random_range(50.0..400.0);
+    let mut walk = 0.0;
+    let values = match rng.random_range(0..4) {
+        0 => rig.switched(rng, 0.0, 4.0),
+        1 => (0..rig.samples).map(|_| normal(rng)).collect(),
+        2 => (0..rig.samples)
+            .map(|k| (std::f64::consts::TAU * k as f64 / period).sin())
+            .collect(),
+        _ => (0..rig.samples)
+            .map(|_| {
+                walk += normal(rng);
+                walk
+            })
+            .collect(),
+    };
+    record.channel = Some(("room", values));
+    rig.of(vec![record])
+}

@@ -341,3 +341,26 @@ proptest! {
         }
     }
 }
+
+/// As it stands in the file, unit included.
+#[test]
+fn a_variable_is_found_by_its_heading() {
+    let by = |t: &str, u: &str| {
+        let mapping = Mapping {
+            t: some(t),
+            u: some(u),
+            y: some("y"),
+            u_threshold: Some(2.5),
+            ..Mapping::default()
+        };
+        imported("german.csv", &mapping).set
+    };
+    assert_eq!(by("Zeit", "Ventil"), by("Zeit [ms]", "Ventil (V)"));
+    let wrong = Mapping {
+        t: some("Zeit [s]"),
+        u: some("Ventil"),
+        y: some("y"),
+        ..Mapping::default()
+    };
+    assert!(message("german.csv", wrong).contains("no variable `Zeit [s]`"));
+}

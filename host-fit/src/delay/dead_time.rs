@@ -6,8 +6,10 @@
 //!
 //!    w_b ∝ prior(b)·√det Cov(h, ln S)·exp(−RSS_b / 2σ²ν)
 //!
-//! with σ² the residual variance and ν its widening through autocorrelation, (1 + ρ)/(1 − ρ). One half of the prior is
-//! the first order's. The interval is that of the mixture, its ends at 2.5 and 97.5 %.
+//! with σ² the residual variance and ν its widening through autocorrelation, (1 + ρ)/(1 − ρ). A third lag is taken from h
+//! in the same way, so it is one more order: for some T₃ in proportion to S, with b and its covariance integrated, too.
+//! One half of the prior is the first order's, a quarter each the second's and the third's. The interval is that of the
+//! mixture, its ends at 2.5 and 97.5 %.
 
 use super::linear::{Evaluation, Free, Refined, Series, refine};
 use super::plant::Plant;
@@ -96,6 +98,24 @@ pub(crate) fn widened_variance(at: &Evaluation) -> f64 {
     at.rss / free * (1.0 + rho) / (1.0 - rho) + f64::MIN_POSITIVE
 }
 
+/// The natural logarithm of the determinant of a small positive definite matrix, row by row; at least that of the least
+/// positive number.
+fn log_determinant(matrix: &[f64], size: usize) -> f64 {
+    let mut left = matrix.to_vec();
+    let mut sum = 0.0;
+    for pivot in 0..size {
+        let diagonal = left[pivot * size + pivot].max(f64::MIN_POSITIVE);
+        sum += diagonal.ln();
+        for row in pivot + 1..size {
+            let factor = left[row * size + pivot] / diagonal;
+            for column in pivot..size {
+                left[row * size + column] -= factor * left[pivot * size + column];
+            }
+        }
+    }
+    sum
+}
+
 /// Density of the prior of b where there is a second time constant (probability ½): mostly without ringing.
 fn prior(ratio: f64) -> f64 {
     if ratio <= 0.25 {
@@ -103,6 +123,35 @@ fn prior(ratio: f64) -> f64 {
     } else {
         0.1 / ratio / 3.0
     }
+}
+
+/// Third lags that are tried, as shares of the sum of the first two time constants; the smallest of three is at most half
+/// of it.
+const THIRDS: [f64; 5] = [0.06, 0.12, 0.2, 0.3, 0.45];
+
+/// The best fit with each third lag behind the plant `second`.
+fn with_third(series: &[Series], second: Plant, free: Free, max_delay: f64) -> Vec<Refined> {
+    let mut at = second;
+    let fit = |share: f64| {
+        let third = share * second.mean_sum();
+        // It is taken from the dead time and from the sum.
+        let more = third - at.third;
+        let from = Plant {
+            delay: at.delay.map(|h| (h - more / 2.0).max(0.0)),
+            sum: at.sum.map(|s| (s - more / 2.0).max(0.5 * s)),
+            third,
+            ratio: at.ratio.max(0.02),
+        };
+        let fit = refine(series, from, free.with_order(true), max_delay)?;
+        at = fit.at.plant;
+        Some(fit)
+    };
+    // Far below a sample it is no lag.
+    let shares = THIRDS.into_iter();
+    shares
+        .filter(|share| share * second.mean_sum() >= 0.5)
+        .map_while(fit)
+        .collect()
 }
 
 /// The dead time over all orders, from the fits of [`super::linear::fit`], and the place of the fit whose order is chosen. `clock`
@@ -114,23 +163,40 @@ pub(crate) fn dead_time(
     max_delay: f64,
     clock: f64,
 ) -> Option<(DeadTime, usize)> {
-    let best = fits.iter().min_by(|a, b| a.at.rss.total_cmp(&b.at.rss))?;
+    let thirds = fits.get(1).map_or_else(Vec::new, |second| {
+        with_third(series, second.at.plant, free, max_delay)
+    });
+    let of_least_error = |fits: &[&Refined]| -> Option<usize> {
+        let places = 0..fits.len();
+        places.min_by(|&a, &b| fits[a].at.rss.total_cmp(&fits[b].at.rss))
+    };
+    let all: Vec<&Refined> = fits.iter().chain(&thirds).collect();
+    let best = all[of_least_error(&all)?];
     let noise = widened_variance(&best.at);
-    let component = |fit: &Refined, log_prior: f64| -> Option<Component> {
+    // h, ln S and as many further parameters as are integrated.
+    let component = |fit: &Refined, integrated: usize, log_prior: f64| -> Option<Component> {
         let inverse = fit.inverse.as_ref()?;
         let stride = inverse.len().isqrt();
-        let (hh, hs) = (*inverse.first()?, *inverse.get(1)?);
-        let ss = *inverse.get(stride + 1)?;
-        let determinant = (hh * ss - hs * hs).max(f64::MIN_POSITIVE);
+        let size = 2 + integrated;
+        let block: Option<Vec<f64>> = (0..size * size)
+            .map(|i| inverse.get(i / size * stride + i % size).copied())
+            .collect();
+        let block = block?;
+        let log_volume = 0.5 * log_determinant(&block, size)
+            + 0.5 * size as f64 * noise.ln()
+            + 0.5 * integrated as f64 * std::f64::consts::TAU.ln();
         Some(Component {
-            log_weight: log_prior + 0.5 * determinant.ln() + noise.ln()
-                - (fit.at.rss - best.at.rss) / (2.0 * noise),
+            log_weight: log_prior + log_volume - (fit.at.rss - best.at.rss) / (2.0 * noise),
             mean: fit.at.plant.mean_delay(),
-            sd: (hh * noise).sqrt(),
+            sd: (block.first()? * noise).sqrt(),
         })
     };
     let first = fits.first()?;
-    let mut components: Vec<Component> = component(first, 0.5f64.ln()).into_iter().collect();
+    let mut components: Vec<Component> = component(first, 0, 0.5f64.ln()).into_iter().collect();
+    for fit in &thirds {
+        let log_prior = (prior(fit.at.plant.ratio) / thirds.len() as f64).ln();
+        components.extend(component(fit, 1, log_prior - 2f64.ln()));
+    }
     let second = fits.get(1);
     let (centre, step) = match second {
         Some(second) => {
@@ -145,6 +211,8 @@ pub(crate) fn dead_time(
         None => (0.01, 0.3),
     };
     let start = second.unwrap_or(first).at.plant;
+    // The density of b is that of half of the prior.
+    let of_second = if thirds.is_empty() { 1.0 } else { 2.0 };
     for direction in [1.0, -1.0] {
         let mut at = start;
         for i in usize::from(direction < 0.0)..=RULES.ratios {
@@ -157,7 +225,11 @@ pub(crate) fn dead_time(
                 break;
             };
             at = fit.at.plant;
-            components.extend(component(&fit, (prior(ratio) * ratio * step).ln()));
+            components.extend(component(
+                &fit,
+                0,
+                (prior(ratio) * ratio * step / of_second).ln(),
+            ));
             if fit.at.rss - best.at.rss > 14.0 * noise {
                 break;
             }
@@ -167,8 +239,15 @@ pub(crate) fn dead_time(
     let samples: usize = best.at.residuals.iter().map(Vec::len).sum();
     let residual = best.at.rss / samples.max(1) as f64;
     let independent = (samples as f64 * residual / noise).max(2.0);
-    let better = second.is_some_and(|s| first.at.rss - s.at.rss > independent.ln() * noise);
+    let earns =
+        |more: &Refined, less: &Refined| less.at.rss - more.at.rss > independent.ln() * noise;
+    let better = second.is_some_and(|second| earns(second, first));
     let chosen = second.filter(|_| better).unwrap_or(first);
+    let thirds: Vec<&Refined> = thirds.iter().collect();
+    let third = of_least_error(&thirds).map(|place| thirds[place]);
+    let chosen = third
+        .filter(|third| better && earns(third, chosen))
+        .unwrap_or(chosen);
     let mixed = mixture(&components, max_delay, clock)?;
     let samples = chosen.at.plant.mean_delay();
     let estimate = DeadTime {

@@ -349,6 +349,7 @@ pub(crate) fn refine(
             delay: [delay(p.delay[0], apart), delay(p.delay[1], -apart)],
             sum: [sum(p.sum[0], stretch), sum(p.sum[1], -stretch)],
             ratio: (p.ratio + by(2)).clamp(0.0, LARGEST_RATIO),
+            third: p.third,
         }
     };
     let mut at = evaluate(series, start)?;

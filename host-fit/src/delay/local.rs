@@ -100,6 +100,7 @@ fn shifted(
         delay: [0.0; 2],
         sum: [sum; 2],
         ratio: plant.ratio,
+        third: plant.third,
     };
     let respond = |shift: f64| -> Vec<f64> {
         let edge = Switching {

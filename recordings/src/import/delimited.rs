@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use super::cell::{Cell, Decimals, is_unit};
+use super::names::name_and_unit;
 use super::stamp::Stamp;
 
 /// Number of lines in which the first row is searched.
@@ -335,24 +336,4 @@ fn likeness(separator: Separator, cells: &[&str]) -> Likeness {
 fn is_header_unit(text: &str) -> bool {
     let bracketed = |open, close| text.starts_with(open) && text.ends_with(close);
     bracketed('[', ']') || bracketed('(', ')') || text == "-" || is_unit(text)
-}
-
-/// `u_inf [m/s]`, `u_inf (m/s)`, `u_inf in m/s` and `u_inf / m/s` in two.
-fn name_and_unit(text: &str) -> (&str, Option<String>) {
-    let bracketed = |open: char, close: char| {
-        let (name, rest) = text.split_once(open)?;
-        Some((name.trim(), rest.trim_end().strip_suffix(close)?.trim()))
-    };
-    let parted = |by: &str| {
-        let (name, unit) = text.split_once(by)?;
-        Some((name.trim(), unit.trim()))
-    };
-    let found = bracketed('[', ']')
-        .or_else(|| bracketed('(', ')'))
-        .or_else(|| parted(" / "))
-        .or_else(|| parted(" in "));
-    match found {
-        Some((name, unit)) if !name.is_empty() && !unit.is_empty() => (name, Some(unit.to_owned())),
-        _ => (text.trim(), None),
-    }
 }

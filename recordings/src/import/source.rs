@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::names::name_and_unit;
 use super::problem::ImportProblem;
 use super::stamp::Stamped;
 use crate::error::{DataError, FilePlace, printable};
@@ -136,8 +137,12 @@ impl Source {
         &self.path
     }
 
+    /// The variable of this name, or of this heading: the name with its unit as it stands in the file, `Time (ms)`.
     pub(super) fn get(&self, name: &str) -> Option<&Variable> {
-        self.variables.iter().find(|v| v.name == name)
+        let by = |test: &dyn Fn(&Variable) -> bool| self.variables.iter().find(|v| test(v));
+        let (bare, unit) = name_and_unit(name);
+        by(&|v| v.name == name)
+            .or_else(|| by(&|v| unit.is_some() && v.name == bare && v.unit == unit))
     }
 
     /// The names with their lengths, for messages.

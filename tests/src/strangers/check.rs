@@ -220,8 +220,9 @@ fn of_identify(right: &Right, heard: &Heard) -> Vec<String> {
         for record in &data.records {
             let row = rows(compared).find(|row| row["name"] == *record.name);
             let scored = row.and_then(|row| row["samples"].as_u64()).unwrap_or(0);
-            if (scored as f64) < least * record.len() as f64 {
-                let all = record.len();
+            // A lead-in is never scored.
+            let all = record.len() - record.lead;
+            if (scored as f64) < least * all as f64 {
                 wrong.push(format!(
                     "{scored} of {all} samples of `{}` are scored, at least {:.0} % is right",
                     record.name,

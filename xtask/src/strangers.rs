@@ -7,7 +7,7 @@ use std::process::Stdio;
 
 pub(crate) const TASK: Task = Task {
     name: "strangers",
-    does: "the program on records as strangers bring them, beside the baselines; --page writes docs/strangers.md, --help has the other options",
+    does: "the program on records as strangers bring them, beside the baselines; --drawn COUNT draws others from a seed; --page writes docs/strangers.md, --help has the other options",
     run: strangers,
 };
 
@@ -20,6 +20,17 @@ estimation records where nothing was held out (own). FOPDT and SOPDT: first and 
 free run; ARX: ARX(2,2). *edges* is the mean delay that `delay` measures, in samples.
 
 ";
+/// The drawn sets of the page.
+const DRAWN: [&str; 4] = ["--drawn", "320", "--seed", "2026"];
+const DRAWN_HEAD: &str = "
+## Drawn from a seed
+
+`cargo xtask strangers --drawn 320 --seed 2026`: sixteen kinds of records in turn, of linear plants with one to three lags
+and a dead time, written as different loggers write them. A case is right if nothing is named that the rig does not have,
+another input that drives y is named, the interval of the dead time holds the true one, the model is not below the best
+baseline by more than a point of FIT, and every printed error is that of the written file. Shares with 95 % bounds.
+
+";
 
 fn strangers(arguments: &[String]) -> Result<()> {
     run(&mut cargo(&["build", "--release", "--package", "host-fit"]))?;
@@ -27,17 +38,24 @@ fn strangers(arguments: &[String]) -> Result<()> {
     if rest.len() == arguments.len() {
         return run(scenario("strangers").args(arguments));
     }
-    // What is wrong stands on the page: its exit code does not matter here.
+    let rest: Vec<&str> = rest.into_iter().map(String::as_str).collect();
+    let (sets, drawn) = (table(&rest)?, table(&DRAWN)?);
+    let page = root().join("docs/strangers.md");
+    std::fs::write(&page, format!("{HEAD}{sets}{DRAWN_HEAD}{drawn}"))
+        .with_context(|| page.display().to_string())?;
+    println!("written: docs/strangers.md");
+    Ok(())
+}
+
+/// What the program prints. What is wrong stands there: its exit code does not matter here.
+fn table(arguments: &[&str]) -> Result<String> {
     let output = scenario("strangers")
-        .args(rest)
+        .args(arguments)
         .stdin(Stdio::null())
         .stderr(Stdio::inherit())
         .output()
         .context("the table of strangers")?;
-    let table = String::from_utf8_lossy(&output.stdout);
+    let table = String::from_utf8(output.stdout)?;
     anyhow::ensure!(table.starts_with('|'), "no table was printed");
-    let page = root().join("docs/strangers.md");
-    std::fs::write(&page, format!("{HEAD}{table}")).with_context(|| page.display().to_string())?;
-    println!("written: docs/strangers.md");
-    Ok(())
+    Ok(table)
 }

@@ -130,6 +130,43 @@ fn dead_times_of_known_plants_are_right_and_within_their_intervals() {
     assert!(unmeasured * 20 <= edges, "{unmeasured} of {edges}");
 }
 
+/// Two time constants and a larger dead time look much the same.
+#[test]
+fn the_dead_time_before_three_lags_is_within_its_interval() {
+    let (lags, delay) = ([50.0, 25.0, 15.0], 10);
+    let mut held = 0;
+    for seed in 0..8 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut u = vec![0.0; 40];
+        for i in 0..6 {
+            let hold = rng.random_range(60..220);
+            u.extend(std::iter::repeat_n(f64::from(u8::from(i % 2 == 0)), hold));
+        }
+        let steps = 40;
+        let mut states = [0.0; 3];
+        let y = (0..u.len())
+            .map(|k| {
+                let z: f64 = StandardNormal.sample(&mut rng);
+                let now = states[2] + 0.005 * z;
+                for _ in 0..steps {
+                    let mut drive = if k < delay { 0.0 } else { u[k - delay] };
+                    for (state, lag) in states.iter_mut().zip(lags) {
+                        *state += (drive - *state) / (f64::from(steps) * lag);
+                        drive = *state;
+                    }
+                }
+                now
+            })
+            .collect();
+        let found = study(vec![Record::new("r", Use::Identify, 1.0, u, y)])
+            .dead_time
+            .unwrap();
+        held += usize::from((found.low..=found.high).contains(&(delay as f64)));
+        assert!(found.high - found.low < 15.0, "{seed}: {found:?}");
+    }
+    assert!(held >= 7, "{held} of 8");
+}
+
 #[test]
 fn level_scale_and_sign_of_y_and_of_u_change_nothing() {
     for seed in [1003, 1010, 1021] {

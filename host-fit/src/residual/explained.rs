@@ -3,6 +3,7 @@
 use super::binned::{Binned, Folds};
 use super::rules::RULES;
 use crate::linalg::dot;
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use std::collections::BTreeMap;
 
 /// The error of a free run, record by record, with the variance of the noise.
@@ -237,13 +238,18 @@ fn gains(
     })
 }
 
-/// The sum over independent blocks; 0 if not significant.
+/// The sum over independent blocks; 0 if not significant: less than so many standard errors of a normal law above 0, or
+/// than the same quantile of Student's, since few blocks give their own variance badly.
 pub(super) fn beyond_chance(gains: &[f64], standard_errors: f64) -> f64 {
     let n = gains.len() as f64;
+    let free = (n - 1.0).max(1.0);
+    let level = Normal::standard().cdf(standard_errors);
+    let standard_errors = StudentsT::new(0.0, 1.0, free)
+        .map_or(standard_errors, |student| student.inverse_cdf(level));
     let sum: f64 = gains.iter().sum();
     let mean = sum / n.max(1.0);
     let variance: f64 = gains.iter().map(|g| (g - mean) * (g - mean)).sum();
-    let standard_error = (variance * n / (n - 1.0).max(1.0)).sqrt();
+    let standard_error = (variance * n / free).sqrt();
     if sum > standard_errors * standard_error {
         sum
     } else {

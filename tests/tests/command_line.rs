@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use host_fit::data::DataSet;
 use host_fit::model::{Law, Model};
 use host_fit::user_effect::Definition;
 use model_core::recursion::LagConvention;
+use scenarios::campaign::Part;
 use scenarios::program;
 use serde_json::Value;
 
@@ -294,14 +296,42 @@ fn simulate_is_the_models_free_run() {
     assert_eq!(written.lines().count(), 3001);
 }
 
+/// Two squares and a telegraph to learn from, a square and a telegraph held out: a quarter of the samples, and of the time.
+const PART: Part = Part {
+    records: &[1, 2, 4, 5, 7],
+    samples: 5000,
+};
+
+/// That part of the bundled set, saved into `folder`; the page of the first ten minutes is tested on the whole of it.
+fn part_of_the_ramp(folder: &Path) -> PathBuf {
+    let path = folder.join("ramp");
+    let set = DataSet::load(&data("hidden-ramp")).expect("bundled");
+    let part = DataSet::from_records(set.title.clone(), PART.of(&set)).expect("a data set");
+    part.save(&path).expect("saved");
+    path
+}
+
+/// For a `design` that is asked for its contract: trials of half the length, and a coarse robustness margin.
+const QUICK: [&str; 8] = [
+    "--set",
+    "design.trial=6000",
+    "--set",
+    "design.trial-from=2000",
+    "--set",
+    "design.margin-rays=4",
+    "--set",
+    "design.margin-bisections=2",
+];
+
 #[test]
 fn extend_finds_the_hidden_plenum() {
     let folder = tempfile::tempdir().expect("a folder");
+    let ramp = part_of_the_ramp(folder.path());
     let out = folder.path().join("new.toml");
     let arguments = [
         p("extend"),
         &data("paper/table-2-state-dependent.toml"),
-        &data("hidden-ramp"),
+        &ramp,
         p("--effect"),
         p("plenum-droop"),
         p("-o"),
@@ -330,13 +360,14 @@ fn extend_finds_the_hidden_plenum() {
     let first = std::fs::read(&out).expect("written");
     json(&arguments);
     assert_eq!(std::fs::read(&out).expect("written"), first);
-    let compared = json(&[p("compare"), &out, &data("hidden-ramp")]);
+    let compared = json(&[p("compare"), &out, &ramp]);
     assert_eq!(compared["validate"]["rmse"], after["rmse"]);
 }
 
 #[test]
 fn diagnose_names_the_hidden_plenum() {
     let folder = tempfile::tempdir().expect("a folder");
+    let ramp = part_of_the_ramp(folder.path());
     let (out, page) = (
         folder.path().join("new.toml"),
         folder.path().join("out.html"),
@@ -344,7 +375,7 @@ fn diagnose_names_the_hidden_plenum() {
     let found = json(&[
         p("diagnose"),
         &data("paper/table-2-state-dependent.toml"),
-        &data("hidden-ramp"),
+        &ramp,
         p("--report"),
         &page,
         p("-o"),
@@ -390,7 +421,7 @@ fn diagnose_names_the_hidden_plenum() {
     let last = ladder.last().expect("a rung");
     assert!(number(&last["validate_rmse"]) < 1.05 * number(&last["noise_rmse"]));
     // What was written scores what the ladder says, before and after.
-    let after = json(&[p("compare"), &out, &data("hidden-ramp")]);
+    let after = json(&[p("compare"), &out, &ramp]);
     let apart = number(&after["validate"]["rmse"]) / number(&last["validate_rmse"]) - 1.0;
     assert!(apart.abs() < 1e-9, "{apart}");
     let page = std::fs::read_to_string(&page).expect("a page");
@@ -497,14 +528,15 @@ fn a_law_is_designed_for_a_model_with_an_effect_of_ones_own() {
     model.define(definition).expect("a new name");
     model.add(definition.spec(), &[0.3, 10.0, 0.06], None);
     model.save(&own).expect("saved");
-    let design = json(&[
+    let asked = [
         p("design"),
         &own,
         p("-o"),
         &controlled,
         p("--target"),
         p("0.6"),
-    ]);
+    ];
+    let design = json(&[&asked[..], &QUICK.map(p)].concat());
     let notes = design["not_tried"].to_string();
     assert!(notes.contains("without supply-line-ringing"), "{notes}");
     assert!(
@@ -536,7 +568,7 @@ fn stress_warns_and_refuses_nothing() {
     let path = |name: &str| folder.path().join(name);
     let (controlled, constants) = (path("c.toml"), path("c.rs"));
     let model = paper_model(folder.path());
-    let arguments = [
+    let asked = [
         p("design"),
         &model,
         p("-o"),
@@ -544,7 +576,7 @@ fn stress_warns_and_refuses_nothing() {
         p("--target"),
         p("0.5"),
     ];
-    let output = run(&arguments);
+    let output = run(&[&asked[..], &QUICK.map(p)].concat());
     let said = String::from_utf8_lossy(&output.stdout);
     assert_eq!(output.status.code(), Some(0), "{said}");
     for part in [
@@ -561,6 +593,25 @@ fn stress_warns_and_refuses_nothing() {
     assert!(!text.contains("ATTACHMENT"), "{text}");
 }
 
+/// A flow of first order, of 0.2 s behind a constant delay.
+const FIRST_ORDER: &str = r#"
+format_version = 1
+sample_period_s = 0.001
+lag_convention = "one-step"
+[structure]
+averaged = false
+window = 250
+state_lags = [1]
+product_lags = [1]
+[coefficients]
+a = [0.995]
+b = [0.005]
+c = [[0.0]]
+[delay]
+law = "fixed"
+delays = [40]
+"#;
+
 /// A valve that stays closed for 0.6 s lets the model's own flow go: no file, the targets that pass, and by force a
 /// file and constants that say so.
 #[test]
@@ -568,26 +619,27 @@ fn a_law_that_loses_its_own_model_is_refused_with_the_targets_that_pass() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name);
     let (controlled, constants) = (path("c.toml"), path("c.rs"));
-    let model = paper_model(folder.path());
-    let mut arguments = vec![
-        p("design"),
-        &model,
-        p("-o"),
-        &controlled,
-        p("--target"),
-        p("0.5"),
-        p("--min-off"),
-        p("0.6"),
-    ];
-    let output = run(&arguments);
+    let model = path("m.toml");
+    std::fs::write(&model, FIRST_ORDER).expect("a file");
+    // Trials half as long decide the same, and three other targets of nine are enough.
+    let arguments = [
+        &[p("design"), &model, p("-o"), &controlled][..],
+        &[p("--target"), p("0.5"), p("--min-off"), p("0.6")],
+        &QUICK.map(p),
+    ]
+    .concat();
+    let with = |more: &[&'static str]| {
+        let more = more.iter().map(|text| p(text));
+        arguments.iter().copied().chain(more).collect::<Vec<_>>()
+    };
+    let output = run(&with(&["--set", "design.targets=4"]));
     let error = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{error}");
     for part in ["the model itself", "Targets that pass: 0.", "--force"] {
         assert!(error.contains(part), "no `{part}` in: {error}");
     }
     assert!(!controlled.exists());
-    arguments.push(p("--force"));
-    let design = json(&arguments);
+    let design = json(&with(&["--set", "design.targets=1", "--force"]));
     let lost = design["law"]["lost"].as_array().expect("trials");
     let written = Model::load(&controlled).expect("the model with its law");
     let named = written.law.expect("a law");
@@ -627,7 +679,7 @@ fn a_law_is_asked_for_in_the_units_of_the_sensor() {
     let (data, model, law) = (path("volts"), path("m.toml"), path("c.toml"));
     set.save(&data).expect("saved");
     json(&[p("identify"), &data, p("-o"), &model]);
-    let design = json(&[
+    let asked = [
         p("design"),
         &model,
         &data,
@@ -635,7 +687,8 @@ fn a_law_is_asked_for_in_the_units_of_the_sensor() {
         &law,
         p("--target"),
         p("2.425"),
-    ]);
+    ];
+    let design = json(&[&asked[..], &QUICK.map(p)].concat());
     let close = |value: &serde_json::Value, to: f64| {
         let value = value.as_f64().expect("a number");
         assert!((value - to).abs() < 0.002, "{value} is not {to}");

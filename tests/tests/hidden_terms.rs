@@ -3,18 +3,18 @@
 
 use firmware_sim::family::Family;
 use firmware_sim::plant::RateLaw;
-use host_fit::data::{DataSet, Record};
+use host_fit::data::DataSet;
 use host_fit::discover::{FoundTerm, Options};
 use host_fit::model::Model;
 use host_fit::steps::discover;
 use scenarios::campaign::terms::Row;
-use scenarios::campaign::{Case, Group};
+use scenarios::campaign::{Case, Group, Part};
 
-/// Of each record, so many samples …
-const SAMPLES: usize = 5000;
-
-/// … of these: two squares and a telegraph to learn from, a square and a telegraph held out.
-const RECORDS: [usize; 5] = [1, 2, 4, 5, 7];
+/// Two squares and a telegraph to learn from, a square and a telegraph held out.
+const PART: Part = Part {
+    records: &[1, 2, 4, 5, 7],
+    samples: 5000,
+};
 
 /// A rough guess, as an engineer would hand it in.
 const GUESS: &str = r#"
@@ -43,8 +43,8 @@ fn asked(group: Group, family: Family, hidden: &[&str], seed: u64) -> Row {
     let case = Case::new(group, family, hidden, seed);
     let plan = case.plan().expect("a rig");
     let set = plan.build().expect("records").data;
-    let records = RECORDS.map(|index| shortened(&set.records[index]));
-    let set = DataSet::from_records(set.title, records.into()).expect("a data set");
+    let records = PART.of(&set);
+    let set = DataSet::from_records(set.title, records).expect("a data set");
     let guess = Model::from_toml(GUESS, "guess.toml").expect("a model");
     let options = Options {
         terms: 1,
@@ -73,19 +73,6 @@ fn asked(group: Group, family: Family, hidden: &[&str], seed: u64) -> Row {
         start.elapsed().as_secs_f64()
     );
     row
-}
-
-fn shortened(record: &Record) -> Record {
-    let mut record = record.clone();
-    let cut = |x: &mut Vec<f64>| x.truncate(SAMPLES);
-    cut(&mut record.u);
-    cut(&mut record.y);
-    [&mut record.y_sd, &mut record.y_min, &mut record.y_max]
-        .into_iter()
-        .flatten()
-        .for_each(cut);
-    record.channels.values_mut().for_each(cut);
-    record
 }
 
 fn is_found(family: Family, hidden: &str, seed: u64) {

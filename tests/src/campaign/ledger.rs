@@ -110,6 +110,7 @@ impl Ledger {
                 limit: Duration::from_secs(self.limit),
                 threads: cores.div_ceil(self.jobs.max(1)),
                 keep: self.keep.clone(),
+                part: None,
             };
             let play = |case: &C| {
                 let row = run(case, &program);

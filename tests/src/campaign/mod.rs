@@ -20,7 +20,7 @@ pub use calibration::calibration;
 pub use case::{Case, Given, Group, Sizes, cases};
 pub(crate) use counts::bounded;
 pub use ledger::{Entry, Ledger};
-pub use program::{Program, Spent};
+pub use program::{Part, Program, Spent};
 pub use row::{Found, PutIn, Row};
 pub use run::run;
 pub use table::table;

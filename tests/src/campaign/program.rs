@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use host_fit::data::{DataSet, Record};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -28,6 +29,39 @@ pub struct Program {
     pub threads: usize,
     /// Folder for unsuccessful cases (data set, answer, models, documents); none to discard them.
     pub keep: Option<PathBuf>,
+    /// The part of a rig's records that it is given; all if none. A pinned decision is cheaper on a part that shows it.
+    pub part: Option<Part>,
+}
+
+/// A part of a rig's records.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    /// These records, by their place …
+    pub records: &'static [usize],
+    /// … of each so many samples from the start.
+    pub samples: usize,
+}
+
+impl Part {
+    /// The part of `set`.
+    #[must_use]
+    pub fn of(self, set: &DataSet) -> Vec<Record> {
+        let records = self.records.iter();
+        records.map(|at| self.start(&set.records[*at])).collect()
+    }
+
+    fn start(self, record: &Record) -> Record {
+        let mut record = record.clone();
+        let cut = |x: &mut Vec<f64>| x.truncate(self.samples);
+        cut(&mut record.u);
+        cut(&mut record.y);
+        [&mut record.y_sd, &mut record.y_min, &mut record.y_max]
+            .into_iter()
+            .flatten()
+            .for_each(cut);
+        record.channels.values_mut().for_each(cut);
+        record
+    }
 }
 
 /// Polling interval of a running program.
@@ -42,6 +76,7 @@ impl Program {
             limit,
             threads: 0,
             keep: None,
+            part: None,
         }
     }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use firmware_sim::family::RigPlan;
 use firmware_sim::plant::{Character, Effect, FlowDelay};
+use host_fit::data::DataSet;
 use host_fit::model::{Delay, Model, Start, Training};
 use model_core::effect::Unit;
 use model_core::effects::StateDependentDelay;
@@ -127,7 +128,10 @@ fn asked(
     let _ = fs::remove_dir_all(folder.join("set"));
     let _ = fs::remove_file(&found);
     fs::create_dir_all(folder).map_err(|e| e.to_string())?;
-    let set = plan.build().map_err(|e| e.to_string())?.data;
+    let mut set = plan.build().map_err(|e| e.to_string())?.data;
+    if let Some(part) = program.part {
+        set = DataSet::from_records(set.title.clone(), part.of(&set)).map_err(|e| e.to_string())?;
+    }
     set.save(Path::new(&data)).map_err(|e| e.to_string())?;
     fs::write(inside("answer.toml"), plan.answer()).map_err(|e| e.to_string())?;
 

@@ -296,7 +296,8 @@ fn simulate_is_the_models_free_run() {
     assert_eq!(written.lines().count(), 3001);
 }
 
-/// Two squares and a telegraph to learn from, a square and a telegraph held out: a quarter of the samples, and of the time.
+/// Two squares and a telegraph to learn from, a square and a telegraph held out: a third of the samples, and
+/// of the time.
 const PART: Part = Part {
     records: &[1, 2, 4, 5, 7],
     samples: 5000,

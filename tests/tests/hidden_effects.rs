@@ -6,7 +6,8 @@ use std::time::Duration;
 use firmware_sim::family::{Family, NoiseKind, Nuisance, Units};
 use scenarios::campaign::{Case, Given, Group, Part, Program, Row, run};
 
-/// Two squares and a telegraph to learn from, a square and a telegraph held out: a quarter of a rig's samples, and of the time.
+/// Two squares and a telegraph to learn from, a square and a telegraph held out: a third of a rig's samples,
+/// and of the time.
 const PART: Part = Part {
     records: &[1, 2, 4, 5, 7],
     samples: 5000,
@@ -99,7 +100,8 @@ fn the_default_model_comes_near_the_noise_in_mid_run_and_under_other_laws() {
 /// the base is the flow's, a rate that depends on y.
 #[test]
 fn what_scatters_between_repeats_gets_no_name() {
-    let row = asked(&Case {
+    // On a part of the records the scatter leaves nothing above the noise, which would test nothing.
+    let row = asked_of_all(&Case {
         noise: NoiseKind::Scatter,
         ..Case::new(Group::Nothing, Family::RateOfY, &[], 2_026_200_270)
     });

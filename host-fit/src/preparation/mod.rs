@@ -62,7 +62,10 @@ impl Preparation {
             .zip(&beginnings)
             .map(|(record, beginning)| beginning.filled_in(record))
             .collect();
-        let left = reference.as_ref().map_or(f64::INFINITY, |r| r.varying_rms);
+        let left = || {
+            let first = reference.as_ref().map_or(f64::INFINITY, |r| r.varying_rms);
+            first.min(rest::left_by_second_order(&prepared).unwrap_or(f64::INFINITY))
+        };
         let moving_zero = MovingZero::of(&prepared, &beginnings, command.off, left);
         if let Some(moving) = &moving_zero {
             rest::tare(&mut prepared, &beginnings, command.off, moving);

@@ -3,7 +3,8 @@
 use super::RULES;
 use super::beginning::{Beginning, range_of_y};
 use super::reference::FirstOrder;
-use crate::data::Record;
+use crate::baseline::Baselines;
+use crate::data::{Record, Use};
 use crate::model::CommandRange;
 use crate::picture::significant;
 use crate::residual::correlation;
@@ -103,7 +104,7 @@ struct NoiseAtRest {
 impl NoiseAtRest {
     /// By the standard errors of y; where a record does not say them, by what the reference response leaves of y, `left`,
     /// which is no less.
-    fn of(rests: &Rests, left: f64) -> Self {
+    fn of(rests: &Rests, left: impl FnOnce() -> f64) -> Self {
         let stated: Option<Vec<f64>> = rests
             .rests
             .iter()
@@ -113,9 +114,10 @@ impl NoiseAtRest {
             })
             .collect();
         let samples: usize = rests.rests.iter().map(|(_, y)| y.len()).sum();
-        let whole = stated.map_or(left * left, |sums| {
-            sums.iter().sum::<f64>() / samples as f64
-        });
+        let whole = stated.map_or_else(
+            || left().powi(2),
+            |sums| sums.iter().sum::<f64>() / samples as f64,
+        );
         // Of a variance of so many samples.
         let error = (2.0 / samples as f64).sqrt();
         let slower = (1.0 - RULES.slower_by_chance * error) * whole - rests.within;
@@ -173,6 +175,21 @@ fn far_level(records: &[Record]) -> f64 {
     }
 }
 
+/// What the response of a second order with dead time leaves of y that is not the same throughout a record, rms.
+pub(super) fn left_by_second_order(records: &[Record]) -> Option<f64> {
+    let learning: Vec<&Record> = records.iter().filter(|r| r.role == Use::Identify).collect();
+    let second = Baselines::fit(&learning).sopdt?;
+    let (mut sum, mut samples) = (0.0, 0);
+    for record in learning {
+        let run = second.simulate(record)?;
+        let left: Vec<f64> = record.y.iter().zip(&run).map(|(y, run)| y - run).collect();
+        let mean = mean(&left);
+        sum += left.iter().map(|e| (e - mean).powi(2)).sum::<f64>();
+        samples += left.len();
+    }
+    Some((sum / samples.max(1) as f64).sqrt())
+}
+
 /// A zero of the sensor that is not the same in all records.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MovingZero {
@@ -189,12 +206,12 @@ pub struct MovingZero {
 impl MovingZero {
     /// Whether records rest at different levels under a command of `off`: by more than chance, and by more than slow
     /// noise makes of a rest; or by half as much, if they creep from each record to the next as chance seldom does. `left`
-    /// is the rms of what the reference response leaves of y within records.
+    /// gives the rms of what the reference responses leave of y within records; it is asked where y_sd is not stated.
     pub(super) fn of(
         records: &[Record],
         beginnings: &[Beginning],
         off: f64,
-        left: f64,
+        left: impl FnOnce() -> f64,
     ) -> Option<Self> {
         let rests = Rests::of(records, beginnings, off)?;
         let levels = rests.levels();
@@ -203,7 +220,7 @@ impl MovingZero {
         let highest = (0..levels.len()).max_by(by_level)?;
         let apart = levels[highest] - levels[lowest];
         let slow = RULES.slow_noise * range_of_y(records);
-        let noise = NoiseAtRest::of(&rests, left.min(slow));
+        let noise = NoiseAtRest::of(&rests, || left().min(slow));
         let error = |of: usize| rests.error_of(rests.rests[of].1.len());
         let error = (error(lowest) + error(highest)).sqrt();
         let least = RULES.moving_zero_noise * noise.whole;
@@ -299,7 +316,6 @@ impl fmt::Display for MovingZero {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::Use;
 
     const AT_REST: Beginning = Beginning {
         command: 0.0,
@@ -308,7 +324,7 @@ mod tests {
     };
 
     fn moving(records: &[Record]) -> Option<MovingZero> {
-        MovingZero::of(records, &vec![AT_REST; records.len()], 0.0, 1.0)
+        MovingZero::of(records, &vec![AT_REST; records.len()], 0.0, || 1.0)
     }
 
     fn resting(name: &str, zero: f64) -> Record {
@@ -396,7 +412,7 @@ mod tests {
         let beginnings = [AT_REST, AT_REST, blown];
         let records = [resting("a", 0.0), resting("b", 0.08), resting("c", 0.3)];
         let mut tared = records.clone();
-        let moving = MovingZero::of(&tared, &beginnings, 0.0, 1.0).expect("0.08 of 1");
+        let moving = MovingZero::of(&tared, &beginnings, 0.0, || 1.0).expect("0.08 of 1");
         tare(&mut tared, &beginnings, 0.0, &moving);
         let rest = |record: &Record| mean(&record.y[..AT_REST.rest]);
         let (a, b) = (rest(&tared[0]), rest(&tared[1]));
@@ -415,7 +431,7 @@ mod tests {
             ..AT_REST
         };
         let records = [("a", 0.0), ("b", 0.006), ("c", -0.005)].map(|(n, zero)| resting(n, zero));
-        let moves = |left: f64| MovingZero::of(&records, &[short; 3], 0.0, left).is_some();
+        let moves = |left: f64| MovingZero::of(&records, &[short; 3], 0.0, || left).is_some();
         assert!(moves(0.006));
         // As much slow noise as the zeros are apart.
         assert!(!moves(0.02));
@@ -437,7 +453,10 @@ mod tests {
             ..AT_REST
         };
         let records = [resting("a", 0.3), resting("b", 0.0)];
-        assert_eq!(MovingZero::of(&records, &[blown, AT_REST], 0.0, 1.0), None);
+        assert_eq!(
+            MovingZero::of(&records, &[blown, AT_REST], 0.0, || 1.0),
+            None
+        );
         assert_eq!(level_of_rest(&records[..1], &[blown], 0.0), None);
     }
 }

@@ -353,7 +353,11 @@ fn a_variable_is_found_by_its_heading() {
             u_threshold: Some(2.5),
             ..Mapping::default()
         };
-        imported("german.csv", &mapping).set
+        let set = imported("german.csv", &mapping).set;
+        let [record] = &set.records[..] else {
+            panic!("one file is one record");
+        };
+        (set.sample_period_s, record.u.clone(), record.y.clone())
     };
     assert_eq!(by("Zeit", "Ventil"), by("Zeit [ms]", "Ventil (V)"));
     let wrong = Mapping {

@@ -47,6 +47,22 @@ impl Preparation {
     /// Prepares `records`; what a file says of a record's beginning stays as it is.
     #[must_use]
     pub fn of(records: &[Record]) -> Self {
+        let prepared = Self::as_read(records);
+        if prepared.moving_zero.is_some() {
+            return prepared;
+        }
+        // Rests too short to tell a zero from a relaxation: by the response through whole records.
+        let Some((moving, tared)) = MovingZero::by_response(records) else {
+            return prepared;
+        };
+        Self {
+            moving_zero: Some(moving),
+            ..Self::as_read(&tared)
+        }
+    }
+
+    /// Prepares `records` with their zeros as they are, but for what their rests say of them.
+    fn as_read(records: &[Record]) -> Self {
         let reference = FirstOrder::fitted(records);
         let mut beginnings: Vec<Beginning> = records
             .iter()

@@ -3,7 +3,7 @@
 use super::RULES;
 use super::beginning::{Beginning, range_of_y};
 use super::reference::FirstOrder;
-use crate::baseline::Baselines;
+use crate::baseline::{Baselines, SecondOrder};
 use crate::data::{Record, Use};
 use crate::model::CommandRange;
 use crate::picture::significant;
@@ -19,10 +19,37 @@ fn mean(values: &[f64]) -> f64 {
 struct Rests<'a> {
     /// Each record that rests long enough, with y of its rest.
     rests: Vec<(&'a Record, &'a [f64])>,
-    /// Variance of y within a rest.
+    /// Of y within a rest.
+    noise: Noise,
+}
+
+/// Noise around the mean of each of several series.
+struct Noise {
+    /// Its variance.
     within: f64,
     /// Samples that are worth one independent one.
     dependence: f64,
+    /// Degrees of freedom of the variance, in independent samples.
+    freedom: f64,
+}
+
+impl Noise {
+    /// That of `deviations` from the mean of each.
+    fn of(deviations: &[Vec<f64>]) -> Self {
+        let samples: usize = deviations.iter().map(Vec::len).sum();
+        let squares: f64 = deviations.iter().flatten().map(|d| d * d).sum();
+        let dependence = dependence(deviations);
+        Self {
+            within: squares / samples.saturating_sub(deviations.len()).max(1) as f64,
+            dependence,
+            freedom: (samples as f64 / dependence - deviations.len() as f64).max(1.0),
+        }
+    }
+
+    /// Variance of the mean of so many samples.
+    fn error_of(&self, samples: usize) -> f64 {
+        self.within * self.dependence / samples as f64
+    }
 }
 
 impl<'a> Rests<'a> {
@@ -44,18 +71,10 @@ impl<'a> Rests<'a> {
                 y.iter().map(|y| y - level).collect()
             })
             .collect();
-        let samples: usize = deviations.iter().map(Vec::len).sum();
-        let squares: f64 = deviations.iter().flatten().map(|d| d * d).sum();
         Some(Self {
-            within: squares / (samples - rests.len()).max(1) as f64,
-            dependence: dependence(&deviations),
+            noise: Noise::of(&deviations),
             rests,
         })
-    }
-
-    /// Variance of the mean of a rest of so many samples, by the noise that is seen within rests.
-    fn error_of(&self, samples: usize) -> f64 {
-        self.within * self.dependence / samples as f64
     }
 
     /// Mean y of each rest.
@@ -63,13 +82,9 @@ impl<'a> Rests<'a> {
         self.rests.iter().map(|(_, y)| mean(y)).collect()
     }
 
-    /// Degrees of freedom of `within`, in independent samples.
-    fn freedom(&self) -> f64 {
-        let independent = self
-            .rests
-            .iter()
-            .map(|(_, y)| y.len() as f64 / self.dependence - 1.0);
-        independent.sum::<f64>().max(1.0)
+    /// Samples of each rest.
+    fn lengths(&self) -> Vec<usize> {
+        self.rests.iter().map(|(_, y)| y.len()).collect()
     }
 }
 
@@ -120,7 +135,7 @@ impl NoiseAtRest {
         );
         // Of a variance of so many samples.
         let error = (2.0 / samples as f64).sqrt();
-        let slower = (1.0 - RULES.slower_by_chance * error) * whole - rests.within;
+        let slower = (1.0 - RULES.slower_by_chance * error) * whole - rests.noise.within;
         Self {
             whole: whole.sqrt(),
             slower: slower.max(0.0).sqrt(),
@@ -137,7 +152,7 @@ pub(super) fn level_of_rest(records: &[Record], beginnings: &[Beginning], off: f
         .iter()
         .flat_map(|(_, y)| y.iter().copied())
         .collect();
-    let (mean, error) = (mean(&samples), rests.error_of(samples.len()).sqrt());
+    let (mean, error) = (mean(&samples), rests.noise.error_of(samples.len()).sqrt());
     // Sums of records without noise are 0 but for their rounding.
     let whole = rests.rests.iter().flat_map(|(record, _)| &record.y);
     let largest = whole.fold(0.0, |m: f64, y| m.max(y.abs()));
@@ -177,17 +192,11 @@ fn far_level(records: &[Record]) -> f64 {
 
 /// What the response of a second order with dead time leaves of y that is not the same throughout a record, rms.
 pub(super) fn left_by_second_order(records: &[Record]) -> Option<f64> {
-    let learning: Vec<&Record> = records.iter().filter(|r| r.role == Use::Identify).collect();
-    let second = Baselines::fit(&learning).sopdt?;
-    let (mut sum, mut samples) = (0.0, 0);
-    for record in learning {
-        let run = second.simulate(record)?;
-        let left: Vec<f64> = record.y.iter().zip(&run).map(|(y, run)| y - run).collect();
-        let mean = mean(&left);
-        sum += left.iter().map(|e| (e - mean).powi(2)).sum::<f64>();
-        samples += left.len();
-    }
-    Some((sum / samples.max(1) as f64).sqrt())
+    let learning = || records.iter().filter(|r| r.role == Use::Identify);
+    let second = Baselines::fit(&learning().collect::<Vec<&Record>>()).sopdt?;
+    let own: Vec<Record> = learning().cloned().collect();
+    let (_, deviations) = left_by(&second, &own)?;
+    Some(Noise::of(&deviations).within.sqrt())
 }
 
 /// A zero of the sensor that is not the same in all records.
@@ -201,6 +210,8 @@ pub struct MovingZero {
     zeros: f64,
     /// Variance of noise that is the same throughout a rest.
     slower: f64,
+    /// Whether rests show it, and not whole records.
+    by_rests: bool,
 }
 
 impl MovingZero {
@@ -221,13 +232,13 @@ impl MovingZero {
         let apart = levels[highest] - levels[lowest];
         let slow = RULES.slow_noise * range_of_y(records);
         let noise = NoiseAtRest::of(&rests, || left().min(slow));
-        let error = |of: usize| rests.error_of(rests.rests[of].1.len());
+        let error = |of: usize| rests.noise.error_of(rests.rests[of].1.len());
         let error = (error(lowest) + error(highest)).sqrt();
         let least = RULES.moving_zero_noise * noise.whole;
         let apart_by = |share: f64| apart > RULES.off_zero * error && apart > share * least;
         let certain = apart_by(1.0) || (creeps(&levels) && apart_by(RULES.creeping_share));
         let slower = if certain { 0.0 } else { noise.slower.powi(2) };
-        let (p, zeros) = between(&rests, &levels, slower)?;
+        let (p, zeros) = between(&rests.noise, &levels, &rests.lengths(), slower)?;
         if !certain && p >= RULES.moving_zero_p {
             return None;
         }
@@ -237,21 +248,84 @@ impl MovingZero {
             highest: named(highest),
             zeros,
             slower,
+            by_rests: true,
         })
+    }
+}
+
+/// The mean of what `second` leaves of y, record by record, and the deviations from it.
+fn left_by(second: &SecondOrder, records: &[Record]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+    let each = records.iter().map(|record| {
+        let run = second.simulate(record)?;
+        let mut left: Vec<f64> = record.y.iter().zip(&run).map(|(y, run)| y - run).collect();
+        let own = mean(&left);
+        left.iter_mut().for_each(|e| *e -= own);
+        Some((own, left))
+    });
+    each.collect::<Option<Vec<_>>>()
+        .map(|each| each.into_iter().unzip())
+}
+
+impl MovingZero {
+    /// As [`MovingZero::of`], with levels by the second-order response through whole records, and the records without them.
+    /// Only where that response leaves a constant of each record and noise with hardly a memory: what a constant cannot be
+    /// but a zero. Records with y_sd are left to their rests.
+    pub(super) fn by_response(records: &[Record]) -> Option<(Self, Vec<Record>)> {
+        if records.len() < 2 || records.iter().any(|record| record.y_sd.is_some()) {
+            return None;
+        }
+        let mut tared = records.to_vec();
+        let mut zeros = vec![0.0; records.len()];
+        let mut last = f64::INFINITY;
+        // Zeros bias the response that they are read from: each round takes most of the bias that is left.
+        let (second, noise) = loop {
+            let learning: Vec<&Record> = tared.iter().filter(|r| r.role == Use::Identify).collect();
+            let second = Baselines::fit(&learning).sopdt?;
+            let (means, deviations) = left_by(&second, &tared)?;
+            let noise = Noise::of(&deviations);
+            let falls = noise.dependence < RULES.memory_falls * last;
+            if !falls {
+                break (second, noise);
+            }
+            last = noise.dependence;
+            let common = mean(&means);
+            for ((record, zero), own) in tared.iter_mut().zip(&mut zeros).zip(&means) {
+                *zero += own - common;
+                subtract(record, own - common);
+            }
+        };
+        if noise.dependence > RULES.memoryless {
+            return None;
+        }
+        let lengths: Vec<usize> = records.iter().map(Record::len).collect();
+        let (p, variance) = between(&noise, &zeros, &lengths, 0.0)?;
+        if p >= RULES.moving_zero_p {
+            return None;
+        }
+        let by_zero = |a: &usize, b: &usize| zeros[*a].total_cmp(&zeros[*b]);
+        let named = |of: usize| (records[of].name.clone(), second.level + zeros[of]);
+        let moving = Self {
+            lowest: named((0..zeros.len()).min_by(by_zero)?),
+            highest: named((0..zeros.len()).max_by(by_zero)?),
+            zeros: variance,
+            slower: 0.0,
+            by_rests: false,
+        };
+        Some((moving, tared))
     }
 }
 
 /// The p-value of no scatter of the levels beside what noise makes of each, by the ratio of the variances (F-test), and the
 /// variance of that scatter. `slower` is the variance of noise that is the same throughout a rest. None of fewer than two
 /// records.
-fn between(rests: &Rests, levels: &[f64], slower: f64) -> Option<(f64, f64)> {
+fn between(noise: &Noise, levels: &[f64], lengths: &[usize], slower: f64) -> Option<(f64, f64)> {
     let n = levels.len() as f64;
     let mean = mean(levels);
     let between = levels.iter().map(|level| (level - mean).powi(2));
     let between = between.sum::<f64>() / (n - 1.0);
-    let within = rests.rests.iter().map(|(_, y)| rests.error_of(y.len()));
+    let within = lengths.iter().map(|length| noise.error_of(*length));
     let chance = slower + within.sum::<f64>() / n;
-    let test = FisherSnedecor::new(n - 1.0, rests.freedom()).ok()?;
+    let test = FisherSnedecor::new(n - 1.0, noise.freedom).ok()?;
     let ratio = between / chance;
     (!ratio.is_nan()).then(|| (test.sf(ratio), (between - chance).max(0.0)))
 }
@@ -279,18 +353,23 @@ pub(super) fn tare(
         .map(|record| {
             let mut rested = rests.rests.iter();
             let (_, y) = rested.find(|(of, _)| std::ptr::eq(*of, record))?;
-            let noise = moving.slower + rests.error_of(y.len());
+            let noise = moving.slower + rests.noise.error_of(y.len());
             Some((mean(y) - common) * moving.zeros / (moving.zeros + noise))
         })
         .collect();
     for (record, own) in records.iter_mut().zip(own) {
         let Some(own) = own else { continue };
-        let envelope = [&mut record.y_min, &mut record.y_max];
-        let series = envelope.into_iter().flatten().chain([&mut record.y]);
-        series.flatten().for_each(|y| *y -= own);
-        if let Some(before) = &mut record.y_before {
-            *before -= own;
-        }
+        subtract(record, own);
+    }
+}
+
+/// Moves y of a record, and what goes with it.
+fn subtract(record: &mut Record, zero: f64) {
+    let envelope = [&mut record.y_min, &mut record.y_max];
+    let series = envelope.into_iter().flatten().chain([&mut record.y]);
+    series.flatten().for_each(|y| *y -= zero);
+    if let Some(before) = &mut record.y_before {
+        *before -= zero;
     }
 }
 
@@ -305,9 +384,13 @@ impl fmt::Display for MovingZero {
                 .ceil()
                 .clamp(0.0, 12.0) as usize;
         let [lowest, highest] = [lowest, highest].map(|level| significant(*level, digits));
+        let where_read = match self.by_rests {
+            true => "at rest",
+            false => "by a second-order response through whole records, without command",
+        };
         write!(
             f,
-            "Record-to-record offset: at rest `{low}` reads {lowest} and `{high}` {highest}. Every command subtracts each \
+            "Record-to-record offset: {where_read} `{low}` reads {lowest} and `{high}` {highest}. Every command subtracts each \
              record's own offset; on the board, subtract the reading at rest before the law starts (`import` has `--y-offset`)."
         )
     }
@@ -458,5 +541,49 @@ mod tests {
             None
         );
         assert_eq!(level_of_rest(&records[..1], &[blown], 0.0), None);
+    }
+
+    /// Rests of a third of the time constant, then switched, with white noise of 0.01; y = zero + x, and for `bent` the
+    /// same with a time constant that is twice as long while the command is off.
+    fn switched_early(name: &str, zero: f64, bent: bool, hold: usize) -> Record {
+        let u: Vec<f64> = (0..900)
+            .map(|k| f64::from(u8::from(k > 25 && (k / hold) % 2 == 0)))
+            .collect();
+        let mut x = 0.0;
+        let y = (0..900_u32).map(|k| {
+            let spread = (0..4_u32).map(|i| {
+                let mixed = (4 * k + i + hold as u32).wrapping_mul(2_654_435_761);
+                f64::from((mixed ^ (mixed >> 15)).wrapping_mul(2_246_822_519) >> 8)
+                    / f64::from(1 << 24)
+                    - 0.5
+            });
+            let noise: f64 = spread.sum();
+            let y = zero + x + 0.017 * noise;
+            let drive = if k < 10 { 0.0 } else { u[k as usize - 10] };
+            let time = if bent && drive < 0.5 { 150.0 } else { 75.0 };
+            x += (drive - x) / time;
+            y
+        });
+        let y = y.collect();
+        Record::new(name, Use::Identify, 0.001, u, y)
+    }
+
+    #[test]
+    fn zeros_of_records_with_short_rests_are_read_from_the_response() {
+        let records = |zeros: [f64; 3], bent| {
+            let holds = [160, 210, 130];
+            let each = zeros.into_iter().zip(holds).zip(["a", "b", "c"]);
+            each.map(|((zero, hold), name)| switched_early(name, zero, bent, hold))
+                .collect::<Vec<Record>>()
+        };
+        let (moving, tared) = MovingZero::by_response(&records([0.0, 0.05, 0.02], false)).unwrap();
+        assert_eq!((&*moving.lowest.0, &*moving.highest.0), ("a", "b"));
+        let apart = moving.highest.1 - moving.lowest.1;
+        assert!((apart - 0.05).abs() < 0.005, "{apart}");
+        // Without them nothing moves.
+        assert!(MovingZero::by_response(&tared).is_none());
+        assert!(MovingZero::by_response(&records([0.3; 3], false)).is_none());
+        // What a response lacks may look like a zero.
+        assert!(MovingZero::by_response(&records([0.0, 0.05, 0.02], true)).is_none());
     }
 }

@@ -62,4 +62,11 @@ rules! {
     creeping_zero: f64 = 0.005, "p-value", "all of 30 zeros that drifted in a straight line lay below 0.0013, eight of them less than four standard errors apart; all of 45 that did not lay above 0.0066";
     /// Where no record rests, an estimated zero nearer to 0 than this is 0.
     near_zero: f64 = 0.1, "size of the response", "judgement: a first-order response knows a bilinear flow's level to a tenth";
+
+    /// Zeros of records and the response that they are read from are fitted in turn until the memory of its residual no
+    /// longer falls to this share.
+    memory_falls: f64 = 0.9, "share of the samples before", "judgement: each round takes three quarters of the bias that is left";
+    /// Samples of that residual that are worth an independent one, above which a constant of a record may be physics that is
+    /// missing.
+    memoryless: f64 = 3.0, "samples", "judgement: noise of loggers; what a response lacks lasts as long as the response";
 }

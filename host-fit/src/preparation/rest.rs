@@ -547,7 +547,7 @@ mod tests {
     /// same with a time constant that is twice as long while the command is off.
     fn switched_early(name: &str, zero: f64, bent: bool, hold: usize) -> Record {
         let u: Vec<f64> = (0..900)
-            .map(|k| f64::from(u8::from(k > 25 && (k / hold) % 2 == 0)))
+            .map(|k| f64::from(u8::from(k > 25 && (k / hold).is_multiple_of(2))))
             .collect();
         let mut x = 0.0;
         let y = (0..900_u32).map(|k| {

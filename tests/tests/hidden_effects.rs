@@ -6,13 +6,6 @@ use std::time::Duration;
 use firmware_sim::family::{Family, NoiseKind, Nuisance, Units};
 use scenarios::campaign::{Case, Given, Group, Part, Program, Row, run};
 
-/// Two squares and a telegraph to learn from, a square and a telegraph held out: a third of a rig's samples,
-/// and of the time.
-const PART: Part = Part {
-    records: &[1, 2, 4, 5, 7],
-    samples: 5000,
-};
-
 fn diagnosed(group: Group, family: Family, hidden: &[&str], seed: u64) -> Row {
     asked(&Case {
         given: Given::Guess,
@@ -22,7 +15,7 @@ fn diagnosed(group: Group, family: Family, hidden: &[&str], seed: u64) -> Row {
 
 /// What is said of a part of the records.
 fn asked(case: &Case) -> Row {
-    asked_of(case, Some(PART))
+    asked_of(case, Some(Part::THIRD))
 }
 
 /// What is said of all records, where a part of them does not show what the test is about.

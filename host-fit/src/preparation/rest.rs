@@ -194,8 +194,7 @@ fn far_level(records: &[Record]) -> f64 {
 pub(super) fn left_by_second_order(records: &[Record]) -> Option<f64> {
     let learning = || records.iter().filter(|r| r.role == Use::Identify);
     let second = Baselines::fit(&learning().collect::<Vec<&Record>>()).sopdt?;
-    let own: Vec<Record> = learning().cloned().collect();
-    let (_, deviations) = left_by(&second, &own)?;
+    let (_, deviations) = left_by(&second, learning())?;
     Some(Noise::of(&deviations).within.sqrt())
 }
 
@@ -254,8 +253,11 @@ impl MovingZero {
 }
 
 /// The mean of what `second` leaves of y, record by record, and the deviations from it.
-fn left_by(second: &SecondOrder, records: &[Record]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
-    let each = records.iter().map(|record| {
+fn left_by<'a>(
+    second: &SecondOrder,
+    records: impl Iterator<Item = &'a Record>,
+) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+    let each = records.map(|record| {
         let run = second.simulate(record)?;
         let mut left: Vec<f64> = record.y.iter().zip(&run).map(|(y, run)| y - run).collect();
         let own = mean(&left);
@@ -281,7 +283,7 @@ impl MovingZero {
         let (second, noise) = loop {
             let learning: Vec<&Record> = tared.iter().filter(|r| r.role == Use::Identify).collect();
             let second = Baselines::fit(&learning).sopdt?;
-            let (means, deviations) = left_by(&second, &tared)?;
+            let (means, deviations) = left_by(&second, tared.iter())?;
             let noise = Noise::of(&deviations);
             let falls = noise.dependence < RULES.memory_falls * last;
             if !falls {

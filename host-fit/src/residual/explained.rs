@@ -309,3 +309,22 @@ impl Learned {
         ]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 2.7 standard errors of the sum: more than 2.5 of a normal law, less than Student's quantile of ten blocks, 3.1.
+    #[test]
+    fn few_blocks_have_to_say_more() {
+        let gains = |n: usize| -> Vec<f64> {
+            let apart = (n as f64 - 1.0).sqrt() / 2.7;
+            (0..n)
+                .map(|k| if k % 2 == 0 { 1.0 + apart } else { 1.0 - apart })
+                .collect()
+        };
+        assert_eq!(beyond_chance(&gains(10), 2.5), 0.0);
+        assert!((beyond_chance(&gains(400), 2.5) - 400.0).abs() < 1e-9);
+        assert!(beyond_chance(&gains(10), 1.9) > 0.0);
+    }
+}

@@ -305,6 +305,26 @@ pub(super) fn switch(text: &str) -> Option<bool> {
     known.map(|&(_, on)| on)
 }
 
+/// `u_inf [m/s]`, `u_inf (m/s)`, `u_inf in m/s` and `u_inf / m/s` in two.
+pub(super) fn name_and_unit(text: &str) -> (&str, Option<String>) {
+    let bracketed = |open: char, close: char| {
+        let (name, rest) = text.split_once(open)?;
+        Some((name.trim(), rest.trim_end().strip_suffix(close)?.trim()))
+    };
+    let parted = |by: &str| {
+        let (name, unit) = text.split_once(by)?;
+        Some((name.trim(), unit.trim()))
+    };
+    let found = bracketed('[', ']')
+        .or_else(|| bracketed('(', ')'))
+        .or_else(|| parted(" / "))
+        .or_else(|| parted(" in "));
+    match found {
+        Some((name, unit)) if !name.is_empty() && !unit.is_empty() => (name, Some(unit.to_owned())),
+        _ => (text.trim(), None),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

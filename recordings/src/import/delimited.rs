@@ -2,8 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::cell::{Cell, Decimals, is_unit};
-use super::names::name_and_unit;
+use super::cell::{Cell, Decimals, is_unit, name_and_unit};
 use super::stamp::Stamp;
 
 /// Number of lines in which the first row is searched.

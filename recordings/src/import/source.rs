@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::names::name_and_unit;
+use super::cell::name_and_unit;
 use super::problem::ImportProblem;
 use super::stamp::Stamped;
 use crate::error::{DataError, FilePlace, printable};

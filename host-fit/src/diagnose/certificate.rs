@@ -6,7 +6,7 @@ use super::ranking::Rival;
 use super::session::Session;
 use crate::model::Model;
 use crate::parallel;
-use crate::terms::{Found, Hypothesis, Judge, MostLikely, Term};
+use crate::terms::{Found, Hypothesis, Judge, MostLikely};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -15,9 +15,9 @@ use std::collections::BTreeMap;
 pub struct Certificate {
     /// ln of the Bayes factor of the model with the effect against the best model without it, nats.
     pub evidence_nats: f64,
-    /// ln of the e-value against "no model without the effect needs more", nats: ln of the evidence of the
-    /// model with it, minus ln of the number of models tried, minus ln of the largest likelihood of any model
-    /// without it.
+    /// ln of the e-value, nats: that Bayes factor over the number of models tried. Both models have the coefficients of the
+    /// recursion in common, with the same wide prior, so that its mean without the effect is at most about 1 for each of
+    /// their values (theory 4.5).
     pub log_e: f64,
     /// Level α, 0 to 1. The effect is certified if the log e-value is at least ln(1/α). At most a share α of
     /// certificates is false, provided that the noise model holds and the base class contains the true base.
@@ -35,6 +35,12 @@ impl Certificate {
     #[must_use]
     pub fn holds(&self) -> bool {
         self.log_e >= -self.alpha.ln()
+    }
+
+    /// The p-value that the e-value bounds: by Markov's inequality at most its inverse.
+    #[must_use]
+    pub(super) fn p_value(&self) -> f64 {
+        (-self.log_e).exp().clamp(f64::MIN_POSITIVE, 1.0)
     }
 
     /// Whether the effect is certified although part of the error stays unexplained. It must then explain most of the
@@ -84,14 +90,11 @@ impl Session<'_> {
         MostLikely::of(self.judge(), hypothesis.judged.model())?.evidence(self.judge())
     }
 
-    /// Whether the records certify that `best` contains an effect that the best base model lacks.
-    pub(super) fn is_certified(&self, best: &Hypothesis, found: &Found) -> bool {
-        let certificate = || {
-            let own = self.evidence(best)?;
-            let bare = Null::of(self.judge(), &found.bare)?;
-            self.certificate(best, own, &[bare], found)
-        };
-        certificate().is_some_and(|certificate| certificate.holds())
+    /// The certificate of all effects of `best` together, against the best base model.
+    pub(super) fn certified(&self, best: &Hypothesis, found: &Found) -> Option<Certificate> {
+        let own = self.evidence(best)?;
+        let bare = Null::of(self.judge(), &found.bare)?;
+        self.certificate(best, own, &[bare], found)
     }
 
     /// The certificate of `subject`, whose evidence is `own` (nats), against these null models; `None` without any.
@@ -103,8 +106,7 @@ impl Session<'_> {
         found: &Found,
     ) -> Option<Certificate> {
         let most = |of: fn(&Null) -> f64| nulls.iter().map(of).reduce(f64::max);
-        let likelihood = most(|null| null.log_likelihood)?;
-        let evidence = most(|null| null.evidence)?;
+        let evidence_nats = own - most(|null| null.evidence)?;
         let all = self.judge().first_fold();
         let mut records: Vec<String> = all.iter().map(|record| record.name.clone()).collect();
         records.dedup();
@@ -114,8 +116,8 @@ impl Session<'_> {
         // The e-value is divided by the number of structures tried.
         let tried = (found.tried.max(1) as f64).ln();
         Some(Certificate {
-            evidence_nats: own - evidence,
-            log_e: own - likelihood - tried,
+            evidence_nats,
+            log_e: evidence_nats - tried,
             alpha: RULES.level_of_search,
             records,
             share: 1.0 - left / without.max(f64::MIN_POSITIVE),
@@ -152,20 +154,13 @@ impl Session<'_> {
             let name = effect.name.to_owned();
             let set = sets.iter().find(|set| set.effect.name == name);
             let names = set.map_or_else(|| vec![name.clone()], Set::names);
-            let lacks = |model: &&Hypothesis| {
-                let mut effects = model.terms.iter().filter_map(Term::effect);
-                !effects.any(|effect| names.iter().any(|name| name == effect.name))
-            };
-            let least = |all: &mut dyn Iterator<Item = &Hypothesis>| {
-                all.filter(lacks)
-                    .min_by(|a, b| a.judged.rmse().total_cmp(&b.judged.rmse()))
-                    .cloned()
-            };
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            let rivals = others.iter().filter_map(|rival| rival.refitted.as_ref());
             let nulls = [
                 Some(found.bare.clone()),
                 lesser[index].take(),
-                least(&mut found.all.iter()),
-                least(&mut others.iter().filter_map(|rival| rival.refitted.as_ref())),
+                Hypothesis::best_without(found.all.iter(), &names).cloned(),
+                Hypothesis::best_without(rivals, &names).cloned(),
             ];
             let places = nulls.into_iter().flatten().map(|null| {
                 let is_same = |other: &Hypothesis| is_same(other, &null);
@@ -190,7 +185,7 @@ impl Session<'_> {
 /// What a certificate needs of a model that lacks the effect.
 #[derive(Clone, Copy)]
 struct Null {
-    log_likelihood: f64,
+    /// ln of its evidence, nats; of its likelihood where that cannot be computed.
     evidence: f64,
     /// Variance above the noise on the validation samples, y².
     excess: f64,
@@ -200,9 +195,7 @@ impl Null {
     fn of(judge: &Judge, hypothesis: &Hypothesis) -> Option<Self> {
         let null = MostLikely::of(judge, hypothesis.judged.model())?;
         Some(Self {
-            log_likelihood: null.log_likelihood,
-            // Where the evidence cannot be computed, the likelihood is used.
-            evidence: null.evidence(judge).unwrap_or(f64::NEG_INFINITY),
+            evidence: null.evidence(judge).unwrap_or(null.log_likelihood),
             excess: judge.excess(&hypothesis.judged.held_out),
         })
     }

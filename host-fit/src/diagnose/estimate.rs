@@ -87,25 +87,19 @@ pub(super) fn is_identified(fit: &Fit, spec: &Spec) -> bool {
             (card.is_logarithmic() && card.low < card.high).then(|| 2.0 * half / values[index])
         });
     let least = spans.next().map(|first| spans.fold(first, f64::min));
-    excludes_zero(fit, spec, f64::INFINITY)
+    excludes_zero(fit, spec)
         && least.is_none_or(|least| least <= RULES.identified.ln())
 }
 
-/// Whether the amplitude of an effect differs significantly from 0; `true` if its card has no linear amplitude.
-pub(super) fn is_there(fit: &Fit, spec: &Spec) -> bool {
-    excludes_zero(fit, spec, 0.0)
-}
-
-/// Whether the interval of an effect's linear amplitude, if it has one, excludes 0. `unknown` is the standard
-/// error of an amplitude that has none.
-fn excludes_zero(fit: &Fit, spec: &Spec, unknown: f64) -> bool {
+/// Whether the interval of an effect's linear amplitude, if it has one, excludes 0.
+fn excludes_zero(fit: &Fit, spec: &Spec) -> bool {
     let Some(amplitude) = spec.amplitude.filter(|amplitude| amplitude.linear) else {
         return true;
     };
     let mut own = own(&fit.model, spec).into_iter();
     let place = own.find(|(_, card)| amplitude.parameter == card.name);
     place.is_none_or(|(index, _)| {
-        let half = DEVIATES * fit.standard_error(index).unwrap_or(unknown);
+        let half = DEVIATES * fit.standard_error(index).unwrap_or(f64::INFINITY);
         fit.model.values()[index].abs() > half
     })
 }

@@ -9,7 +9,6 @@ use super::ranking::{Rival, not_tried, ranked, rivals_and_chance};
 use super::{DiagnoseError, Diagnosis, Options, RULES, Rung, Verdict};
 use crate::model::Model;
 use crate::parallel;
-use crate::residual::NoiseSource;
 use crate::terms::{
     Chance, Found, HeldOut, Hypothesis, Judge, Judged, Likelihood, Search, Term, Units, p_value,
 };
@@ -29,8 +28,8 @@ struct Way {
     order: Vec<&'static Spec>,
     /// One step for each effect, with those before it.
     rungs: Vec<Rung>,
-    /// Number of significant effects. Not counted: those without which the model still fits, those that a
-    /// second copy of another effect replaces, and those whose parameters are not identifiable.
+    /// Number of significant effects. Not counted: those that a second copy of another effect replaces, and those whose
+    /// parameters are not identifiable.
     proven: usize,
 }
 
@@ -118,7 +117,7 @@ impl Session<'_> {
         } = alone
             .map(concluded)
             .filter(|conclusion| !conclusion.effects.is_empty())
-            .unwrap_or_else(|| self.concluded_on_most(&named, &found, as_given));
+            .unwrap_or_else(|| concluded(&named));
         if effects.is_empty() && !named.is_bare() {
             compared = self.compared(&last, &found);
         }
@@ -175,14 +174,11 @@ impl Session<'_> {
             &found.best
         };
         let certificates = self.certificates(subject, &sets, &others, &found);
-        // Where the noise level is unknown an error says little by its size: a name stands only if records that chose nothing
-        // do not speak against it.
-        let in_the_dark = judge.noise_source == NoiseSource::Scatter;
-        let contradicted = in_the_dark
-            && order.iter().take(way.proven).any(|spec| {
-                let certificate = certificates.get(spec.name);
-                certificate.is_some_and(|certificate| certificate.log_e < 0.0)
-            });
+        // A name stands only if no model that lacks it has more evidence.
+        let contradicted = order.iter().take(way.proven).any(|spec| {
+            let certificate = certificates.get(spec.name);
+            certificate.is_some_and(|certificate| certificate.evidence_nats < 0.0)
+        });
         let (verdict, claims) = match claims && contradicted {
             true => (Verdict::PartlyExplained, false),
             false => (verdict, claims),
@@ -262,29 +258,6 @@ impl Session<'_> {
         }
     }
 
-    /// The verdict on the largest set of the effects of `named` for which there is enough evidence. The least
-    /// important effect is left out first: doubts about it are no doubts about the others.
-    fn concluded_on_most(
-        &self,
-        named: &Hypothesis,
-        found: &Found,
-        as_given: &HeldOut,
-    ) -> Conclusion {
-        let all = self.concluded(named, found, as_given);
-        let mut fewer = named.clone();
-        while all.effects.is_empty()
-            && let Some((_, least)) = self.without_the_least(&fewer, &found.root)
-            && !least.is_bare()
-        {
-            let conclusion = self.concluded(&least, found, as_given);
-            if !conclusion.effects.is_empty() {
-                return conclusion;
-            }
-            fewer = least;
-        }
-        all
-    }
-
     /// The effect that lowers the error of `hypothesis` the least, and the hypothesis refitted without it.
     fn without_the_least(
         &self,
@@ -341,8 +314,7 @@ impl Session<'_> {
             };
             left.retain(|other| other.name != spec.name);
             let stands_in = || {
-                self.is_enough(&lesser)
-                    || !is_identified(&current.judged.fits[0], spec)
+                !is_identified(&current.judged.fits[0], spec)
                     || self.does_as_well_twice(&left, &lesser, &current)
             };
             if claims && unproven == later.len() && stands_in() {
@@ -412,13 +384,12 @@ mod tests {
         let drifting = ("thermal-drift", [0.1, 1.0].as_slice());
         let both = with(&[drifting, ("stopping-vortex", &[0.001, 0.03])]);
         let as_given = &bare.judged.held_out;
-        assert!(
-            session
-                .concluded(&both, &found, as_given)
-                .effects
-                .is_empty()
-        );
-        let claimed = session.concluded_on_most(&both, &found, as_given);
+        let searched = Found {
+            all: vec![bare.clone(), both.clone()],
+            best: both,
+            ..found.clone()
+        };
+        let claimed = session.concluded(&session.named(&searched), &searched, as_given);
         let names: Vec<&str> = claimed.effects.iter().map(|spec| spec.name).collect();
         assert_eq!(names, ["thermal-drift"]);
         assert_eq!(claimed.verdict, Verdict::EffectMissing);

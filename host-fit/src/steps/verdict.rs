@@ -3,17 +3,20 @@
 use super::symptom::{meant, shown};
 use super::{Answer, Tone};
 use crate::data::Plant;
-use crate::diagnose::{Diagnosis, FLOW_LAG, FLOW_MEMORY, HeldOutBy, Rung, Verdict};
+use crate::diagnose::{Diagnosis, FLOW_LAG, FLOW_MEMORY, HeldOutBy, RULES, Rung, Verdict};
 use crate::discover::Glance;
 use crate::picture::significant;
 use crate::residual::NoiseSource;
-use crate::terms::{RULES as TERMS, second_lag_s};
+use crate::terms::second_lag_s;
 use model_core::effect::Place;
 use model_core::effects::spec;
 
 /// What a p-value and an interval are worth, measured on simulated plants (docs/calibration.md).
 const CALIBRATED: &str = "What p and intervals are worth, measured on simulated plants: of 300 without a missing effect, 2 got a name; \
      95 % intervals held the truth in about 90 % of the cases.";
+
+/// Smaller p-values are shown as this: their size is that of the noise model, which is not known so well.
+const LEAST_P: f64 = 1e-6;
 
 /// The answer of a diagnosis. `judged_rmse` is the error used for the decision, y, if it is not that of whole
 /// validation records; `channel` is a measured channel that the residual depends on, with its share of the
@@ -216,38 +219,28 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
 
 /// The confidence in the named effects, with its test.
 fn confidence(diagnosis: &Diagnosis) -> String {
-    match diagnosis.p_value {
-        Some(p) => format!(
-            "Family-wise p {} {} over {} candidates.",
-            if p > 1.0 / (TERMS.draws + 1) as f64 {
-                "="
-            } else {
-                "≤"
-            },
-            significant(p, 2),
-            diagnosis.alternatives
-        ),
-        None => "Chosen by parsimony, not by a significance test: the model with it fits equally well with fewer parameters."
-            .to_owned(),
-    }
+    let p = diagnosis.p_value.unwrap_or(1.0);
+    let p = match p < LEAST_P {
+        true => "< 10⁻⁶".to_owned(),
+        false => format!("≤ {}", significant(p, 2)),
+    };
+    format!("Family-wise p {p} over {} models.", diagnosis.tried)
 }
 
-/// The reduction of the error by the named effects. An effect named for parsimony does not lower the error of
-/// the given model; it is compared with the lowest-order model.
+/// The reduction of the error by the named effects. Where additional lags of the given model fit equally well, it is
+/// compared with the lowest-order model.
 fn fall(diagnosis: &Diagnosis, with: &str) -> String {
     let rmse = |rung: Option<&Rung>| rung.map_or(f64::NAN, |rung| rung.validate_rmse);
-    let last = rmse(diagnosis.ladder.last());
+    let [given, last] = [diagnosis.ladder.first(), diagnosis.ladder.last()].map(rmse);
     let error = error_name(diagnosis);
     let fewest = diagnosis.ladder.get(1);
-    match fewest.filter(|rung| diagnosis.p_value.is_none() && rung.effects.is_empty()) {
+    let lags_do = last > (1.0 - RULES.worthwhile) * given;
+    match fewest.filter(|rung| lags_do && rung.effects.is_empty()) {
         Some(fewest) => format!(
             "Beside the fewest lags, {with} lowers the {error} {}; without it, additional lags fit equally well.",
             from_to(rmse(Some(fewest)), last, diagnosis)
         ),
-        None => format!(
-            "With {with} the {error} falls {}.",
-            from_to(rmse(diagnosis.ladder.first()), last, diagnosis)
-        ),
+        None => format!("With {with} the {error} falls {}.", from_to(given, last, diagnosis)),
     }
 }
 

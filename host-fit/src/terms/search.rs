@@ -81,6 +81,19 @@ impl Hypothesis {
         Term::all_of(other, self.judged.model()).is_some_and(|terms| terms.is_empty())
     }
 
+    /// The one with the lowest error among `all` that have none of these effects.
+    pub(crate) fn best_without<'a>(
+        all: impl Iterator<Item = &'a Self>,
+        effects: &[&str],
+    ) -> Option<&'a Self> {
+        let lacks = |hypothesis: &&Self| {
+            let mut own = hypothesis.terms.iter().filter_map(Term::effect);
+            !own.any(|effect| effects.contains(&effect.name))
+        };
+        all.filter(lacks)
+            .min_by(|a, b| a.judged.rmse().total_cmp(&b.judged.rmse()))
+    }
+
     /// Its terms in words.
     #[must_use]
     pub fn words(&self) -> String {

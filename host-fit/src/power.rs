@@ -13,10 +13,11 @@ use crate::fit::channel_reference;
 use crate::model::Model;
 use crate::parallel;
 use crate::picture::significant;
-use crate::residual::NoiseSource;
 use crate::rules;
 use crate::simulate::SimulateError;
-use crate::terms::{Bench, Judge, Known, Left, RULES as TERMS, Screen, Shown, Units, Unnamed};
+use crate::terms::{
+    Bench, Judge, Known, Left, MostLikely, RULES as TERMS, Screen, Shown, Units, Unnamed,
+};
 use model_core::effect::{Parameter, Spec};
 use model_core::effects::SPECS;
 use serde::Serialize;
@@ -78,7 +79,7 @@ pub fn detectable(
     let detector = Detector {
         unnamed: Unnamed::of(&screen, &known),
         block: held_out.block(),
-        asked: Asked::of(&bench.judge, held_out.rmse(), usual),
+        asked: Asked::of(&bench.judge, &bench.given, held_out.rmse(), usual),
         units: &bench.units,
         screen,
     };
@@ -97,17 +98,17 @@ struct Asked {
 }
 
 impl Asked {
-    fn of(judge: &Judge, rmse: f64, usual: f64) -> Self {
-        // Without a known noise level, the practical margin is larger.
-        let worthwhile = match judge.noise_source {
-            NoiseSource::Measured | NoiseSource::Repeats => NAMED.worthwhile,
-            NoiseSource::Scatter => NAMED.worthwhile_in_the_dark,
-        };
+    fn of(judge: &Judge, given: &Model, rmse: f64, usual: f64) -> Self {
+        // The e-value of the effect pays for the level, for the models that are tried, and for the coefficients that the
+        // model has without it. A share of the error of n samples is worth −n/2·ln(1 − share) nats.
+        let likely = MostLikely::of(judge, given);
+        let prior = likely.and_then(|likely| Some(likely.log_likelihood - likely.evidence(judge)?));
+        let nats = prior.unwrap_or(0.0) - NAMED.level_of_search.ln() + (SPECS.len() as f64).ln();
+        let samples: usize = judge.scored_records().iter().map(Record::len).sum();
+        let told = 1.0 - (-2.0 * nats.max(0.0) / samples.max(1) as f64).exp();
         // An error that is at the noise level already leaves nothing to detect.
         let from_floor = (judge.over_noise(rmse) / TERMS.at_the_floor).powi(2);
-        let taken = (1.0 - (1.0 - worthwhile).powi(2))
-            .max(usual.min(0.99))
-            .max(1.0 - from_floor);
+        let taken = told.max(usual.min(0.99)).max(1.0 - from_floor);
         Self {
             share: taken / (1.0 - taken),
             often: Normal::standard().inverse_cdf(RULES.power),

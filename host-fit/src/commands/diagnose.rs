@@ -13,8 +13,8 @@ use super::{Console, check_outputs, page};
 
 /// Find the physical effect that a model lacks, by the error of its free run on the validation records.
 ///
-/// Every effect of the catalogue is refitted together with the model. An effect is named if the validation error falls
-/// significantly (family-wise p-value over all candidates) and by more than additional lags achieve.
+/// Every effect of the catalogue is refitted together with the model. An effect is named if there is significantly more
+/// evidence for the model with it than for every model without it (family-wise p-value over all models tried).
 ///
 /// Example: host-fit diagnose model.toml DATASET -o better.toml --report diagnosis.html
 #[derive(Debug, clap::Args)]

@@ -15,9 +15,9 @@ use std::collections::BTreeMap;
 pub struct Certificate {
     /// ln of the Bayes factor of the model with the effect against the best model without it, nats.
     pub evidence_nats: f64,
-    /// ln of the e-value, nats: that Bayes factor over the number of models tried. Both models have the coefficients of the
-    /// recursion in common, with the same wide prior, so that its mean without the effect is at most about 1 for each of
-    /// their values (theory 4.5).
+    /// ln of the e-value against "no model without the effect needs more", nats: ln of the evidence of the
+    /// model with it, minus ln of the number of models tried, minus ln of the largest likelihood of any model
+    /// without it.
     pub log_e: f64,
     /// Level α, 0 to 1. The effect is certified if the log e-value is at least ln(1/α). At most a share α of
     /// certificates is false, provided that the noise model holds and the base class contains the true base.
@@ -106,7 +106,8 @@ impl Session<'_> {
         found: &Found,
     ) -> Option<Certificate> {
         let most = |of: fn(&Null) -> f64| nulls.iter().map(of).reduce(f64::max);
-        let evidence_nats = own - most(|null| null.evidence)?;
+        let likelihood = most(|null| null.log_likelihood)?;
+        let evidence = most(|null| null.evidence)?;
         let all = self.judge().first_fold();
         let mut records: Vec<String> = all.iter().map(|record| record.name.clone()).collect();
         records.dedup();
@@ -116,8 +117,8 @@ impl Session<'_> {
         // The e-value is divided by the number of structures tried.
         let tried = (found.tried.max(1) as f64).ln();
         Some(Certificate {
-            evidence_nats,
-            log_e: evidence_nats - tried,
+            evidence_nats: own - evidence,
+            log_e: own - likelihood - tried,
             alpha: RULES.level_of_search,
             records,
             share: 1.0 - left / without.max(f64::MIN_POSITIVE),
@@ -185,7 +186,7 @@ impl Session<'_> {
 /// What a certificate needs of a model that lacks the effect.
 #[derive(Clone, Copy)]
 struct Null {
-    /// ln of its evidence, nats; of its likelihood where that cannot be computed.
+    log_likelihood: f64,
     evidence: f64,
     /// Variance above the noise on the validation samples, y².
     excess: f64,
@@ -195,7 +196,9 @@ impl Null {
     fn of(judge: &Judge, hypothesis: &Hypothesis) -> Option<Self> {
         let null = MostLikely::of(judge, hypothesis.judged.model())?;
         Some(Self {
-            evidence: null.evidence(judge).unwrap_or(null.log_likelihood),
+            log_likelihood: null.log_likelihood,
+            // Where the evidence cannot be computed, the likelihood is used.
+            evidence: null.evidence(judge).unwrap_or(f64::NEG_INFINITY),
             excess: judge.excess(&hypothesis.judged.held_out),
         })
     }
@@ -210,6 +213,24 @@ fn is_same(a: &Hypothesis, b: &Hypothesis) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// ln(50) nats are a p-value of 0.02; an e-value below 1 says nothing.
+    #[test]
+    fn an_e_value_bounds_the_p_value_by_its_inverse() {
+        let p_value = |log_e: f64| {
+            let certificate = Certificate {
+                evidence_nats: log_e,
+                log_e,
+                alpha: 0.02,
+                records: Vec::new(),
+                share: 1.0,
+            };
+            certificate.p_value()
+        };
+        assert!((p_value(50.0_f64.ln()) - 0.02).abs() < 1e-12);
+        assert_eq!(p_value(-3.0), 1.0);
+        assert!(p_value(1e4) > 0.0);
+    }
 
     #[test]
     fn an_effect_is_certified_beside_others_by_its_evidence_and_its_share() {

@@ -87,8 +87,7 @@ pub(super) fn is_identified(fit: &Fit, spec: &Spec) -> bool {
             (card.is_logarithmic() && card.low < card.high).then(|| 2.0 * half / values[index])
         });
     let least = spans.next().map(|first| spans.fold(first, f64::min));
-    excludes_zero(fit, spec)
-        && least.is_none_or(|least| least <= RULES.identified.ln())
+    excludes_zero(fit, spec) && least.is_none_or(|least| least <= RULES.identified.ln())
 }
 
 /// Whether the interval of an effect's linear amplitude, if it has one, excludes 0.

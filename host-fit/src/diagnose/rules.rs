@@ -11,8 +11,7 @@ rules! {
     floor_margin: f64 = 1.03, "times the noise level", "`y_sd` of 20 repeats, pooled over the validation records, gives the noise to 0.4 %; models of the right structure have 0.98 to 1.02";
     /// Level of the tests.
     level: f64 = 0.05, "p-value", "convention";
-    /// Family-wise level: the probability that noise alone gives any effect, at any grid point, as large a
-    /// gain.
+    /// Family-wise level: an e-value has to be at least its inverse.
     level_of_search: f64 = 0.02, "p-value", "target: at most 3 % false names";
     /// An effect must lower the validation error of the best base model by this fraction, unless it fits
     /// equally well with fewer parameters.
@@ -42,9 +41,6 @@ rules! {
     /// Where the level of slow noise is unknown, a model error also counts if it is more than this share: no
     /// recording worth fitting is so noisy.
     too_much: f64 = 0.06, "share of the variance of y", "the public sets";
-    /// Where the noise level is unknown and the error depends on no coordinate, an effect must lower the
-    /// error by this.
-    worthwhile_in_the_dark: f64 = 0.1, "share of the rms error", "the hair dryer and the gas furnace, where nothing is missing";
     /// Number of candidates refitted for the ranking, beside the named ones.
     ranked_in_full: usize = 4, "", "judgement: lower-ranked candidates never became the best";
     /// From this number of `validate` records on, every third is set aside for an independent error estimate.

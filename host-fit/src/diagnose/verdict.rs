@@ -6,9 +6,7 @@ use super::session::Session;
 use super::{RULES, Verdict};
 use crate::parallel;
 use crate::residual::{FailureCoordinate, NoiseSource, examine};
-use crate::terms::{
-    Found, HeldOut, Hypothesis, Judged, Likelihood, RULES as TERMS, Term,
-};
+use crate::terms::{Found, HeldOut, Hypothesis, Judged, Likelihood, RULES as TERMS, Term};
 use model_core::effect::Spec;
 
 impl Session<'_> {

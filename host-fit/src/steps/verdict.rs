@@ -240,7 +240,10 @@ fn fall(diagnosis: &Diagnosis, with: &str) -> String {
             "Beside the fewest lags, {with} lowers the {error} {}; without it, additional lags fit equally well.",
             from_to(rmse(Some(fewest)), last, diagnosis)
         ),
-        None => format!("With {with} the {error} falls {}.", from_to(given, last, diagnosis)),
+        None => format!(
+            "With {with} the {error} falls {}.",
+            from_to(given, last, diagnosis)
+        ),
     }
 }
 

@@ -6,7 +6,7 @@ use super::session::Session;
 use super::{RULES, Verdict};
 use crate::parallel;
 use crate::residual::{FailureCoordinate, NoiseSource, examine};
-use crate::terms::{Found, HeldOut, Hypothesis, Judged, Likelihood, RULES as TERMS, Term};
+use crate::terms::{Found, HeldOut, Hypothesis, Judged, Likelihood, RULES as TERMS, Search, Term};
 use model_core::effect::Spec;
 
 impl Session<'_> {
@@ -67,14 +67,23 @@ impl Session<'_> {
             .any(|place| place.explained_fraction > RULES.depends)
     }
 
+    /// The best hypothesis, without the effects that the evidence is against or that lags replace.
+    pub(super) fn named(&self, found: &Found) -> Hypothesis {
+        self.without_what_lags_do(self.most_evident(found), &found.root)
+    }
+
     /// The best hypothesis, or, as long as there is more evidence for it, one that lacks one of its effects: refitted without
     /// it, or the best of the search.
-    pub(super) fn named(&self, found: &Found) -> Hypothesis {
+    fn most_evident(&self, found: &Found) -> Hypothesis {
         let mut best = found.best.clone();
         let Some(likelihood) = Likelihood::of(self.judge(), best.judged.model()) else {
             return best;
         };
         let evidence = |of: &Hypothesis| likelihood.evidence(of.judged.model());
+        // Validation records of a known noise level have a say of their own.
+        let scatter = self.judge().noise_source == NoiseSource::Scatter;
+        let most = (1.0 + RULES.worthwhile) * best.judged.rmse();
+        let may_stand = |judged: &Judged| scatter || judged.rmse() <= most;
         let mut own = evidence(&best);
         loop {
             let effects = best.terms.iter().enumerate();
@@ -88,6 +97,10 @@ impl Session<'_> {
                 })
                 .flatten()
                 .collect();
+            let lesser = lesser
+                .into_iter()
+                .filter(|lesser| may_stand(&lesser.judged));
+            let lesser: Vec<Hypothesis> = lesser.collect();
             let evident = parallel::some(lesser, |lesser| Some((evidence(&lesser)?, lesser)));
             match evident.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
                 Some((most, lesser)) if own.is_none_or(|own| most >= own) => {
@@ -96,6 +109,43 @@ impl Session<'_> {
                 _ => return best,
             }
         }
+    }
+
+    /// `best` without the effects that additional lags replace equally well. Lags are searched anew beside
+    /// the other effects, since the present ones were found beside all of them. Skipped if the noise level is
+    /// unknown: the error then says too little.
+    fn without_what_lags_do(&self, mut best: Hypothesis, root: &Hypothesis) -> Hypothesis {
+        if self.judge().noise_source == NoiseSource::Scatter {
+            return best;
+        }
+        let bases = Search {
+            effects: false,
+            known: self.search.known.clone(),
+            ..*self.search
+        };
+        while best.terms.iter().filter_map(Term::effect).count() > 1 {
+            let enough = (1.0 + RULES.worthwhile) * best.judged.rmse();
+            let named = (0..best.terms.len()).filter(|i| best.terms[*i].effect().is_some());
+            let lesser = named.filter_map(|index| {
+                let name = best.terms[index].name();
+                (self.search.progress)(&format!("lags in the place of {name}"));
+                let lesser = self.search.without(&best, index, root)?;
+                let is_effect = |term: &Term| term.effect().is_some();
+                let (kept, lags) = lesser.terms.into_iter().partition(is_effect);
+                let mut from = Hypothesis::new(lesser.judged);
+                from.terms = lags;
+                let mut found = bases.run(from, None).best;
+                let mut terms: Vec<Term> = kept;
+                terms.append(&mut found.terms);
+                found.terms = terms;
+                (found.judged.rmse() <= enough).then_some(found)
+            });
+            match lesser.min_by(|a, b| a.score().total_cmp(&b.score())) {
+                Some(lesser) => best = lesser,
+                None => break,
+            }
+        }
+        best
     }
 
     /// The verdict on `best` compared with the best model without effects.

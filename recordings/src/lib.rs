@@ -14,6 +14,7 @@ mod hash;
 pub mod import;
 pub mod memory;
 pub mod output;
+mod printed;
 mod raw;
 mod record;
 mod repetition;

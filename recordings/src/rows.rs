@@ -214,30 +214,6 @@ pub(crate) fn number(cell: &[u8]) -> Result<f64, DataProblem> {
         .ok_or_else(|| DataProblem::NotANumber(printable(&String::from_utf8_lossy(cell))))
 }
 
-/// The value of one unit in the last printed place: 0.001 for `1.250`, 1 for `7`, 1e-7 for `1.5e-6`.
-///
-/// This is what a printed time may be wrong by at most through rounding (half of it, to be exact, at either end of a step).
-pub(crate) fn printed_unit(cell: &[u8]) -> f64 {
-    let (mantissa, exponent) = match cell.iter().position(|b| matches!(b, b'e' | b'E')) {
-        Some(at) => {
-            let (m, e) = cell.split_at(at);
-            let e = std::str::from_utf8(e.get(1..).unwrap_or_default())
-                .ok()
-                .and_then(|t| t.parse::<i32>().ok())
-                .unwrap_or(0);
-            (m, e)
-        }
-        None => (cell, 0),
-    };
-    let decimals = mantissa
-        .iter()
-        .rev()
-        .position(|&b| b == b'.')
-        .unwrap_or(0)
-        .min(400) as i32;
-    10f64.powi(exponent.saturating_sub(decimals).clamp(-300, 300))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -276,20 +252,6 @@ mod tests {
             text.contains("x.csv, line 1") && text.contains("(t,u)"),
             "{text}"
         );
-    }
-
-    #[test]
-    fn unit_in_the_last_place() {
-        for (text, unit) in [
-            ("1.250", 1e-3),
-            ("7", 1.0),
-            ("1.5e-6", 1e-7),
-            (".5", 0.1),
-            ("2e3", 1e3),
-        ] {
-            let found = printed_unit(text.as_bytes());
-            assert!((found / unit - 1.0).abs() < 1e-12, "{text}: {found}");
-        }
     }
 
     #[test]

@@ -264,7 +264,7 @@ pub(crate) fn tidy(value: f64, tolerance: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rows::printed_unit;
+    use crate::printed::printed_unit;
 
     fn stated(period_s: f64) -> Option<Stated> {
         let by = "`sample_period_s` is";

@@ -7,8 +7,9 @@ use std::path::Path;
 use crate::error::{DataError, DataProblem, FilePlace};
 use crate::import::ImportProblem;
 use crate::memory;
+use crate::printed::printed_unit;
 use crate::record::{Origin, Record, Use, check_values};
-use crate::rows::{RowReader, number, open_text, printed_unit};
+use crate::rows::{RowReader, number, open_text};
 use crate::sampling::{PrintedTimes, Stated};
 use crate::thresholds::RULES;
 

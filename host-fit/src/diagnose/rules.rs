@@ -13,8 +13,8 @@ rules! {
     level: f64 = 0.05, "p-value", "convention";
     /// Family-wise level: an e-value has to be at least its inverse.
     level_of_search: f64 = 0.02, "p-value", "target: at most 3 % false names";
-    /// An effect must lower the validation error of the best base model by this fraction, unless it fits
-    /// equally well with fewer parameters.
+    /// At a known noise level an effect is left out, or replaced by lags, if the validation error rises by no more than this
+    /// fraction.
     worthwhile: f64 = 0.015, "share of the rms error", "null cases of six families: noise alone reaches 0.01";
     /// Validation errors that differ by less than this are equal in practice.
     alike: f64 = 0.005, "share of the rms error", "judgement: a tenth of the difference between two noise seeds";

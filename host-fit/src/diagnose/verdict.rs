@@ -83,8 +83,8 @@ impl Session<'_> {
         let evidence = |of: &Hypothesis| likelihood.evidence(of.judged.model());
         // Validation records of a known noise level have a say of their own.
         let scatter = self.judge().noise_source == NoiseSource::Scatter;
-        let most = (1.0 + RULES.worthwhile) * best.judged.rmse();
-        let may_stand = |judged: &Judged| scatter || judged.rmse() <= most;
+        let largest = (1.0 + RULES.worthwhile) * best.judged.rmse();
+        let may_stand = |of: &Hypothesis| scatter || of.judged.rmse() <= largest;
         let mut own = evidence(&best);
         loop {
             let effects = best.terms.iter().enumerate();
@@ -97,11 +97,8 @@ impl Session<'_> {
                     ]
                 })
                 .flatten()
+                .filter(may_stand)
                 .collect();
-            let lesser = lesser
-                .into_iter()
-                .filter(|lesser| may_stand(&lesser.judged));
-            let lesser: Vec<Hypothesis> = lesser.collect();
             let evident = parallel::some(lesser, |lesser| Some((evidence(&lesser)?, lesser)));
             match evident.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
                 Some((most, lesser)) if own.is_none_or(|own| most >= own) => {

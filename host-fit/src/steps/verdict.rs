@@ -180,10 +180,9 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
         }
         Verdict::PartlyExplained => {
             let own = |name| diagnosis.certificates.get(name);
-            let contradicted = diagnosis.noise_source == NoiseSource::Scatter
-                && diagnosis.stand_ins.iter().filter_map(own).any(|one| one.log_e < 0.0);
-            let why = match contradicted {
-                true => "records that did not choose them are predicted better without them",
+            let mut certificates = diagnosis.stand_ins.iter().filter_map(own);
+            let why = match certificates.any(|one| one.evidence_nats < 0.0) {
+                true => "there is more evidence for a model without them",
                 false => "too much variance stays unexplained",
             };
             Answer::new(Tone::Warning, "something is missing; its cause is not identified")

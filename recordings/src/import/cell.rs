@@ -1,7 +1,7 @@
 //! Contents of a table cell: a number in any notation, on or off, a date or time, or nothing.
 
 use super::stamp::Stamp;
-use crate::rows::printed_unit;
+use crate::printed::printed_unit;
 
 /// The contents of one cell.
 #[derive(Debug, Clone, Copy, PartialEq)]

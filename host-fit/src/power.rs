@@ -16,7 +16,7 @@ use crate::picture::significant;
 use crate::rules;
 use crate::simulate::SimulateError;
 use crate::terms::{
-    Bench, Judge, Known, Left, MostLikely, RULES as TERMS, Screen, Shown, Units, Unnamed,
+    Bench, HeldOut, Judge, Known, Left, MostLikely, RULES as TERMS, Screen, Shown, Units, Unnamed,
 };
 use model_core::effect::{Parameter, Spec};
 use model_core::effects::SPECS;
@@ -58,16 +58,10 @@ pub struct Detectable {
 
 /// The detectable amplitude of each effect of the catalogue that has an amplitude, is not in the model and
 /// can be tried on these records. Other parameters are at the middle of the catalogue's starting values.
-/// `usual` is the largest share of the validation error energy that noise alone usually gives any effect
-/// ([`Diagnosis::usual_by_chance`](crate::diagnose::Diagnosis::usual_by_chance)).
 ///
 /// # Errors
 /// A missing channel of the model's own, or a free run that diverges.
-pub fn detectable(
-    model: &Model,
-    records: &[Record],
-    usual: f64,
-) -> Result<Vec<Detectable>, SimulateError> {
+pub fn detectable(model: &Model, records: &[Record]) -> Result<Vec<Detectable>, SimulateError> {
     let Some(bench) = Bench::of(model, records) else {
         return Ok(Vec::new());
     };
@@ -79,7 +73,7 @@ pub fn detectable(
     let detector = Detector {
         unnamed: Unnamed::of(&screen, &known),
         block: held_out.block(),
-        asked: Asked::of(&bench.judge, &bench.given, held_out.rmse(), usual),
+        asked: Asked::of(&bench.judge, &bench.given, &held_out),
         units: &bench.units,
         screen,
     };
@@ -98,17 +92,18 @@ struct Asked {
 }
 
 impl Asked {
-    fn of(judge: &Judge, given: &Model, rmse: f64, usual: f64) -> Self {
+    fn of(judge: &Judge, given: &Model, held_out: &HeldOut) -> Self {
         // The e-value of the effect pays for the level, for the models that are tried, and for the coefficients that the
-        // model has without it. A share of the error of n samples is worth −n/2·ln(1 − share) nats.
+        // model has without it. A share of the error of n independent samples is worth −n/2·ln(1 − share) nats.
         let likely = MostLikely::of(judge, given);
         let prior = likely.and_then(|likely| Some(likely.log_likelihood - likely.evidence(judge)?));
         let nats = prior.unwrap_or(0.0) - NAMED.level_of_search.ln() + (SPECS.len() as f64).ln();
         let samples: usize = judge.scored_records().iter().map(Record::len).sum();
-        let told = 1.0 - (-2.0 * nats.max(0.0) / samples.max(1) as f64).exp();
+        let independent = samples.max(1) as f64 / held_out.correlated();
+        let told = 1.0 - (-2.0 * nats.max(0.0) / independent).exp();
         // An error that is at the noise level already leaves nothing to detect.
-        let from_floor = (judge.over_noise(rmse) / TERMS.at_the_floor).powi(2);
-        let taken = told.max(usual.min(0.99)).max(1.0 - from_floor);
+        let from_floor = (judge.over_noise(held_out.rmse()) / TERMS.at_the_floor).powi(2);
+        let taken = told.min(0.99).max(1.0 - from_floor);
         Self {
             share: taken / (1.0 - taken),
             often: Normal::standard().inverse_cdf(RULES.power),
@@ -229,7 +224,7 @@ mod tests {
 
     /// The verdict of a diagnosis on records with `effect` at `times` its detectable amplitude.
     fn named(model: &Model, records: &[Record], effect: &str, times: f64) -> Vec<String> {
-        let found = detectable(model, records, 0.01).expect("stable");
+        let found = detectable(model, records).expect("stable");
         let found = found.iter().find(|d| d.effect == effect).expect("judged");
         let spec = spec(effect).expect("in the catalogue");
         let mut parameters = found.parameters.clone();
@@ -267,11 +262,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_to_be_seen_is_named_and_a_sixth_of_it_is_not() {
+    fn what_is_said_to_be_seen_is_named_and_a_tenth_of_it_is_not() {
         let records = records(&[], &[], 2);
         let model = base(&records);
         let effect = "hot-film-lag";
         assert_eq!(named(&model, &records, effect, 0.75), [effect]);
-        assert!(named(&model, &records, effect, 0.16).is_empty());
+        assert!(named(&model, &records, effect, 0.1).is_empty());
     }
 }

@@ -595,13 +595,13 @@ fn report_candidates(report: &mut Report, found: &Finding) {
             "Each effect alone, refitted with everything else.",
         );
         report.table(
-            "p is family-wise: it is corrected for all candidates. 5 % level: the reduction that noise alone \
-            exceeds in 5 % of searches. Screened only: the first-order estimate was too small to refit.",
+            "Nats: ln of the Bayes factor of the model with the effect against the model without it. p is family-wise: \
+             it is corrected for all models that were tried. Screened only: the first-order estimate was too small to refit.",
             &[
                 Column::Text("effect"),
                 Column::Text("outcome"),
                 Column::Number("error falls"),
-                Column::Number("5 % level"),
+                Column::Number("nats"),
                 Column::Number("p"),
                 Column::Text("parameters (95 % interval)"),
             ],

@@ -99,7 +99,7 @@ fn unseen(
     units: &Units,
 ) -> Vec<PossibleFlow> {
     // A model at the stability limit has no detectable sizes.
-    let found = detectable(model, records, RULES.usual_by_chance).unwrap_or_default();
+    let found = detectable(model, records).unwrap_or_default();
     parallel::some(&found, |found| {
         found.amplitude?;
         let spec = judge

@@ -86,8 +86,6 @@ rules! {
     not_excluded: f64 = 0.025, "p-value", "convention: the ends of intervals of 95 %";
     /// Steps, of a fifth each, in which the end of an interval is searched inwards from 1.96 standard errors.
     interval_steps: u32 = 20, "", "judgement: to a seventieth";
-    /// Share of the error energy that noise alone gives the best effect, assumed for the detectable size.
-    usual_by_chance: f64 = 0.01, "share of the energy", "typical value of searches on 8 records";
     /// Gauss–Newton steps of the refit for a possible plant.
     refitting_steps: usize = 5, "", "judgement";
     /// Iterations of a fit with another delay law.

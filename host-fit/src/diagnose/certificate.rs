@@ -6,9 +6,10 @@ use super::ranking::Rival;
 use super::session::Session;
 use crate::model::Model;
 use crate::parallel;
-use crate::terms::{Found, Hypothesis, Judge, MostLikely};
+use crate::terms::{Found, Hypothesis, MostLikely};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::sync::PoisonError;
 
 /// The certificate of an effect: a bound on its false-alarm rate, whatever else is missing (theory 4.5).
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -76,8 +77,8 @@ impl Session<'_> {
         if terms_fewer == 0 || effects.is_empty() {
             return None;
         }
-        let before = MostLikely::of(self.judge(), given)?.evidence(self.judge())?;
-        let nats = self.evidence(last)? - before;
+        let before = self.likely(given)?.evidence?;
+        let nats = self.likely(last.judged.model())?.evidence? - before;
         (nats > 0.0).then(|| Parsimony {
             effects: effects.to_vec(),
             nats,
@@ -85,26 +86,50 @@ impl Session<'_> {
         })
     }
 
-    /// ln of the evidence of a model at its maximum-likelihood parameters, nats.
-    fn evidence(&self, hypothesis: &Hypothesis) -> Option<f64> {
-        MostLikely::of(self.judge(), hypothesis.judged.model())?.evidence(self.judge())
+    /// A model at its most likely parameters; `None` if its free run diverges. Several questions ask for the same models:
+    /// each is fitted once.
+    pub(super) fn likely(&self, model: &Model) -> Option<Likely> {
+        let all = || self.likely.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, met)) = all().iter().find(|(met, _)| met == model) {
+            return *met;
+        }
+        let judge = self.judge();
+        let likely = MostLikely::of(judge, model).map(|likely| Likely {
+            log_likelihood: likely.log_likelihood,
+            evidence: likely.evidence(judge),
+        });
+        all().push((model.clone(), likely));
+        likely
     }
 
-    /// The certificate of all effects of `best` together, against the best base model.
-    pub(super) fn certified(&self, best: &Hypothesis, found: &Found) -> Option<Certificate> {
-        let own = self.evidence(best)?;
-        let bare = Null::of(self.judge(), &found.bare)?;
-        self.certificate(best, own, &[bare], found)
+    /// The certificate of all effects of `subject` together, against one model without them.
+    pub(super) fn certified(
+        &self,
+        subject: &Hypothesis,
+        without: &Hypothesis,
+        found: &Found,
+    ) -> Option<Certificate> {
+        self.certificate(subject, &[self.null(without)?], found)
     }
 
-    /// The certificate of `subject`, whose evidence is `own` (nats), against these null models; `None` without any.
+    fn null(&self, hypothesis: &Hypothesis) -> Option<Null> {
+        let likely = self.likely(hypothesis.judged.model())?;
+        Some(Null {
+            log_likelihood: likely.log_likelihood,
+            // Where the evidence cannot be computed, the likelihood is used.
+            evidence: likely.evidence.unwrap_or(f64::NEG_INFINITY),
+            excess: self.judge().excess(&hypothesis.judged.held_out),
+        })
+    }
+
+    /// The certificate of `subject` against these null models; `None` without any.
     fn certificate(
         &self,
         subject: &Hypothesis,
-        own: f64,
         nulls: &[Null],
         found: &Found,
     ) -> Option<Certificate> {
+        let own = self.likely(subject.judged.model())?.evidence?;
         let most = |of: fn(&Null) -> f64| nulls.iter().map(of).reduce(f64::max);
         let likelihood = most(|null| null.log_likelihood)?;
         let evidence = most(|null| null.evidence)?;
@@ -137,9 +162,6 @@ impl Session<'_> {
         if subject.is_bare() {
             return BTreeMap::new();
         }
-        let Some(own) = self.evidence(subject) else {
-            return BTreeMap::new();
-        };
         let without = |index: usize| {
             subject.terms[index].effect()?;
             self.search.without(subject, index, &found.root)
@@ -173,14 +195,21 @@ impl Session<'_> {
             let places = places.collect();
             effects.push((name, places));
         }
-        let judge = self.judge();
-        let nulls: Vec<Option<Null>> = parallel::each(&distinct, |null| Null::of(judge, null));
+        let nulls: Vec<Option<Null>> = parallel::each(&distinct, |null| self.null(null));
         let certificates = effects.into_iter().filter_map(|(name, places)| {
             let nulls: Vec<Null> = places.into_iter().filter_map(|at| nulls[at]).collect();
-            Some((name, self.certificate(subject, own, &nulls, found)?))
+            Some((name, self.certificate(subject, &nulls, found)?))
         });
         certificates.collect()
     }
+}
+
+/// A model at its most likely parameters, nats.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Likely {
+    pub(super) log_likelihood: f64,
+    /// ln of the evidence; `None` where it cannot be computed.
+    pub(super) evidence: Option<f64>,
 }
 
 /// What a certificate needs of a model that lacks the effect.
@@ -190,18 +219,6 @@ struct Null {
     evidence: f64,
     /// Variance above the noise on the validation samples, y².
     excess: f64,
-}
-
-impl Null {
-    fn of(judge: &Judge, hypothesis: &Hypothesis) -> Option<Self> {
-        let null = MostLikely::of(judge, hypothesis.judged.model())?;
-        Some(Self {
-            log_likelihood: null.log_likelihood,
-            // Where the evidence cannot be computed, the likelihood is used.
-            evidence: null.evidence(judge).unwrap_or(f64::NEG_INFINITY),
-            excess: judge.excess(&hypothesis.judged.held_out),
-        })
-    }
 }
 
 /// Whether two hypotheses are one model, found on two ways.

@@ -31,6 +31,7 @@ use crate::model::{Model, Start};
 use crate::simulate::SimulateError;
 use crate::terms::{Bench, Effort, Hypothesis, Known, Search};
 use session::Session;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use thiserror::Error;
 
@@ -57,7 +58,7 @@ pub enum DiagnoseError {
 pub struct Options {
     /// Most effects added one after the other.
     pub most_effects: usize,
-    /// Seed of the signs that stand for noise.
+    /// Seed of the search for the command that distinguishes alternatives.
     pub seed: u64,
 }
 
@@ -115,6 +116,7 @@ fn chosen(
         known,
         effects: true,
         most_effects: options.most_effects,
+        most_parameters: usize::MAX,
         interrupt,
         progress,
     };
@@ -122,6 +124,7 @@ fn chosen(
         search: &search,
         units,
         options,
+        likely: Mutex::default(),
     };
     progress("the model as given");
     let as_given = judge.held_out(|_| &given_inside)?;

@@ -121,22 +121,20 @@ pub struct Ranked {
     pub validate_rmse: f64,
     /// Reduction of the validation error, %.
     pub error_reduction_percent: f64,
-    /// Family-wise p-value: the probability that noise alone gives any effect, at any grid point, a gain as
-    /// large.
+    /// Family-wise p-value against the model that it was added to, as its e-value bounds it; 1 if it was not refitted.
     pub p_value: f64,
-    /// 95 % quantile of the largest reduction of the validation error that noise alone gives any effect, %.
-    pub by_chance_percent: f64,
+    /// ln of the Bayes factor of the model with it against the model that it was added to, nats.
+    pub gain_nats: Option<f64>,
     /// Fitted parameters by name.
     pub parameters: BTreeMap<String, ParameterEstimate>,
     /// Candidates that are not distinguishable from it on the validation records.
     pub confounded_with: Vec<String>,
-    /// Whether the gain is significant, above the practical margin, and above the gain that noise gives.
+    /// Whether the gain is significant and above the practical margin.
     pub significant: bool,
     /// Whether the whole model was refitted with it; if not, its numbers are first-order predictions of the
     /// screening.
     pub refitted: bool,
-    /// ln of the evidence of the refitted model on the estimation records, nats. Comparable within one
-    /// diagnosis.
+    /// ln of the evidence of the refitted model, nats. Comparable within one diagnosis.
     pub evidence_nats: Option<f64>,
 }
 
@@ -166,11 +164,8 @@ pub struct Diagnosis {
     pub sets: Vec<Vec<String>>,
     /// Memories of the flow in the final model.
     pub memory: Vec<Memory>,
-    /// Number of models that were refitted in full.
+    /// Number of models that were refitted in full: the family over which p-values are corrected.
     pub tried: usize,
-    /// Number of candidates (effects × grid points) screened on the final base model: the family over which
-    /// the p-values of the ranking are corrected.
-    pub alternatives: usize,
     /// How the validation error was obtained.
     pub held_out_by: HeldOutBy,
     /// Free runs are restarted from the measurement after so many seconds, for rigs that drift: see
@@ -186,15 +181,13 @@ pub struct Diagnosis {
     /// The final model's error on records that played no part in the choice of the structure. None if there
     /// are too few records to set some aside.
     pub quoted: Option<Quoted>,
-    /// 95 % quantile of the largest share of the validation error energy that noise alone gives any effect.
-    pub usual_by_chance: f64,
     /// Validation errors from the given model to the final one.
     pub ladder: Vec<Rung>,
     /// All candidates for the final base model, best first.
     pub ranking: Vec<Ranked>,
     /// Parameters of the missing effects, or of the surrogates, in the final model.
     pub parameters: BTreeMap<String, BTreeMap<String, ParameterEstimate>>,
-    /// ln of the evidence of the final model on the estimation records, nats; none if no search was made.
+    /// ln of the evidence of the final model, nats; none where it cannot be computed.
     pub evidence_nats: Option<f64>,
     /// The certificate of each effect of the best model, named or not.
     pub certificates: BTreeMap<String, Certificate>,

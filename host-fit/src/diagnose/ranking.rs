@@ -1,11 +1,12 @@
 //! Ranking of the candidates on one model, and which of them are not distinguishable.
 
+use super::certificate::Certificate;
+use super::session::Session;
 use super::{NotTried, RULES, Ranked, estimates};
 use crate::model::Model;
 use crate::parallel;
 use crate::terms::{
-    Candidate, Chance, HeldOut, Hypothesis, Judged, Likelihood, Noise, Screen, Search, Table, Term,
-    Units, p_value,
+    Candidate, Found, HeldOut, Hypothesis, Judged, Screen, Search, Table, Term, p_value,
 };
 use model_core::effect::Spec;
 
@@ -57,24 +58,6 @@ pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) 
         }
         None => Vec::new(),
     }
-}
-
-/// The same with the bootstrap distribution of the best candidate's gain under noise alone: the error of
-/// `last` with random signs from `seed`.
-pub(super) fn rivals_and_chance(
-    search: &Search<'_>,
-    context: &Hypothesis,
-    named: &[&str],
-    last: &Judged,
-    seed: u64,
-) -> (Vec<Rival>, Chance) {
-    let made = Screen::new(search.judge, context.judged.model()).and_then(|screen| {
-        let noise = Noise::new(&screen, last.model(), last.held_out.block(), seed)?;
-        let table = Table::with_chance(&screen, &search.known, &noise);
-        let rivals = refitted(search, context, named, &screen, &table);
-        Some((rivals, table.chance))
-    });
-    made.unwrap_or_default()
 }
 
 /// The most promising candidates and `named`, refitted on `context`. None if no effect is named.
@@ -161,49 +144,50 @@ fn rated(
     rated
 }
 
-/// The ranking in the user's units; `before` is the validation error without the candidates.
-pub(super) fn ranked(
-    units: &Units,
-    before: f64,
-    rivals: &[Rival],
-    chance: &Chance,
-    likelihood: Option<&Likelihood<'_>>,
-) -> Vec<Ranked> {
-    let by_chance = 1.0 - (1.0 - chance.usual()).max(0.0).sqrt();
-    let effects = || rivals.iter().filter_map(|r| Some((r, r.spec?)));
-    effects()
-        .map(|(rival, spec)| {
-            let after = rival.rmse();
-            let gain = 1.0 - after / before;
-            let p = chance.p_value(1.0 - (after / before).powi(2));
-            let others = effects().filter(|(other, _)| {
+impl Session<'_> {
+    /// The ranking in the user's units of what was added to `context`.
+    pub(super) fn ranked(
+        &self,
+        context: &Hypothesis,
+        rivals: &[Rival],
+        found: &Found,
+    ) -> Vec<Ranked> {
+        let units = &self.units;
+        let effects: Vec<(&Rival, &'static Spec)> = rivals
+            .iter()
+            .filter_map(|rival| Some((rival, rival.spec?)))
+            .collect();
+        parallel::each(&effects, |(rival, spec)| {
+            let gain = 1.0 - rival.rmse() / context.judged.rmse();
+            let others = effects.iter().filter(|(other, _)| {
                 let both = (other.judged(), rival.judged());
                 let (Some(a), Some(b)) = both else {
                     return false;
                 };
                 other.name != rival.name && alike(&a.held_out, &b.held_out)
             });
+            let refitted = rival.refitted.as_ref();
+            let certificate = refitted.and_then(|with| self.certified(with, context, found));
+            let p_value = certificate.as_ref().map_or(1.0, Certificate::p_value);
             Ranked {
                 effect: rival.name.clone(),
                 validate_rmse: rival.measured_rmse() * units.y,
                 error_reduction_percent: 100.0 * gain,
-                p_value: p,
-                by_chance_percent: 100.0 * by_chance,
+                p_value,
+                gain_nats: certificate.map(|certificate| certificate.evidence_nats),
                 parameters: rival
                     .judged()
                     .map(|judged| estimates(&judged.fits[0], spec, units))
                     .unwrap_or_default(),
                 confounded_with: others.map(|(other, _)| other.name.clone()).collect(),
-                significant: rival.refitted.is_some()
-                    && p <= RULES.level
-                    && gain > RULES.worthwhile,
-                refitted: rival.refitted.is_some(),
+                significant: p_value <= RULES.level && gain > RULES.worthwhile,
+                refitted: refitted.is_some(),
                 evidence_nats: rival
                     .judged()
-                    .and_then(|judged| likelihood?.evidence(judged.model())),
+                    .and_then(|judged| self.likely(judged.model())?.evidence),
             }
         })
-        .collect()
+    }
 }
 
 /// Effects that cannot be tried on these records, and why.

@@ -1,25 +1,28 @@
 //! A diagnosis in progress: from the result of the search to the final answer.
 
 use super::alternatives::Set;
-use super::certificate::Certificate;
+use super::certificate::{Certificate, Likely};
 use super::estimate::{estimates_among, is_identified};
 use super::memory::memory;
 use super::outcome::Conclusion;
-use super::ranking::{Rival, not_tried, ranked, rivals_and_chance};
+use super::ranking::{Rival, not_tried, rivals};
 use super::{DiagnoseError, Diagnosis, Options, RULES, Rung, Verdict};
 use crate::model::Model;
 use crate::parallel;
 use crate::terms::{
-    Chance, Found, HeldOut, Hypothesis, Judge, Judged, Likelihood, Search, Term, Units, p_value,
+    Found, HeldOut, Hypothesis, Judge, Judged, Likelihood, Search, Term, Units, p_value,
 };
 use model_core::effect::Spec;
 use std::collections::BTreeMap;
+use std::sync::Mutex;
 
 /// A diagnosis in progress.
 pub(super) struct Session<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) units: Units,
     pub(super) options: &'a Options,
+    /// Models at their most likely parameters, as far as they were asked for.
+    pub(super) likely: Mutex<Vec<(Model, Option<Likely>)>>,
 }
 
 /// The ladder from the first effect to the last.
@@ -37,7 +40,6 @@ struct Way {
 struct Compared {
     context: Hypothesis,
     others: Vec<Rival>,
-    chance: Chance,
 }
 
 impl Compared {
@@ -121,11 +123,7 @@ impl Session<'_> {
         if effects.is_empty() && !named.is_bare() {
             compared = self.compared(&last, &found);
         }
-        let Compared {
-            context,
-            others,
-            chance,
-        } = compared;
+        let Compared { context, others } = compared;
         let claims = verdict == Verdict::EffectMissing;
         let way = self.way(&last, effects, &found.root, claims);
         let order = way.order;
@@ -188,7 +186,7 @@ impl Session<'_> {
             .take(if claims { way.proven } else { 0 })
             .map(|set| likelihood.map_or_else(Vec::new, |all| set.posterior(all, &last.judged)))
             .collect();
-        let mut ranking = ranked(units, context.judged.rmse(), &others, &chance, likelihood);
+        let mut ranking = self.ranked(&context, &others, &found);
         for entry in &mut ranking {
             // The ranking shows the parameters of the final model, and only the ambiguities that remain
             // there.
@@ -235,8 +233,6 @@ impl Session<'_> {
             certified,
             memory: memory(&model),
             tried: found.tried,
-            alternatives: chance.alternatives,
-            usual_by_chance: chance.usual(),
             held_out_by: judge.held_out_by,
             quoted: None,
             restarted_s,
@@ -246,7 +242,9 @@ impl Session<'_> {
             ladder,
             ranking,
             parameters,
-            evidence_nats: likelihood.and_then(|all| all.evidence(last.judged.model())),
+            evidence_nats: self
+                .likely(last.judged.model())
+                .and_then(|own| own.evidence),
             certificates,
             parsimony,
             posterior,
@@ -286,13 +284,8 @@ impl Session<'_> {
         } else {
             found.bare.clone()
         };
-        let seed = self.options.seed;
-        let (others, chance) = rivals_and_chance(self.search, &context, &names, &with.judged, seed);
-        Compared {
-            context,
-            others,
-            chance,
-        }
+        let others = rivals(self.search, &context, &names);
+        Compared { context, others }
     }
 
     /// The ladder from no effect to `last`, one more of its `effects` at each step, the least important last.
@@ -362,6 +355,7 @@ mod tests {
             search: &search,
             units: bench.units,
             options: &options,
+            likely: Mutex::default(),
         };
         let with = |effects: &[(&str, &[f64])]| {
             let mut model = bench.given.clone();

@@ -42,7 +42,7 @@ impl Session<'_> {
                 "a second {} in the place of another effect",
                 spec.name
             ));
-            let twice = self.search.again(lesser, spec);
+            let twice = self.search.again(lesser, spec, enough);
             twice.is_some_and(|twice| twice.rmse() <= enough)
         })
     }
@@ -116,11 +116,6 @@ impl Session<'_> {
         if self.judge().noise_source == NoiseSource::Scatter {
             return best;
         }
-        let bases = Search {
-            effects: false,
-            known: self.search.known.clone(),
-            ..*self.search
-        };
         while best.terms.iter().filter_map(Term::effect).count() > 1 {
             let enough = (1.0 + RULES.worthwhile) * best.judged.rmse();
             let named = (0..best.terms.len()).filter(|i| best.terms[*i].effect().is_some());
@@ -132,6 +127,13 @@ impl Session<'_> {
                 let (kept, lags) = lesser.terms.into_iter().partition(is_effect);
                 let mut from = Hypothesis::new(lesser.judged);
                 from.terms = lags;
+                // Lags with many more parameters than the effect are no simpler explanation.
+                let bases = Search {
+                    effects: false,
+                    most_parameters: from.cost() + best.terms[index].cost() + TERMS.head_start,
+                    known: self.search.known.clone(),
+                    ..*self.search
+                };
                 let mut found = bases.run(from, None).best;
                 let mut terms: Vec<Term> = kept;
                 terms.append(&mut found.terms);
@@ -192,7 +194,7 @@ impl Session<'_> {
             return of_bare();
         }
         let certificate = (!judge.drifts_more(&best.judged, &bare.judged))
-            .then(|| self.certified(best, found))
+            .then(|| self.certified(best, bare, found))
             .flatten();
         let p_value = match certificate {
             Some(certificate) if certificate.holds() => Some(certificate.p_value()),

@@ -12,7 +12,8 @@ use crate::experiment::Separation;
 use crate::model::Model;
 use crate::order;
 use crate::terms::{
-    HeldOut, Hypothesis, Judge, Judged, Screen, Search, Table, Units, is_out, p_value, shares_won,
+    HeldOut, Hypothesis, Judge, Judged, MostLikely, Screen, Search, Table, Units, is_out, p_value,
+    shares_won,
 };
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
@@ -169,7 +170,7 @@ impl Finder<'_> {
         if gain < RULES.worthwhile || little || drifts_more {
             return None;
         }
-        let p = self.by_chance(base, last, looked_at, number);
+        let p = self.p_value(base, last, looked_at);
         if p >= RULES.level_of_search {
             return None;
         }
@@ -225,19 +226,16 @@ impl Finder<'_> {
         })
     }
 
-    /// Family-wise p-value of the gain of `with` over `base`, over all curves.
-    fn by_chance(&self, base: &Hypothesis, with: &Judged, looked_at: usize, number: usize) -> f64 {
-        let one = p_value(&base.judged.held_out, &with.held_out);
-        let at_most = one * looked_at as f64;
-        if at_most < RULES.level_of_search || one >= RULES.level_of_search {
-            return at_most.min(1.0);
-        }
-        // Most curves are strongly correlated, so that a Bonferroni correction over all of them would be far
-        // too strict: bootstrap draws give the distribution of the maximum.
-        let chance = Context::new(self.search, base.judged.model(), number)
-            .and_then(|context| context.chance(with.model(), &with.held_out));
-        let left = (with.rmse() / base.judged.rmse()).powi(2);
-        chance.map_or(1.0, |chance| chance.p_value(1.0 - left))
+    /// Family-wise p-value of `with` against `base` over the curves that were screened, as its e-value bounds it
+    /// (theory 4.5).
+    fn p_value(&self, base: &Hypothesis, with: &Judged, looked_at: usize) -> f64 {
+        let judge = self.search.judge;
+        let log_e = || {
+            let own = MostLikely::of(judge, with.model())?.evidence(judge)?;
+            let without = MostLikely::of(judge, base.judged.model())?.log_likelihood;
+            Some(own - without - (looked_at.max(1) as f64).ln())
+        };
+        log_e().map_or(1.0, |log_e| (-log_e).exp().min(1.0))
     }
 
     /// A model in the user's units, and its `terms` in the order they were added.

@@ -111,6 +111,7 @@ pub fn discover(
         known: Known::of(&judge.learning(0)),
         effects: false,
         most_effects: 0,
+        most_parameters: usize::MAX,
         interrupt,
         progress,
     };

@@ -9,7 +9,7 @@ use crate::data::Record;
 use crate::model::Model;
 use crate::order;
 use crate::parallel;
-use crate::terms::{Chance, HeldOut, Noise, Screen, Search, Tangent};
+use crate::terms::{Screen, Search, Tangent};
 use crate::user_effect::Definition;
 use model_core::effects::ZERO_OFFSET;
 
@@ -221,17 +221,6 @@ impl<'a> Context<'a> {
     /// The screening of the model.
     pub(super) fn screen(&self) -> &Screen<'a> {
         &self.screen
-    }
-
-    /// Bootstrap distribution of the best curve's gain under noise alone, taken from the residual of `last`.
-    pub(super) fn chance(&self, last: &Model, held_out: &HeldOut) -> Option<Chance> {
-        let noise = Noise::new(&self.screen, last, held_out.block(), 0)?;
-        let shares = self.each(self.coordinates(), &Entry::ALL, |(term, with)| {
-            let columns = self.screen.columns(&with, &term.name())?;
-            let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-            noise.taken_together(&self.screen, &columns)
-        });
-        Some(Chance::of_all(&shares))
     }
 
     fn curves(&self, coordinates: Vec<Coordinate>, entries: &[Entry]) -> Vec<Screened> {

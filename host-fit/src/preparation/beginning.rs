@@ -14,7 +14,7 @@ pub(super) struct Beginning {
     pub(super) command: f64,
     /// First samples through which y rests; 0 in mid-run.
     pub(super) rest: usize,
-    /// First samples of which the past is not recorded; 0 at rest.
+    /// First samples that may answer commands before the record; 0 where those are known.
     pub(super) follow: usize,
 }
 
@@ -201,7 +201,7 @@ impl Beginning {
             let trend = Shape::of(&y[..rest.min(window)], |k| k as f64);
             let noise = trend.left / (rest as f64 - 2.0).max(1.0);
             if rest < RULES.fewest_at_rest || trend.motion <= RULES.motion_over_noise * noise {
-                return at_rest(other, rest);
+                return Self::behind_an_edge(record, other, rest, reference);
             }
         }
         in_mid_run(dead_time, time)
@@ -218,6 +218,19 @@ impl Beginning {
             command: held,
             rest: 0,
             follow: (arrives + fades).min(share).max(arrives.min(most.max(1))),
+        }
+    }
+
+    /// At rest through the first samples under a command of `other`, with an edge near the first sample. When it was nobody
+    /// recorded: where the record shows further edges, what answers it is not scored.
+    fn behind_an_edge(record: &Record, other: f64, rest: usize, reference: &FirstOrder) -> Self {
+        let begun = Self::in_mid_run(record, other, reference.dead_time, reference.time_constant);
+        let later = record.u.windows(2).skip(begun.follow);
+        let shows_more = later.filter(|pair| pair[0] != pair[1]).count() > 1;
+        Self {
+            rest,
+            follow: if shows_more { begun.follow } else { 0 },
+            ..begun
         }
     }
 
@@ -283,14 +296,15 @@ impl Beginning {
         }
     }
 
-    /// Takes a record that begins where others rest under the other level of the command for one that rests there, with
-    /// an edge at its first sample.
+    /// Takes a record that begins where others rest under the other level of the command, and not where the response to its
+    /// own first command ends, for one that rests there with an edge near its first sample.
     pub(super) fn recognise(beginnings: &mut [Self], records: &[Record], reference: &FirstOrder) {
         let Some(levels) = two_levels(records) else {
             return;
         };
         let mean = |y: &[f64]| y.iter().sum::<f64>() / y.len().max(1) as f64;
         let near = 0.5 * RULES.rests_apart * range_of_y(records);
+        let spread = (reference.at_rest(levels[1]) - reference.at_rest(levels[0])).abs();
         let early = (RULES.surely_before * reference.dead_time).floor() as usize;
         let rests: Vec<(f64, f64)> = records
             .iter()
@@ -301,7 +315,8 @@ impl Beginning {
         for (own, record) in beginnings.iter_mut().zip(records) {
             let first = record.u.first().copied().unwrap_or(0.0);
             let other = levels.into_iter().find(|level| *level != first);
-            let Some(other) = other.filter(|_| own.follow > 0 && record.u_before.is_none()) else {
+            let is_of_its_own = |command: f64| own.command == command && record.u_before.is_none();
+            let Some(other) = other.filter(|_| is_of_its_own(first)) else {
                 continue;
             };
             let under: Vec<f64> = rests
@@ -312,19 +327,18 @@ impl Beginning {
             if under.is_empty() || early == 0 || early > record.y.len() {
                 continue;
             }
-            if (mean(&record.y[..early]) - mean(&under)).abs() < near {
-                *own = Self {
-                    command: other,
-                    rest: early,
-                    follow: 0,
-                };
+            let level = mean(&record.y[..early]);
+            let is_elsewhere =
+                own.follow > 0 || (level - reference.at_rest(first)).abs() > 0.5 * spread;
+            if is_elsewhere && (level - mean(&under)).abs() < near {
+                *own = Self::behind_an_edge(record, other, early, reference);
             }
         }
     }
 
     /// Whether the record begins at rest under a command of `level`.
     pub(super) fn rests_at(&self, level: f64) -> bool {
-        self.follow == 0 && self.command == level
+        self.rest > 0 && self.command == level
     }
 
     /// The record with what is known of its beginning.
@@ -484,5 +498,41 @@ mod tests {
         Beginning::reconcile(&mut beginnings, &records, &reference);
         assert_eq!(beginnings[0], rests(0.0));
         assert!(beginnings[1].follow > 0, "{beginnings:?}");
+    }
+
+    /// The jet was opened a sample before the second record and closed before y had answered, so that y still lies where it
+    /// rests without it.
+    #[test]
+    fn an_edge_before_the_record_is_recognised_and_its_answer_is_not_scored() {
+        let command: Vec<f64> = (0..1500)
+            .map(|k| f64::from(u8::from(k >= 300 && (k < 304 || k > 600 && k % 300 < 150))))
+            .collect();
+        let y = response(&command);
+        let from = |from: usize| {
+            let (u, y) = (command[from..].to_vec(), y[from..].to_vec());
+            Record::new("part", Use::Identify, 0.001, u, y)
+        };
+        let records = [from(0), from(301)];
+        let reference = FirstOrder::fitted(&records).unwrap();
+        let mut beginnings = records
+            .each_ref()
+            .map(|r| Beginning::of(r, &records, Some(&reference)));
+        // It lies still under its first command until that is felt.
+        assert_eq!((beginnings[1].command, beginnings[1].follow), (1.0, 0));
+        Beginning::reconcile(&mut beginnings, &records, &reference);
+        Beginning::recognise(&mut beginnings, &records, &reference);
+        assert_eq!((beginnings[0].command, beginnings[0].follow), (0.0, 0));
+        let edge_before = beginnings[1];
+        assert!(edge_before.command == 0.0 && edge_before.rest > 0 && edge_before.follow > 20);
+        // Without further edges its answer is all there is to score.
+        let step = Record::new(
+            "step",
+            Use::Identify,
+            0.001,
+            vec![1.0; 400],
+            response(&[1.0; 400]),
+        );
+        let own = Beginning::behind_an_edge(&step, 0.0, 5, &reference);
+        assert_eq!((own.rest, own.follow), (5, 0));
     }
 }

@@ -75,7 +75,7 @@ impl Serialize for Finding {
             beyond: Option<&'a Glance>,
             held_out_by: HeldOutBy,
             quoted: Option<&'a Quoted>,
-            alternatives: usize,
+            tried: usize,
             p_value: Option<f64>,
             restarted_s: Option<f64>,
             judged_rmse: Option<f64>,
@@ -106,7 +106,7 @@ impl Serialize for Finding {
             beyond: self.beyond.as_ref(),
             held_out_by: found.held_out_by,
             quoted: found.quoted.as_ref(),
-            alternatives: found.alternatives,
+            tried: found.tried,
             p_value: found.p_value,
             restarted_s: found.restarted_s,
             judged_rmse: self.judged_rmse,
@@ -162,9 +162,7 @@ pub fn diagnose(
             diagnosis.verdict = Verdict::Unexplained;
         }
         let detectable = match diagnosis.verdict {
-            Verdict::NothingMissing => {
-                detectable(&diagnosis.model, &records, diagnosis.usual_by_chance)
-            }
+            Verdict::NothingMissing => detectable(&diagnosis.model, &records),
             Verdict::EffectMissing | Verdict::PartlyExplained | Verdict::Unexplained => {
                 Ok(Vec::new())
             }

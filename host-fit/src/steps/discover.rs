@@ -2,7 +2,7 @@
 
 use super::onlooker::watched;
 use super::prepared::prepared;
-use super::verdict::times;
+use super::verdict::{p_bound, times};
 use super::{Answer, Onlooker, StepError, Tone, check_period, trained_in_free_run};
 use crate::data::{DataSet, Record};
 use crate::diagnose::Rung;
@@ -231,11 +231,7 @@ fn answer(discovery: &Discovery) -> Answer {
         )
     });
     let sure = discovery.terms.iter().map(|term| {
-        let p = if term.p_value < 0.001 {
-            "< 0.001".to_owned()
-        } else {
-            format!("= {}", significant(term.p_value, 1))
-        };
+        let p = p_bound(term.p_value);
         let stable = term.stability_percent;
         let stable = match stable >= 100.0 * DISCOVER.stable {
             true => {

@@ -18,6 +18,15 @@ const CALIBRATED: &str = "What p and intervals are worth, measured on simulated 
 /// Smaller p-values are shown as this: their size is that of the noise model, which is not known so well.
 const LEAST_P: f64 = 1e-6;
 
+/// A p-value that is known as a bound, with its sign of comparison.
+#[must_use]
+pub fn p_bound(p: f64) -> String {
+    match p < LEAST_P {
+        true => "< 10⁻⁶".to_owned(),
+        false => format!("≤ {}", significant(p, 2)),
+    }
+}
+
 /// The answer of a diagnosis. `judged_rmse` is the error used for the decision, y, if it is not that of whole
 /// validation records; `channel` is a measured channel that the residual depends on, with its share of the
 /// unexplained variance.
@@ -220,11 +229,7 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
 fn confidence(diagnosis: &Diagnosis) -> String {
     match diagnosis.p_value {
         Some(p) => {
-            let p = match p < LEAST_P {
-                true => "< 10⁻⁶".to_owned(),
-                false => format!("≤ {}", significant(p, 2)),
-            };
-            format!("Family-wise p {p} over {} models.", diagnosis.tried)
+            format!("Family-wise p {} over {} models.", p_bound(p), diagnosis.tried)
         }
         None => "Chosen by parsimony, not by a significance test: the model with it fits equally well with fewer parameters."
             .to_owned(),

@@ -10,9 +10,15 @@ use crate::parallel;
 use model_core::effect::Spec;
 
 impl Search<'_> {
-    /// `hypothesis` with a second copy of one of its effects, fitted from the best starting point of its
-    /// card. `None` if it has no effect outside the delay law, or no copy is stable.
-    pub(crate) fn again(&self, hypothesis: &Hypothesis, spec: &'static Spec) -> Option<Judged> {
+    /// `hypothesis` with a second copy of one of its effects, fitted from the best starting points of its
+    /// card. `None` if it has no effect outside the delay law, no copy is stable, or a few iterations leave every copy far
+    /// from an error of `enough`.
+    pub(crate) fn again(
+        &self,
+        hypothesis: &Hypothesis,
+        spec: &'static Spec,
+        enough: f64,
+    ) -> Option<Judged> {
         let model = hypothesis.judged.model();
         let own = model.effects.iter().find(|added| added.name == spec.name)?;
         let learning = self.judge.learning(0);
@@ -24,7 +30,9 @@ impl Search<'_> {
                 iterations: RULES.brief,
                 ..self.judge.options_for(&twice)
             };
-            fit(&twice, &learning, &options).ok()
+            let begun = fit(&twice, &learning, &options).ok()?;
+            let held_out = self.judge.held_out(|_| &begun.model).ok()?;
+            (held_out.rmse() < RULES.in_reach * enough).then_some(begun)
         });
         order::ascending(&mut brief, Fit::mean_square);
         brief.truncate(RULES.followed);
@@ -61,9 +69,10 @@ mod tests {
             "{}",
             over(one.judged.rmse())
         );
-        let two = search.again(&one, drift).expect("stable");
+        let own = one.judged.rmse();
+        let two = search.again(&one, drift, own).expect("stable");
         assert!(over(two.rmse()) < 1.03, "{}", over(two.rmse()));
         let echo = spec("echo-path").expect("in the catalogue");
-        assert!(search.again(&one, echo).is_none());
+        assert!(search.again(&one, echo, own).is_none());
     }
 }

@@ -84,6 +84,7 @@ pub fn base_model(
         known: Known::of(&judge.learning(0)),
         effects: false,
         most_effects: 0,
+        most_parameters: usize::MAX,
         interrupt,
         progress,
     };

@@ -150,10 +150,8 @@ rules! {
     /// Level of y at which delay laws are compared if no level is given.
     middle: f64 = 0.5, "size of y", "the middle of the range";
 
-    /// The bootstrap draws signs per record, or per piece of a record if there are fewer records than this.
-    fewest_pieces: usize = 8, "", "2⁸ sign patterns resolve a p-value of 0.01";
-    /// Bootstrap draws of the error under noise alone.
-    draws: usize = 199, "", "the smallest p-value is then 0.005";
+    /// The scatter of what an effect gains is estimated from records, or from pieces of them if there are fewer records.
+    fewest_pieces: usize = 8, "", "judgement: a scatter of fewer is known to no better than a third";
     /// Block length in correlation times; blocks count as independent.
     correlation_times: f64 = 8.0, "correlation times", "tested in `the_p_value_is_calibrated_for_coloured_errors`";
     /// Shortest block.

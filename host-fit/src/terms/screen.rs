@@ -118,14 +118,6 @@ impl<'a> Screen<'a> {
         self.joined(errors.iter().map(Vec::as_slice))
     }
 
-    /// The joined error of another model; `None` if it diverges.
-    pub(super) fn error_of(&self, other: &Model) -> Option<Vec<f64>> {
-        let runs: Option<Vec<Vec<f64>>> = (self.records.iter())
-            .map(|record| other.free_run(record).ok())
-            .collect();
-        Some(self.error_with(&runs?))
-    }
-
     /// Independent blocks of the joined series: whole records, because record-to-record scatter is constant
     /// within one. If records are few, pieces of them of at least so many samples.
     pub(super) fn blocks(&self, samples: usize) -> Vec<Range<usize>> {
@@ -358,7 +350,7 @@ impl<'a> Screen<'a> {
 
     /// Change of the free run by each parameter of an effect, linearised at its values in `other`: this model
     /// with the effect, at an amplitude that leaves the run unchanged. `None` if it diverges.
-    pub(crate) fn columns(&self, other: &Model, effect: &str) -> Option<Vec<Vec<f64>>> {
+    fn columns(&self, other: &Model, effect: &str) -> Option<Vec<Vec<f64>>> {
         let coordinates = other.coordinates();
         let own = |name: &str| name.split('.').next() == Some(effect);
         let indices: Vec<usize> = (0..coordinates.len())

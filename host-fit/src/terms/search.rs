@@ -161,6 +161,8 @@ pub struct Search<'a> {
     pub effects: bool,
     /// Largest number of effects.
     pub most_effects: usize,
+    /// Terms are added only to hypotheses whose terms have fewer parameters.
+    pub most_parameters: usize,
     /// When set, the search ends with the best hypothesis so far.
     pub interrupt: &'a AtomicBool,
     /// Receives progress messages.
@@ -175,6 +177,7 @@ impl<'a> Search<'a> {
             known: Known::of(&judge.learning(0)),
             effects: most_effects > 0,
             most_effects,
+            most_parameters: usize::MAX,
             interrupt,
             progress: &|_| {},
         }
@@ -444,12 +447,11 @@ impl Search<'_> {
     /// from a wider round.
     fn chosen(&self, all: &[Hypothesis], since: Option<usize>) -> Vec<(usize, bool)> {
         let (end, bare) = (best(all, |_| true), best(all, Hypothesis::is_bare));
-        let settled = all[end].expanded;
-        let open = |i: &usize| !all[*i].expanded;
+        let open = |i: &usize| !all[*i].expanded && all[*i].cost() < self.most_parameters;
+        let settled = !open(&end);
         // If the best hypothesis is at the noise level, only the base model can still improve.
-        let bare_is_done = bare == end
-            || all[bare].expanded
-            || all[bare].cost() >= all[end].cost() + RULES.head_start;
+        let bare_is_done =
+            bare == end || !open(&bare) || all[bare].cost() >= all[end].cost() + RULES.head_start;
         if self.over(&all[end]) <= RULES.at_the_floor && bare_is_done {
             return Vec::new();
         }

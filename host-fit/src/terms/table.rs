@@ -1,7 +1,6 @@
 //! All candidate terms of a model, with the share of the error that each explains alone.
 
 use super::RULES;
-use super::chance::{Chance, Noise, Taken};
 use super::grid::{grid, longest_lag};
 use super::screen::Screen;
 use super::term::Term;
@@ -35,8 +34,7 @@ struct Rated {
     term: Term,
     /// The model with it.
     with: Model,
-    /// Its change of the free run orthogonal to the model's own sensitivities, at least on the estimation
-    /// samples.
+    /// Its change of the free run on the estimation samples, orthogonal to the model's own sensitivities.
     column: Vec<f64>,
     /// The components of its change along the directions of the basis, which were subtracted.
     along: Vec<f64>,
@@ -51,8 +49,6 @@ pub struct Table {
     /// The candidates by descending share of the validation error energy.
     pub candidates: Vec<Candidate>,
     pub(super) columns: Vec<Vec<f64>>,
-    /// Distribution of the best effect's gain under noise alone; empty if it was not requested.
-    pub chance: Chance,
 }
 
 impl Table {
@@ -62,26 +58,12 @@ impl Table {
         let mut columns = Vec::new();
         let mut candidates = screen.base_candidates(&mut columns);
         if effects {
-            candidates.extend(screen.effect_candidates(known, None, &mut columns).0);
+            candidates.extend(screen.effect_candidates(known, &mut columns));
         }
-        Self::sorted(candidates, columns, Chance::default())
-    }
-
-    /// The same with effects and the distribution of their best gain under `noise` alone.
-    pub(crate) fn with_chance(screen: &Screen, known: &Known, noise: &Noise) -> Self {
-        let mut columns = Vec::new();
-        let mut candidates = screen.base_candidates(&mut columns);
-        let (effects, chance) = screen.effect_candidates(known, Some(noise), &mut columns);
-        candidates.extend(effects);
-        Self::sorted(candidates, columns, chance)
-    }
-
-    fn sorted(mut candidates: Vec<Candidate>, columns: Vec<Vec<f64>>, chance: Chance) -> Self {
         order::descending(&mut candidates, |one| one.held_out);
         Self {
             candidates,
             columns,
-            chance,
         }
     }
 
@@ -323,46 +305,25 @@ impl Screen<'_> {
         term
     }
 
-    /// Screened effects with their changes on the estimation samples, best first; infeasible ones are left
-    /// out. The share of noise alone that each explains is added to `by_chance`; only for this do the free
-    /// runs cover the validation samples too.
-    fn rated(
-        &self,
-        terms: Vec<Term>,
-        noise: Option<&Noise>,
-        by_chance: &mut Vec<(String, Vec<Taken>)>,
-    ) -> Vec<Rated> {
-        let all = parallel::some(terms, |term| {
+    /// Screened effects with their changes on the estimation samples, best first; infeasible ones are left out.
+    fn rated(&self, terms: Vec<Term>) -> Vec<Rated> {
+        let mut rated = parallel::some(terms, |term| {
             let with = term.added_to(self.model, &[]);
-            let mut column = match noise {
-                Some(_) => self.change(&with)?,
-                None => self.change_on(0..self.learning(), &with)?,
-            };
+            let mut column = self.change_on(0..self.learning(), &with)?;
             let before = self.learned_square(&column);
             let along = self.residualise(&mut column);
             let after = self.learned_square(&column);
             let shows = after > 1e-10 * before && after > 0.0;
             let (scale, learned, _) = self.regress(&[&column]).filter(|_| shows)?;
-            let makes_sense = |scale: f64| Self::is_feasible(&term, scale);
-            let taken = noise.map(|noise| noise.taken(self, &column, makes_sense));
-            let feasible = makes_sense(scale[0]);
-            let rated = Rated {
+            Self::is_feasible(&term, scale[0]).then_some(Rated {
                 learned: 1.0 - learned,
                 scale: scale[0],
                 column,
                 along,
                 with,
                 term,
-            };
-            Some((rated, feasible, taken))
+            })
         });
-        let mut rated = Vec::new();
-        for (one, feasible, taken) in all {
-            by_chance.extend(taken.map(|taken| (one.term.name(), taken)));
-            if feasible {
-                rated.push(one);
-            }
-        }
         order::descending(&mut rated, |one| one.learned);
         rated
     }
@@ -370,14 +331,12 @@ impl Screen<'_> {
     /// A screened effect with its change on the validation samples; `None` if it diverges there.
     fn held_out(&self, rated: Rated) -> Option<(Candidate, Vec<f64>)> {
         let mut changed = rated.column;
-        if changed.len() < self.error.len() {
-            let mut others = self.change_on(self.learning()..self.records.len(), &rated.with)?;
-            for (direction, along) in self.basis.iter().zip(&rated.along) {
-                let pairs = others.iter_mut().zip(&direction[self.learned..]);
-                pairs.for_each(|(x, d)| *x -= along * d);
-            }
-            changed.append(&mut others);
+        let mut others = self.change_on(self.learning()..self.records.len(), &rated.with)?;
+        for (direction, along) in self.basis.iter().zip(&rated.along) {
+            let pairs = others.iter_mut().zip(&direction[self.learned..]);
+            pairs.for_each(|(x, d)| *x -= along * d);
         }
+        changed.append(&mut others);
         let (error, own) = (&self.error[self.learned..], &changed[self.learned..]);
         let gain = rated.scale * (2.0 * dot(own, error) - rated.scale * dot(own, own));
         let candidate = Candidate {
@@ -389,13 +348,7 @@ impl Screen<'_> {
         Some((candidate, changed))
     }
 
-    fn effect_candidates(
-        &self,
-        known: &Known,
-        noise: Option<&Noise>,
-        columns: &mut Vec<Vec<f64>>,
-    ) -> (Vec<Candidate>, Chance) {
-        let mut by_chance = Vec::new();
+    fn effect_candidates(&self, known: &Known, columns: &mut Vec<Vec<f64>>) -> Vec<Candidate> {
         let specs = self.model.candidates();
         let specs = specs.filter(|spec| self.pointless(spec).is_none());
         let with_grading = |spec: &'static Spec, parameters: Vec<f64>, grading: Grading| {
@@ -414,7 +367,7 @@ impl Screen<'_> {
             })
             .map(|(spec, parameters)| with_grading(spec, parameters, self.model.grading))
             .collect();
-        let mut rated = self.rated(terms, noise, &mut by_chance);
+        let mut rated = self.rated(terms);
         // The response to jets of part strength can only be identified if there are such jets.
         if self.judge.on_off && !has_jet_effect(self.model) {
             let mut met: Vec<&str> = Vec::new();
@@ -438,7 +391,7 @@ impl Screen<'_> {
                         .map(|g| with_grading(spec, parameters.clone(), g)),
                 );
             }
-            rated.extend(self.rated(others, noise, &mut by_chance));
+            rated.extend(self.rated(others));
             order::descending(&mut rated, |one| one.learned);
         }
         let mut met = Vec::new();
@@ -455,7 +408,7 @@ impl Screen<'_> {
             columns.push(column);
             kept.push(candidate);
         }
-        (kept, Chance::of(by_chance))
+        kept
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{Words, aligned, lines, short};
 use host_fit::diagnose::{Diagnosis, ParameterEstimate, RULES, Ranked, Rung};
 use host_fit::residual::Failures;
-use host_fit::steps::{Finding, Terms};
+use host_fit::steps::{Finding, Terms, p_bound};
 use model_core::effects::spec;
 
 impl Words for Finding {
@@ -132,8 +132,7 @@ fn outcome(r: &Ranked, diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// The candidates, the named ones first: effect, outcome, error reduction, 5 % level of noise alone, p,
-/// parameters.
+/// The candidates, the named ones first: effect, outcome, error reduction, evidence, p, parameters.
 pub(crate) fn ranking_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
     let row = |r: &Ranked| {
         // Parameters of a candidate without a gain are meaningless.
@@ -148,9 +147,10 @@ pub(crate) fn ranking_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
             r.effect.clone(),
             outcome(r, diagnosis),
             percent(r.error_reduction_percent),
-            percent(r.by_chance_percent),
+            r.gain_nats
+                .map_or_else(|| "–".to_owned(), |nats| format!("{nats:.0}")),
             if r.refitted {
-                format!("{:.3}", r.p_value)
+                p_bound(r.p_value)
             } else {
                 "–".to_owned()
             },
@@ -180,7 +180,7 @@ fn ranking_table(diagnosis: &Diagnosis) -> String {
         "each candidate alone",
         "outcome",
         "error falls",
-        "5 % level",
+        "nats",
         "p",
         "parameters (95 % interval)",
     ];

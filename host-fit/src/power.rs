@@ -85,6 +85,8 @@ pub fn detectable(model: &Model, records: &[Record]) -> Result<Vec<Detectable>, 
 
 /// The threshold for naming an effect.
 struct Asked {
+    /// Standard deviations of the amplitude's estimate.
+    deviations: f64,
     /// Threshold on the energy, as a share of the validation error's.
     share: f64,
     /// Standard deviations that correspond to the required power.
@@ -94,19 +96,22 @@ struct Asked {
 impl Asked {
     fn of(judge: &Judge, given: &Model, held_out: &HeldOut) -> Self {
         // The e-value of the effect pays for the level, for the models that are tried, and for the coefficients that the
-        // model has without it. A share of the error of n independent samples is worth −n/2·ln(1 − share) nats.
+        // model has without it. An amplitude t standard deviations from 0 gains t²/2 nats, with standard deviation t.
         let likely = MostLikely::of(judge, given);
         let prior = likely.and_then(|likely| Some(likely.log_likelihood - likely.evidence(judge)?));
         let nats = prior.unwrap_or(0.0) - NAMED.level_of_search.ln() + (SPECS.len() as f64).ln();
-        let samples: usize = judge.scored_records().iter().map(Record::len).sum();
-        let independent = samples.max(1) as f64 / held_out.correlated();
-        let told = 1.0 - (-2.0 * nats.max(0.0) / independent).exp();
+        let often = Normal::standard().inverse_cdf(RULES.power);
+        // Amplitudes are estimated from all records.
+        let all: usize = judge.scored_records().iter().map(Record::len).sum();
+        let held_out_share = (held_out.samples as f64 / all.max(1) as f64).min(1.0);
         // An error that is at the noise level already leaves nothing to detect.
         let from_floor = (judge.over_noise(held_out.rmse()) / TERMS.at_the_floor).powi(2);
-        let taken = told.min(0.99).max(1.0 - from_floor);
+        let taken = (1.0 - from_floor).clamp(0.0, 0.99);
         Self {
+            deviations: (often + (often * often + 2.0 * nats.max(0.0)).sqrt())
+                * held_out_share.sqrt(),
             share: taken / (1.0 - taken),
-            often: Normal::standard().inverse_cdf(RULES.power),
+            often,
         }
     }
 
@@ -114,7 +119,7 @@ impl Asked {
     fn passes(&self, left: &Left, error: f64) -> f64 {
         let scatter = self.often * left.deviation;
         let wanted = scatter * scatter + left.energy * self.share * error;
-        (scatter + wanted.sqrt()) / left.energy
+        (scatter + wanted.sqrt()).max(self.deviations * left.deviation) / left.energy
     }
 
     /// The factor on the amplitude at which the effect is detected: `margin` times the one that passes beside

@@ -223,9 +223,10 @@ fn the_terms_of_the_field_are_said_and_explained() {
 
 /// The message that says what p-values and intervals are worth quotes the page that counted them.
 #[test]
-fn the_calibration_that_messages_quote_is_that_of_the_page() {
+fn the_calibration_that_messages_quote_is_that_of_the_pages() {
     let page = std::fs::read_to_string(root().join("docs/calibration.md")).expect("the page");
-    assert!(page.contains("| named although nothing is missing | 2 of 300 "));
+    let evidence = std::fs::read_to_string(root().join("docs/evidence.md")).expect("the page");
+    assert!(evidence.contains("0 of 70 rigs without an effect got a false name"));
     let held = page
         .lines()
         .filter(|line| line.starts_with("| 95 % intervals that hold"));
@@ -241,6 +242,6 @@ fn the_calibration_that_messages_quote_is_that_of_the_page() {
     assert!((held / all - 0.9).abs() < 0.02, "{held} of {all}");
     let verdict = root().join("host-fit/src/steps/verdict.rs");
     let said = texts(&verdict).join(" ");
-    assert!(said.contains("of 300 without a missing effect, 2 got a name"));
+    assert!(said.contains("of 70 without a missing effect, none got a false name"));
     assert!(said.contains("about 90 % of the cases"));
 }

@@ -201,7 +201,7 @@ impl Beginning {
             let trend = Shape::of(&y[..rest.min(window)], |k| k as f64);
             let noise = trend.left / (rest as f64 - 2.0).max(1.0);
             if rest < RULES.fewest_at_rest || trend.motion <= RULES.motion_over_noise * noise {
-                return Self::behind_an_edge(record, other, rest, reference);
+                return at_rest(other, rest);
             }
         }
         in_mid_run(dead_time, time)
@@ -221,16 +221,23 @@ impl Beginning {
         }
     }
 
-    /// At rest through the first samples under a command of `other`, with an edge near the first sample. When it was nobody
-    /// recorded: where the record shows further edges, what answers it is not scored.
-    fn behind_an_edge(record: &Record, other: f64, rest: usize, reference: &FirstOrder) -> Self {
-        let begun = Self::in_mid_run(record, other, reference.dead_time, reference.time_constant);
-        let later = record.u.windows(2).skip(begun.follow);
-        let shows_more = later.filter(|pair| pair[0] != pair[1]).count() > 1;
-        Self {
-            rest,
-            follow: if shows_more { begun.follow } else { 0 },
-            ..begun
+    /// Where records were cut out of a run, an edge near the first sample of one that rests may have been before it, and nobody
+    /// recorded when: what answers it is followed, as in mid-run, where the record shows further edges.
+    pub(super) fn distrust(beginnings: &mut [Self], records: &[Record], reference: &FirstOrder) {
+        if beginnings.iter().all(|own| own.follow == 0) {
+            return;
+        }
+        for (own, record) in beginnings.iter_mut().zip(records) {
+            let has_edge_before = record.u.first().is_some_and(|first| *first != own.command);
+            if !has_edge_before || record.u_before.is_some() {
+                continue;
+            }
+            let (dead_time, time) = (reference.dead_time, reference.time_constant);
+            let follow = Self::in_mid_run(record, own.command, dead_time, time).follow;
+            let later = record.u.windows(2).skip(follow);
+            if later.filter(|pair| pair[0] != pair[1]).count() > 1 {
+                own.follow = follow;
+            }
         }
     }
 
@@ -331,7 +338,11 @@ impl Beginning {
             let is_elsewhere =
                 own.follow > 0 || (level - reference.at_rest(first)).abs() > 0.5 * spread;
             if is_elsewhere && (level - mean(&under)).abs() < near {
-                *own = Self::behind_an_edge(record, other, early, reference);
+                *own = Self {
+                    command: other,
+                    rest: early,
+                    follow: 0,
+                };
             }
         }
     }
@@ -512,7 +523,8 @@ mod tests {
             let (u, y) = (command[from..].to_vec(), y[from..].to_vec());
             Record::new("part", Use::Identify, 0.001, u, y)
         };
-        let records = [from(0), from(301)];
+        // The third begins while y rises.
+        let records = [from(0), from(301), from(650)];
         let reference = FirstOrder::fitted(&records).unwrap();
         let mut beginnings = records
             .each_ref()
@@ -522,17 +534,21 @@ mod tests {
         Beginning::reconcile(&mut beginnings, &records, &reference);
         Beginning::recognise(&mut beginnings, &records, &reference);
         assert_eq!((beginnings[0].command, beginnings[0].follow), (0.0, 0));
+        assert_eq!((beginnings[1].command, beginnings[1].follow), (0.0, 0));
+        let together = &mut beginnings.clone()[..2];
+        Beginning::distrust(together, &records[..2], &reference);
+        assert_eq!(together, &beginnings[..2], "no record was cut out of a run");
+        Beginning::distrust(&mut beginnings, &records, &reference);
+        assert_eq!((beginnings[0].command, beginnings[0].follow), (0.0, 0));
         let edge_before = beginnings[1];
         assert!(edge_before.command == 0.0 && edge_before.rest > 0 && edge_before.follow > 20);
         // Without further edges its answer is all there is to score.
-        let step = Record::new(
-            "step",
-            Use::Identify,
-            0.001,
-            vec![1.0; 400],
-            response(&[1.0; 400]),
-        );
-        let own = Beginning::behind_an_edge(&step, 0.0, 5, &reference);
-        assert_eq!((own.rest, own.follow), (5, 0));
+        let short = Record {
+            u: records[1].u[..200].to_vec(),
+            ..records[1].clone()
+        };
+        let mut own = [together[1], beginnings[2]];
+        Beginning::distrust(&mut own, &[short, records[2].clone()], &reference);
+        assert_eq!(own[0], together[1]);
     }
 }

@@ -71,6 +71,7 @@ impl Preparation {
         if let Some(reference) = &reference {
             Beginning::reconcile(&mut beginnings, records, reference);
             Beginning::recognise(&mut beginnings, records, reference);
+            Beginning::distrust(&mut beginnings, records, reference);
         }
         let command = command::range_of(records, &beginnings, reference.as_ref());
         let mut prepared: Vec<Record> = records

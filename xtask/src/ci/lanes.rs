@@ -41,6 +41,8 @@ pub(super) fn run(steps: &[&'static Step]) -> Result<Vec<Done>> {
     std::fs::create_dir_all(&folder)?;
     // A step may build this program anew in its place.
     let program = folder.join("xtask");
+    // The copy of a run that was stopped may still be at work.
+    let _ = std::fs::remove_file(&program);
     std::fs::copy(std::env::current_exe()?, &program).context("could not copy this program")?;
     let (progress, changed) = (Mutex::new(Progress::default()), Condvar::new());
     std::thread::scope(|scope| {

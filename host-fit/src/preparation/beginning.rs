@@ -535,7 +535,8 @@ mod tests {
         Beginning::recognise(&mut beginnings, &records, &reference);
         assert_eq!((beginnings[0].command, beginnings[0].follow), (0.0, 0));
         assert_eq!((beginnings[1].command, beginnings[1].follow), (0.0, 0));
-        let together = &mut beginnings.clone()[..2];
+        let mut two = beginnings;
+        let together = &mut two[..2];
         Beginning::distrust(together, &records[..2], &reference);
         assert_eq!(together, &beginnings[..2], "no record was cut out of a run");
         Beginning::distrust(&mut beginnings, &records, &reference);

@@ -267,11 +267,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_to_be_seen_is_named_and_a_tenth_of_it_is_not() {
+    fn what_is_said_to_be_seen_is_named_and_a_sixth_of_it_is_not() {
         let records = records(&[], &[], 2);
         let model = base(&records);
         let effect = "hot-film-lag";
         assert_eq!(named(&model, &records, effect, 0.75), [effect]);
-        assert!(named(&model, &records, effect, 0.1).is_empty());
+        assert!(named(&model, &records, effect, 0.16).is_empty());
     }
 }

@@ -6,7 +6,7 @@ use super::ranking::Rival;
 use super::session::Session;
 use crate::model::Model;
 use crate::parallel;
-use crate::terms::{Found, Hypothesis, MostLikely};
+use crate::terms::{Found, Hypothesis, MostLikely, log_e, p_of};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::PoisonError;
@@ -41,7 +41,7 @@ impl Certificate {
     /// The p-value that the e-value bounds: by Markov's inequality at most its inverse.
     #[must_use]
     pub(super) fn p_value(&self) -> f64 {
-        (-self.log_e).exp().clamp(f64::MIN_POSITIVE, 1.0)
+        p_of(self.log_e)
     }
 
     /// Whether the effect is certified although part of the error stays unexplained. It must then explain most of the
@@ -139,11 +139,9 @@ impl Session<'_> {
         let left = self.judge().excess(&subject.judged.held_out);
         let without = nulls.iter().map(|null| null.excess);
         let without = without.fold(f64::INFINITY, f64::min);
-        // The e-value is divided by the number of structures tried.
-        let tried = (found.tried.max(1) as f64).ln();
         Some(Certificate {
             evidence_nats: own - evidence,
-            log_e: own - likelihood - tried,
+            log_e: log_e(own, likelihood, found.tried),
             alpha: RULES.level_of_search,
             records,
             share: 1.0 - left / without.max(f64::MIN_POSITIVE),

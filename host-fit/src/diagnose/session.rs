@@ -162,8 +162,6 @@ impl Session<'_> {
             })
             .collect();
         (search.progress)("the evidence of the models");
-        let likelihood = Likelihood::of(judge, last.judged.model());
-        let likelihood = likelihood.as_ref();
         let subject = if !order.is_empty() {
             &last
         } else if !named.is_bare() {
@@ -181,10 +179,15 @@ impl Session<'_> {
             true => (Verdict::PartlyExplained, false),
             false => (verdict, claims),
         };
-        let posterior = sets
-            .iter()
-            .take(if claims { way.proven } else { 0 })
-            .map(|set| likelihood.map_or_else(Vec::new, |all| set.posterior(all, &last.judged)))
+        let named_sets = sets.iter().take(if claims { way.proven } else { 0 });
+        let likelihood = claims.then(|| Likelihood::of(judge, last.judged.model()));
+        let likelihood = likelihood.flatten();
+        let posterior = |set: &Set| {
+            let all = likelihood.as_ref()?;
+            Some(set.posterior(all, &last.judged))
+        };
+        let posterior = named_sets
+            .map(|set| posterior(set).unwrap_or_default())
             .collect();
         let mut ranking = self.ranked(&context, &others, &found);
         for entry in &mut ranking {

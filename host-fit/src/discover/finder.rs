@@ -12,8 +12,8 @@ use crate::experiment::Separation;
 use crate::model::Model;
 use crate::order;
 use crate::terms::{
-    HeldOut, Hypothesis, Judge, Judged, MostLikely, Screen, Search, Table, Units, is_out, p_value,
-    shares_won,
+    HeldOut, Hypothesis, Judge, Judged, MostLikely, Screen, Search, Table, Units, is_out, log_e,
+    p_of, p_value, shares_won,
 };
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
@@ -230,12 +230,12 @@ impl Finder<'_> {
     /// (theory 4.5).
     fn p_value(&self, base: &Hypothesis, with: &Judged, looked_at: usize) -> f64 {
         let judge = self.search.judge;
-        let log_e = || {
+        let p = || {
             let own = MostLikely::of(judge, with.model())?.evidence(judge)?;
             let without = MostLikely::of(judge, base.judged.model())?.log_likelihood;
-            Some(own - without - (looked_at.max(1) as f64).ln())
+            Some(p_of(log_e(own, without, looked_at)))
         };
-        log_e().map_or(1.0, |log_e| (-log_e).exp().min(1.0))
+        p().unwrap_or(1.0)
     }
 
     /// A model in the user's units, and its `terms` in the order they were added.

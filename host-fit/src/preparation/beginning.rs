@@ -322,8 +322,8 @@ impl Beginning {
         for (own, record) in beginnings.iter_mut().zip(records) {
             let first = record.u.first().copied().unwrap_or(0.0);
             let other = levels.into_iter().find(|level| *level != first);
-            let is_of_its_own = |command: f64| own.command == command && record.u_before.is_none();
-            let Some(other) = other.filter(|_| is_of_its_own(first)) else {
+            let is_known = record.u_before.is_some() || own.command != first;
+            let Some(other) = other.filter(|_| !is_known) else {
                 continue;
             };
             let under: Vec<f64> = rests

@@ -21,9 +21,10 @@ const LEAST_P: f64 = 1e-6;
 /// A p-value that is known as a bound, with its sign of comparison.
 #[must_use]
 pub fn p_bound(p: f64) -> String {
-    match p < LEAST_P {
-        true => "< 10⁻⁶".to_owned(),
-        false => format!("≤ {}", significant(p, 2)),
+    match p {
+        p if p < LEAST_P => "< 10⁻⁶".to_owned(),
+        p if p < 1.0 => format!("≤ {}", significant(p, 2)),
+        _ => "= 1".to_owned(),
     }
 }
 
@@ -416,6 +417,12 @@ fn bench_check(sets: &[Vec<String>]) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_bound_on_p_is_said_with_its_sign() {
+        let said = [0.0, 0.012_34, 1.0].map(p_bound);
+        assert_eq!(said, ["< 10⁻⁶", "≤ 0.012", "= 1"]);
+    }
 
     #[test]
     fn what_cannot_be_told_from_a_name_stands_beside_it() {

@@ -72,6 +72,7 @@ mod tests {
         let own = one.judged.rmse();
         let two = search.again(&one, drift, own).expect("stable");
         assert!(over(two.rmse()) < 1.03, "{}", over(two.rmse()));
+        assert!(search.again(&one, drift, 0.2 * own).is_none());
         let echo = spec("echo-path").expect("in the catalogue");
         assert!(search.again(&one, echo, own).is_none());
     }

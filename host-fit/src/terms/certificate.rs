@@ -13,6 +13,17 @@ use crate::residual::NoiseSource;
 const STEPS: usize = 8;
 const HALVINGS: i32 = 8;
 
+/// ln of the e-value of a model with this `evidence` (ln, nats) against one with this largest `log_likelihood` (nats), the best
+/// of so many `tried` (theory 4.5).
+pub(crate) fn log_e(evidence: f64, log_likelihood: f64, tried: usize) -> f64 {
+    evidence - log_likelihood - (tried.max(1) as f64).ln()
+}
+
+/// The p-value that an e-value bounds: by Markov's inequality at most its inverse.
+pub(crate) fn p_of(log_e: f64) -> f64 {
+    (-log_e).exp().clamp(f64::MIN_POSITIVE, 1.0)
+}
+
 /// A model at its maximum-likelihood parameters.
 pub(crate) struct MostLikely {
     /// ln of the likelihood of all records up to a constant of the records, nats.

@@ -596,8 +596,7 @@ fn report_candidates(report: &mut Report, found: &Finding) {
         );
         report.table(
             "Nats: ln of the Bayes factor of the model with the effect against the model without it. p is family-wise: \
-             it is corrected for all models that were tried, and pays for the coefficients that both models have, so that \
-             it may be 1 where there are nats. Screened only: the first-order estimate was too small to refit.",
+             it is corrected for all models that were tried. Screened only: the first-order estimate was too small to refit.",
             &[
                 Column::Text("effect"),
                 Column::Text("outcome"),

@@ -16,9 +16,8 @@ use std::sync::PoisonError;
 pub struct Certificate {
     /// ln of the Bayes factor of the model with the effect against the best model without it, nats.
     pub evidence_nats: f64,
-    /// ln of the e-value against "no model without the effect needs more", nats: ln of the evidence of the
-    /// model with it, minus ln of the number of models tried, minus ln of the largest likelihood of any model
-    /// without it.
+    /// ln of the e-value against "no model without the effect needs more", nats: `evidence_nats` minus ln of the number
+    /// of models tried.
     pub log_e: f64,
     /// Level α, 0 to 1. The effect is certified if the log e-value is at least ln(1/α). At most a share α of
     /// certificates is false, provided that the noise model holds and the base class contains the true base.
@@ -77,8 +76,7 @@ impl Session<'_> {
         if terms_fewer == 0 || effects.is_empty() {
             return None;
         }
-        let before = self.likely(given)?.evidence?;
-        let nats = self.likely(last.judged.model())?.evidence? - before;
+        let nats = self.likely(last.judged.model())? - self.likely(given)?;
         (nats > 0.0).then(|| Parsimony {
             effects: effects.to_vec(),
             nats,
@@ -86,18 +84,15 @@ impl Session<'_> {
         })
     }
 
-    /// A model at its most likely parameters; `None` if its free run diverges. Several questions ask for the same models:
-    /// each is fitted once.
-    pub(super) fn likely(&self, model: &Model) -> Option<Likely> {
+    /// ln of the evidence of a model at its most likely parameters, nats; `None` if its free run diverges. Several questions
+    /// ask for the same models: each is fitted once.
+    pub(super) fn likely(&self, model: &Model) -> Option<f64> {
         let all = || self.likely.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, met)) = all().iter().find(|(met, _)| met == model) {
             return *met;
         }
         let judge = self.judge();
-        let likely = MostLikely::of(judge, model).map(|likely| Likely {
-            log_likelihood: likely.log_likelihood,
-            evidence: likely.evidence(judge),
-        });
+        let likely = MostLikely::of(judge, model).and_then(|likely| likely.evidence(judge));
         all().push((model.clone(), likely));
         likely
     }
@@ -113,11 +108,8 @@ impl Session<'_> {
     }
 
     fn null(&self, hypothesis: &Hypothesis) -> Option<Null> {
-        let likely = self.likely(hypothesis.judged.model())?;
         Some(Null {
-            log_likelihood: likely.log_likelihood,
-            // Where the evidence cannot be computed, the likelihood is used.
-            evidence: likely.evidence.unwrap_or(f64::NEG_INFINITY),
+            evidence: self.likely(hypothesis.judged.model())?,
             excess: self.judge().excess(&hypothesis.judged.held_out),
         })
     }
@@ -129,10 +121,8 @@ impl Session<'_> {
         nulls: &[Null],
         found: &Found,
     ) -> Option<Certificate> {
-        let own = self.likely(subject.judged.model())?.evidence?;
-        let most = |of: fn(&Null) -> f64| nulls.iter().map(of).reduce(f64::max);
-        let likelihood = most(|null| null.log_likelihood)?;
-        let evidence = most(|null| null.evidence)?;
+        let own = self.likely(subject.judged.model())?;
+        let most = nulls.iter().map(|null| null.evidence).reduce(f64::max)?;
         let all = self.judge().first_fold();
         let mut records: Vec<String> = all.iter().map(|record| record.name.clone()).collect();
         records.dedup();
@@ -140,15 +130,15 @@ impl Session<'_> {
         let without = nulls.iter().map(|null| null.excess);
         let without = without.fold(f64::INFINITY, f64::min);
         Some(Certificate {
-            evidence_nats: own - evidence,
-            log_e: log_e(own, likelihood, found.tried),
+            evidence_nats: own - most,
+            log_e: log_e(own, most, found.tried),
             alpha: RULES.level_of_search,
             records,
             share: 1.0 - left / without.max(f64::MIN_POSITIVE),
         })
     }
 
-    /// The certificate of each effect of `subject`: the evidence of that model over the largest likelihood of
+    /// The certificate of each effect of `subject`: the evidence of that model over the largest of
     /// all models that contain neither the effect nor another member of its equivalence set.
     pub(super) fn certificates(
         &self,
@@ -202,18 +192,10 @@ impl Session<'_> {
     }
 }
 
-/// A model at its most likely parameters, nats.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Likely {
-    pub(super) log_likelihood: f64,
-    /// ln of the evidence; `None` where it cannot be computed.
-    pub(super) evidence: Option<f64>,
-}
-
 /// What a certificate needs of a model that lacks the effect.
 #[derive(Clone, Copy)]
 struct Null {
-    log_likelihood: f64,
+    /// ln of it, nats.
     evidence: f64,
     /// Variance above the noise on the validation samples, y².
     excess: f64,

@@ -199,8 +199,7 @@ pub struct Diagnosis {
     pub not_tried: Vec<NotTried>,
     /// The experiment that would distinguish the members of an equivalence set.
     pub separation: Option<Separation>,
-    /// Family-wise p-value of the named effects or surrogates, as their e-value bounds it. None without any, or where effects
-    /// were named for fitting equally well with fewer parameters and more evidence.
+    /// Family-wise p-value of the named effects or surrogates, as their e-value bounds it; none without any.
     pub p_value: Option<f64>,
     /// The final model.
     pub model: Model,

@@ -1,7 +1,7 @@
 //! A diagnosis in progress: from the result of the search to the final answer.
 
 use super::alternatives::Set;
-use super::certificate::{Certificate, Likely};
+use super::certificate::Certificate;
 use super::estimate::{estimates_among, is_identified};
 use super::memory::memory;
 use super::outcome::Conclusion;
@@ -22,7 +22,7 @@ pub(super) struct Session<'a> {
     pub(super) units: Units,
     pub(super) options: &'a Options,
     /// Models at their most likely parameters, as far as they were asked for.
-    pub(super) likely: Mutex<Vec<(Model, Option<Likely>)>>,
+    pub(super) likely: Mutex<Vec<(Model, Option<f64>)>>,
 }
 
 /// The ladder from the first effect to the last.
@@ -245,9 +245,7 @@ impl Session<'_> {
             ladder,
             ranking,
             parameters,
-            evidence_nats: self
-                .likely(last.judged.model())
-                .and_then(|own| own.evidence),
+            evidence_nats: self.likely(last.judged.model()),
             certificates,
             parsimony,
             posterior,

@@ -1,7 +1,6 @@
 //! The verdict: whether anything is missing, and which effects are significant.
 
 use super::certificate::Certificate;
-use super::estimate::is_identified;
 use super::outcome::Conclusion;
 use super::session::Session;
 use super::{RULES, Verdict};
@@ -148,23 +147,6 @@ impl Session<'_> {
         best
     }
 
-    /// Whether identified effects fit as well as the lags of a base that fits, with fewer parameters and more evidence, and
-    /// the rest of the model needs them.
-    fn is_parsimonious(&self, best: &Hypothesis, found: &Found, certificate: &Certificate) -> bool {
-        let known = self.judge().noise_source != NoiseSource::Scatter;
-        let end = self.judge().final_fit(&best.judged);
-        let mut effects = best.terms.iter().filter_map(Term::effect);
-        let needed = || {
-            let without = self.search.without_effects(best, &found.root, |_| true);
-            !(without.is_bare() && self.fits(&without.judged))
-        };
-        known
-            && is_leaner(best, &found.bare)
-            && certificate.evidence_nats >= -certificate.alpha.ln()
-            && effects.all(|spec| is_identified(&end, spec))
-            && needed()
-    }
-
     /// The verdict on `best` compared with the best model without effects.
     pub(super) fn concluded(
         &self,
@@ -195,11 +177,10 @@ impl Session<'_> {
         }
         let certificate = (!judge.drifts_more(&best.judged, &bare.judged))
             .then(|| self.certified(best, bare, found))
-            .flatten();
-        let p_value = match certificate {
-            Some(certificate) if certificate.holds() => Some(certificate.p_value()),
-            Some(certificate) if self.is_parsimonious(best, found, &certificate) => None,
-            _ => return of_bare(),
+            .flatten()
+            .filter(Certificate::holds);
+        let Some(certificate) = certificate else {
+            return of_bare();
         };
         let left = judge.excess(&best.judged.held_out)
             / judge.excess(&bare.judged.held_out).max(f64::MIN_POSITIVE);
@@ -230,7 +211,7 @@ impl Session<'_> {
             },
             model: best.clone(),
             effects,
-            p_value,
+            p_value: Some(certificate.p_value()),
         }
     }
 }

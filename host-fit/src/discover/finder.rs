@@ -231,9 +231,12 @@ impl Finder<'_> {
     fn p_value(&self, base: &Hypothesis, with: &Judged, looked_at: usize) -> f64 {
         let judge = self.search.judge;
         let p = || {
-            let own = MostLikely::of(judge, with.model())?.evidence(judge)?;
-            let without = MostLikely::of(judge, base.judged.model())?.log_likelihood;
-            Some(p_of(log_e(own, without, looked_at)))
+            let evidence = |of: &Judged| MostLikely::of(judge, of.model())?.evidence(judge);
+            Some(p_of(log_e(
+                evidence(with)?,
+                evidence(&base.judged)?,
+                looked_at,
+            )))
         };
         p().unwrap_or(1.0)
     }

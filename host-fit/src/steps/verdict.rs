@@ -228,13 +228,8 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
 
 /// The confidence in the named effects, with its test.
 fn confidence(diagnosis: &Diagnosis) -> String {
-    match diagnosis.p_value {
-        Some(p) => {
-            format!("Family-wise p {} over {} models.", p_bound(p), diagnosis.tried)
-        }
-        None => "Chosen by parsimony, not by a significance test: the model with it fits equally well with fewer parameters."
-            .to_owned(),
-    }
+    let p = p_bound(diagnosis.p_value.unwrap_or(1.0));
+    format!("Family-wise p {p} over {} models.", diagnosis.tried)
 }
 
 /// The reduction of the error by the named effects. Where additional lags of the given model fit equally well, it is
@@ -244,7 +239,7 @@ fn fall(diagnosis: &Diagnosis, with: &str) -> String {
     let [given, last] = [diagnosis.ladder.first(), diagnosis.ladder.last()].map(rmse);
     let error = error_name(diagnosis);
     let fewest = diagnosis.ladder.get(1);
-    let lags_do = diagnosis.p_value.is_none() || last > (1.0 - RULES.worthwhile) * given;
+    let lags_do = last > (1.0 - RULES.worthwhile) * given;
     match fewest.filter(|rung| lags_do && rung.effects.is_empty()) {
         Some(fewest) => format!(
             "Beside the fewest lags, {with} lowers the {error} {}; without it, additional lags fit equally well.",

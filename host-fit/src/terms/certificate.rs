@@ -13,10 +13,10 @@ use crate::residual::NoiseSource;
 const STEPS: usize = 8;
 const HALVINGS: i32 = 8;
 
-/// ln of the e-value of a model with this `evidence` (ln, nats) against one with this largest `log_likelihood` (nats), the best
-/// of so many `tried` (theory 4.5).
-pub(crate) fn log_e(evidence: f64, log_likelihood: f64, tried: usize) -> f64 {
-    evidence - log_likelihood - (tried.max(1) as f64).ln()
+/// ln of the e-value of a model with this `evidence` (ln, nats) against one `without` what is tested, the best of so many
+/// `tried` (theory 4.5).
+pub(crate) fn log_e(evidence: f64, without: f64, tried: usize) -> f64 {
+    evidence - without - (tried.max(1) as f64).ln()
 }
 
 /// The p-value that an e-value bounds: by Markov's inequality at most its inverse.
@@ -27,7 +27,7 @@ pub(crate) fn p_of(log_e: f64) -> f64 {
 /// A model at its maximum-likelihood parameters.
 pub(crate) struct MostLikely {
     /// ln of the likelihood of all records up to a constant of the records, nats.
-    pub(crate) log_likelihood: f64,
+    log_likelihood: f64,
     model: Model,
     noise: NoiseModel,
     records: Vec<Weighed>,

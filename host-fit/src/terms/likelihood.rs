@@ -226,7 +226,7 @@ fn scored_variance(judge: &Judge, record: &Record, variance: &[f64]) -> Vec<f64>
 
 #[cfg(test)]
 mod tests {
-    use super::super::certificate::MostLikely;
+    use super::super::certificate::{MostLikely, log_e};
     use super::*;
     use crate::data::Use;
     use crate::fit::FitOptions;
@@ -293,7 +293,8 @@ mod tests {
         );
     }
 
-    /// A lag that is not in the plant is never certified; the product that is there always is.
+    /// A lag that is not in the plant is never certified; the product that is there always is. What both models have
+    /// costs neither anything.
     #[test]
     fn certificates_are_of_what_is_there() {
         for seed in 0..12 {
@@ -307,10 +308,12 @@ mod tests {
             });
             let needless = likely(model(&[0.97, 0.001], -0.01));
             let log_e = |with: &MostLikely, without: &MostLikely| {
-                with.evidence(&judge).expect("stable") - without.log_likelihood
+                let of = |model: &MostLikely| model.evidence(&judge).expect("stable");
+                log_e(of(with), of(without), 1)
             };
             assert!(log_e(&truth, &linear) > 100.0, "{seed}");
             assert!(log_e(&needless, &truth) < 0.0, "{seed}");
+            assert_eq!(log_e(&truth, &truth), 0.0);
         }
     }
 }

@@ -99,8 +99,8 @@ impl Asked {
         // Amplitudes are estimated from all records.
         let all: usize = judge.scored_records().iter().map(Record::len).sum();
         let held_out_share = (held_out.samples as f64 / all.max(1) as f64).min(1.0);
-        // An error that is at the noise level already leaves nothing to detect.
-        let from_floor = (judge.over_noise(held_out.rmse()) / TERMS.at_the_floor).powi(2);
+        // Up to the margin an error counts as noise, and nothing is named.
+        let from_floor = (judge.over_noise(held_out.rmse()) / NAMED.floor_margin).powi(2);
         let taken = (1.0 - from_floor).clamp(0.0, 0.99);
         // The e-value of the effect pays for the level, the models that are tried, and the effect's own parameters: the
         // amplitude, and one that shapes it. An amplitude t standard deviations from 0 gains t²/2 nats, with standard

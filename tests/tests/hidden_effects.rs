@@ -71,6 +71,7 @@ fn a_memory_of_the_flow_is_no_missing_effect() {
 /// What `identify` makes of the rig alone is near the noise level: a wake that nobody saw begin, and a delay
 /// that shortens up to a level only.
 #[test]
+#[ignore = "half a minute of processor time: cargo xtask kept-rigs"]
 fn the_default_model_comes_near_the_noise_in_mid_run_and_under_other_laws() {
     let in_mid_run = Case {
         nuisances: vec![Nuisance::MidRun],
@@ -92,6 +93,7 @@ fn the_default_model_comes_near_the_noise_in_mid_run_and_under_other_laws() {
 /// The level of each record is off by a per cent, as the tunnel's speed never comes back exactly: no effect bends to that, and
 /// the base is the flow's, a rate that depends on y.
 #[test]
+#[ignore = "half a minute of processor time: cargo xtask kept-rigs"]
 fn what_scatters_between_repeats_gets_no_name() {
     // On a part of the records the scatter leaves nothing above the noise, which would test nothing.
     let row = asked_of_all(&Case {
@@ -251,6 +253,7 @@ fn two_effects_of_which_one_imitates_both_are_found() {
 }
 
 #[test]
+#[ignore = "half a minute of processor time: cargo xtask kept-rigs"]
 fn what_the_catalogue_does_not_have_is_not_named() {
     let row = asked_of_all(&Case {
         given: Given::Guess,

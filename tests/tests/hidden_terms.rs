@@ -78,6 +78,7 @@ fn is_found(family: Family, hidden: &str, seed: u64) {
 }
 
 #[test]
+#[ignore = "the demo finds one in CI; this one: cargo xtask kept-rigs"]
 fn a_jet_that_tires_with_every_pulse_is_found() {
     // Where a part jet changes the level and not the rate, a sensor that tires shows the same.
     let bilinear = |seed: &u64| {

@@ -29,14 +29,11 @@ fn bundled_sets_are_answered_right() {
     all_right(&options(Vec::new(), &[]), 12);
 }
 
-/// Measured sets, where the folder with them is there: as good as the best baseline, and printed as written.
+/// As good as the best baseline, and printed as written.
 #[test]
+#[ignore = "measured sets, which are not part of the project: cargo xtask kept-rigs"]
 fn measured_sets_are_no_worse_than_the_baselines() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/real");
-    if !folder.is_dir() {
-        eprintln!("skipped: {} is not there", folder.display());
-        return;
-    }
     // The others have tens of thousands of samples: `cargo xtask strangers --folder`.
     let small = ["ball", "buck", "dc_motor", "gas", "hair", "halogen"];
     all_right(&options(vec![folder], &small), small.len());

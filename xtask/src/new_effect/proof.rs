@@ -184,7 +184,7 @@ fn recordings(folder: &Path) -> Result<std::path::PathBuf> {
     for (name, role, half_period) in RECORDS {
         let mut table = String::from("t,u,y\n");
         let (mut friction, mut commands) = (vec![0.0_f64], Vec::new());
-        for k in 0..3000_usize {
+        for k in 0..1800_usize {
             let u = f64::from(u8::from(k / half_period % 2 == 1 && k / 60 % 5 != 3));
             commands.push(u);
             let y = friction[k];

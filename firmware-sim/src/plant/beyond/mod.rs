@@ -158,28 +158,26 @@ mod tests {
     fn every_physics_draws_valid_values_changes_the_reading_and_has_a_place_and_a_coordinate() {
         for name in Beyond::NAMES {
             assert!(!Effect::NAMES.contains(name) && !Altered::NAMES.contains(name));
-            for seed in 0..3 {
-                let mut rng = ChaCha8Rng::seed_from_u64(seed);
-                let base = BasePlant::draw(&mut rng);
-                let physics = Beyond::draw(name, &base, &mut rng).unwrap();
-                physics.validate().unwrap();
-                let truth = physics.truth();
-                assert!(!truth.coordinates.is_empty() && !physics.parameters().is_empty());
-                // 2 Hz, with a rest of one second at the end.
-                let on = |k: usize| k < 7500 && k % 500 >= 250;
-                let command: Vec<f64> = (0..8500).map(|k| f64::from(u8::from(on(k)))).collect();
-                let stream = FreeStream::draw(&mut rng, command.len());
-                let play = |beyond: Vec<Beyond>| {
-                    let plain = PlantSpec::new(base, &[]);
-                    let spec = PlantSpec { beyond, ..plain };
-                    let rig = Rig::new(&spec, Some(stream.clone()));
-                    rig.unwrap().play(&command)
-                };
-                let (without, with) = (play(Vec::new()), play(vec![physics]));
-                let off = with.iter().zip(&without).map(|(a, b)| (a - b) * (a - b));
-                let rms = (off.sum::<f64>() / 8500.0).sqrt();
-                assert!((0.003..1.0).contains(&rms), "{name}: {rms}, {physics:?}");
-            }
+            let mut rng = ChaCha8Rng::seed_from_u64(0);
+            let base = BasePlant::draw(&mut rng);
+            let physics = Beyond::draw(name, &base, &mut rng).unwrap();
+            physics.validate().unwrap();
+            let truth = physics.truth();
+            assert!(!truth.coordinates.is_empty() && !physics.parameters().is_empty());
+            // 2 Hz, with a rest of one second at the end.
+            let on = |k: usize| k < 7500 && k % 500 >= 250;
+            let command: Vec<f64> = (0..8500).map(|k| f64::from(u8::from(on(k)))).collect();
+            let stream = FreeStream::draw(&mut rng, command.len());
+            let play = |beyond: Vec<Beyond>| {
+                let plain = PlantSpec::new(base, &[]);
+                let spec = PlantSpec { beyond, ..plain };
+                let rig = Rig::new(&spec, Some(stream.clone()));
+                rig.unwrap().play(&command)
+            };
+            let (without, with) = (play(Vec::new()), play(vec![physics]));
+            let off = with.iter().zip(&without).map(|(a, b)| (a - b) * (a - b));
+            let rms = (off.sum::<f64>() / 8500.0).sqrt();
+            assert!((0.003..1.0).contains(&rms), "{name}: {rms}, {physics:?}");
         }
     }
 

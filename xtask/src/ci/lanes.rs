@@ -1,4 +1,4 @@
-//! Steps of CI, two at a time. Each is a process of its own; its output is kept together and printed when it has ended.
+//! Steps of CI, three at a time. Each is a process of its own; its output is kept together and printed when it has ended.
 
 use super::{BUILD, Step};
 use crate::shell::target;
@@ -9,8 +9,8 @@ use std::process::{Command, Stdio};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// Steps at a time: CI has two cores, and most steps keep one of them busy.
-const LANES: usize = 2;
+/// Steps at a time: CI has two cores, and a step in three waits for a browser, an emulator or a disk.
+const LANES: usize = 3;
 /// How the last lines of a step's output begin ([`alone`]).
 const FAILED: &str = "step failed: ";
 const CPU: &str = "step used CPU seconds: ";

@@ -1,4 +1,4 @@
-//! Everything CI runs, in one command: two steps at a time; failures are collected, not fatal.
+//! Everything CI runs, in one command: three steps at a time; failures are collected, not fatal.
 
 mod lanes;
 mod slowest;
@@ -66,12 +66,26 @@ const STEPS: &[Step] = &[
         room: None,
         run: || crate::setup::setup(&[]),
     },
-    // The README's test command; documentation examples are part of it.
+    // The README's test command; documentation examples are part of it. Everything is compiled, so that it is soon out of the
+    // others' way.
     Step {
         name: "tests",
         after: &[BUILD],
-        room: Some(Room::Host),
+        room: None,
         run: || run(&mut cargo(&["test", "--release", "--workspace"])),
+    },
+    // What a report carries is what the sources give.
+    Step {
+        name: "pages",
+        after: &[SET_UP],
+        room: None,
+        run: || crate::pages::pages(&["--check".to_owned()]),
+    },
+    Step {
+        name: "browser",
+        after: &[BUILD, "pages"],
+        room: None,
+        run: || crate::browser::browser(&[]),
     },
     Step {
         name: "lints",
@@ -137,13 +151,6 @@ const STEPS: &[Step] = &[
         after: &[BUILD],
         room: None,
         run: crate::fuzz::brief,
-    },
-    // What a report carries is what the sources give.
-    Step {
-        name: "pages",
-        after: &[SET_UP],
-        room: None,
-        run: || crate::pages::pages(&["--check".to_owned()]),
     },
     // The book's pages are what the catalogue gives, and every link of them leads somewhere.
     Step {
@@ -264,12 +271,6 @@ const STEPS: &[Step] = &[
         after: &[SET_UP, BUILD],
         room: Some(Room::Firmware),
         run: demo_on_board,
-    },
-    Step {
-        name: "browser",
-        after: &[BUILD, "pages"],
-        room: None,
-        run: || crate::browser::browser(&[]),
     },
 ];
 

@@ -16,7 +16,7 @@ use crate::picture::significant;
 use crate::rules;
 use crate::simulate::SimulateError;
 use crate::terms::{
-    Bench, HeldOut, Judge, Known, Left, RULES as TERMS, Screen, Shown, Units, Unnamed,
+    Bench, HeldOut, Judge, Known, Left, MostLikely, RULES as TERMS, Screen, Shown, Units, Unnamed,
 };
 use model_core::effect::{Parameter, Spec};
 use model_core::effects::SPECS;
@@ -73,7 +73,7 @@ pub fn detectable(model: &Model, records: &[Record]) -> Result<Vec<Detectable>, 
     let detector = Detector {
         unnamed: Unnamed::of(&screen, &known),
         block: held_out.block(),
-        asked: Asked::of(&bench.judge, &held_out),
+        asked: Asked::of(&bench.judge, &bench.given, &held_out),
         units: &bench.units,
         screen,
     };
@@ -94,20 +94,22 @@ struct Asked {
 }
 
 impl Asked {
-    fn of(judge: &Judge, held_out: &HeldOut) -> Self {
+    fn of(judge: &Judge, given: &Model, held_out: &HeldOut) -> Self {
+        // The effect pays for the level, for the models that are tried, and for the coefficients of the model without it, all
+        // of which move to imitate it. An amplitude t standard deviations from 0 gains t²/2 nats, with standard deviation t.
+        let likely = MostLikely::of(judge, given);
+        let prior = likely.and_then(|likely| Some(likely.log_likelihood - likely.evidence(judge)?));
+        let nats = prior.unwrap_or(0.0) - NAMED.level_of_search.ln() + (SPECS.len() as f64).ln();
         let often = Normal::standard().inverse_cdf(RULES.power);
         // Amplitudes are estimated from all records.
         let all: usize = judge.scored_records().iter().map(Record::len).sum();
         let held_out_share = (held_out.samples as f64 / all.max(1) as f64).min(1.0);
-        // Up to the margin an error counts as noise, and nothing is named.
-        let from_floor = (judge.over_noise(held_out.rmse()) / NAMED.floor_margin).powi(2);
+        // An error that is at the noise level already leaves nothing to detect.
+        let from_floor = (judge.over_noise(held_out.rmse()) / TERMS.at_the_floor).powi(2);
         let taken = (1.0 - from_floor).clamp(0.0, 0.99);
-        // The e-value of the effect pays for the level, the models that are tried, and the effect's own parameters: the
-        // amplitude, and one that shapes it. An amplitude t standard deviations from 0 gains t²/2 nats, with standard
-        // deviation t.
-        let nats = (SPECS.len() as f64 / NAMED.level_of_search).ln() + (all.max(1) as f64).ln();
         Self {
-            deviations: (often + (often * often + 2.0 * nats).sqrt()) * held_out_share.sqrt(),
+            deviations: (often + (often * often + 2.0 * nats.max(0.0)).sqrt())
+                * held_out_share.sqrt(),
             share: taken / (1.0 - taken),
             often,
         }

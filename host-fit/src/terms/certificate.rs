@@ -27,7 +27,7 @@ pub(crate) fn p_of(log_e: f64) -> f64 {
 /// A model at its maximum-likelihood parameters.
 pub(crate) struct MostLikely {
     /// ln of the likelihood of all records up to a constant of the records, nats.
-    log_likelihood: f64,
+    pub(crate) log_likelihood: f64,
     model: Model,
     noise: NoiseModel,
     records: Vec<Weighed>,

@@ -192,7 +192,7 @@ fn averaged_models_are_refined_on_their_free_run() {
 fn the_validation_error_decides_between_a_law_and_a_constant_delay() {
     let sizes = ["--n1", "2", "--n2", "2", "--max-lag", "150"];
     let fit = |set: &str, delay: &str| {
-        let options = ["--evaluations", "300", "--delay", delay];
+        let options = ["--evaluations", "600", "--delay", delay];
         let (document, model) = found(set, &[&sizes[..], &options].concat());
         let fit = document["validate"]["fit_percent"].as_f64();
         (

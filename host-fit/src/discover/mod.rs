@@ -122,9 +122,11 @@ pub fn discover(
         options,
         moving_zero: moving_zero.is_some(),
     };
-    let rung = |hypothesis: &Hypothesis, terms: &[String], step: &str| {
-        let held_out = &hypothesis.judged.held_out;
-        Rung::of(judge, units, held_out, terms, step, None)
+    let rung = |hypothesis: &Hypothesis, terms: &[&Term], step: &str| {
+        let judged = &hypothesis.judged;
+        let model = finder.outer(&judge.final_fit(judged).model, terms).0;
+        let names: Vec<String> = terms.iter().map(|term| term.name()).collect();
+        Rung::of(judge, units, &judged.held_out, &names, step, Some(model))
     };
     progress("the model as given");
     let as_given = judge.held_out(|_| &bench.given)?;
@@ -160,7 +162,7 @@ pub fn discover(
     }
     let mut found = Vec::new();
     let mut smallest = None;
-    let (mut looked_at, mut names) = (0, Vec::new());
+    let mut looked_at = 0;
     // A term describes how the response depends on a coordinate, which few records hardly show.
     let most = match says_little(records) {
         Some(_) => 0,
@@ -176,9 +178,9 @@ pub fn discover(
             .map(|before: &Found| before.term.clone())
             .collect();
         current = term.with.clone();
-        names.push(term.term.name());
         let step = format!("with {}", term.term.name());
-        ladder.push(rung(&current, &names, &step));
+        let own: Vec<&Term> = term.beside.iter().chain([&term.term]).collect();
+        ladder.push(rung(&current, &own, &step));
         if missing(current.judged.rmse()) && found.len() + 1 < options.terms {
             finder.better_as_formula(&mut term, &mut current);
         }
@@ -198,11 +200,11 @@ pub fn discover(
         .flatten();
     progress("formulas");
     let (terms, end) = finder.formulas(found, current);
+    let own: Vec<&Term> = terms.iter().map(|found| &found.term).collect();
     if !terms.is_empty() {
-        ladder.push(rung(&end, &names, "with formulas that fit equally well"));
+        ladder.push(rung(&end, &own, "with formulas that fit equally well"));
     }
     let fitted = judge.final_fit(&end.judged);
-    let own: Vec<&Term> = terms.iter().map(|found| &found.term).collect();
     let (mut model, written) = finder.outer(&fitted.model, &own);
     if own.is_empty() && as_given.rmse() <= end.judged.rmse() {
         model = handed_in.clone();

@@ -131,7 +131,7 @@ pub fn discover(
 }
 
 /// The final model by its free-run error over whole `records`: the found one, or the given one if its error
-/// is smaller. The last step of the ladder shows the same.
+/// is smaller. Every step of the ladder is of whole records.
 fn as_written(
     discovery: &mut Discovery,
     given: &Model,
@@ -153,11 +153,12 @@ fn as_written(
     };
     if let Some(first) = discovery.ladder.first_mut() {
         first.model = Some(given.clone());
-        first.as_compared(records);
     }
     if let Some(last) = discovery.ladder.last_mut() {
         last.model = Some(discovery.model.clone());
-        last.as_compared(records);
+    }
+    for rung in &mut discovery.ladder {
+        rung.as_compared(records);
     }
     Ok((scores, runs))
 }

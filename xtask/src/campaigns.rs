@@ -42,6 +42,7 @@ pub(crate) const KEPT: Task = Task {
         run(&mut cargo(&[
             "test",
             "--release",
+            "--no-fail-fast",
             "--package=scenarios",
             "--test=hidden_effects",
             "--test=hidden_terms",

@@ -76,7 +76,7 @@ impl Session<'_> {
         if terms_fewer == 0 || effects.is_empty() {
             return None;
         }
-        let nats = self.likely(last.judged.model())? - self.likely(given)?;
+        let nats = self.evidence_of(last.judged.model())? - self.evidence_of(given)?;
         (nats > 0.0).then(|| Parsimony {
             effects: effects.to_vec(),
             nats,
@@ -86,15 +86,19 @@ impl Session<'_> {
 
     /// ln of the evidence of a model at its most likely parameters, nats; `None` if its free run diverges. Several questions
     /// ask for the same models: each is fitted once.
-    pub(super) fn likely(&self, model: &Model) -> Option<f64> {
-        let all = || self.likely.lock().unwrap_or_else(PoisonError::into_inner);
+    pub(super) fn evidence_of(&self, model: &Model) -> Option<f64> {
+        let all = || {
+            self.evidences
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+        };
         if let Some((_, met)) = all().iter().find(|(met, _)| met == model) {
             return *met;
         }
         let judge = self.judge();
-        let likely = MostLikely::of(judge, model).and_then(|likely| likely.evidence(judge));
-        all().push((model.clone(), likely));
-        likely
+        let evidence = MostLikely::of(judge, model).and_then(|likely| likely.evidence(judge));
+        all().push((model.clone(), evidence));
+        evidence
     }
 
     /// The certificate of all effects of `subject` together, against one model without them.
@@ -109,7 +113,7 @@ impl Session<'_> {
 
     fn null(&self, hypothesis: &Hypothesis) -> Option<Null> {
         Some(Null {
-            evidence: self.likely(hypothesis.judged.model())?,
+            evidence: self.evidence_of(hypothesis.judged.model())?,
             excess: self.judge().excess(&hypothesis.judged.held_out),
         })
     }
@@ -121,7 +125,7 @@ impl Session<'_> {
         nulls: &[Null],
         found: &Found,
     ) -> Option<Certificate> {
-        let own = self.likely(subject.judged.model())?;
+        let own = self.evidence_of(subject.judged.model())?;
         let most = nulls.iter().map(|null| null.evidence).reduce(f64::max)?;
         let all = self.judge().first_fold();
         let mut records: Vec<String> = all.iter().map(|record| record.name.clone()).collect();
@@ -138,8 +142,7 @@ impl Session<'_> {
         })
     }
 
-    /// The certificate of each effect of `subject`: the evidence of that model over the largest of
-    /// all models that contain neither the effect nor another member of its equivalence set.
+    /// The certificate of each effect of `subject`: the evidence of that model over the largest of all models that contain neither the effect nor another member of its equivalence set.
     pub(super) fn certificates(
         &self,
         subject: &Hypothesis,
@@ -185,8 +188,9 @@ impl Session<'_> {
         }
         let nulls: Vec<Option<Null>> = parallel::each(&distinct, |null| self.null(null));
         let certificates = effects.into_iter().filter_map(|(name, places)| {
-            let nulls: Vec<Null> = places.into_iter().filter_map(|at| nulls[at]).collect();
-            Some((name, self.certificate(subject, &nulls, found)?))
+            // Against a model whose evidence is not known nothing is certified.
+            let nulls: Option<Vec<Null>> = places.into_iter().map(|at| nulls[at]).collect();
+            Some((name, self.certificate(subject, &nulls?, found)?))
         });
         certificates.collect()
     }
@@ -195,7 +199,7 @@ impl Session<'_> {
 /// What a certificate needs of a model that lacks the effect.
 #[derive(Clone, Copy)]
 struct Null {
-    /// ln of it, nats.
+    /// ln of the evidence, nats.
     evidence: f64,
     /// Variance above the noise on the validation samples, y².
     excess: f64,

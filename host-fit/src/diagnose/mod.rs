@@ -124,7 +124,7 @@ fn chosen(
         search: &search,
         units,
         options,
-        likely: Mutex::default(),
+        evidences: Mutex::default(),
     };
     progress("the model as given");
     let as_given = judge.held_out(|_| &given_inside)?;

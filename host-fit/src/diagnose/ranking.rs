@@ -184,7 +184,7 @@ impl Session<'_> {
                 refitted: refitted.is_some(),
                 evidence_nats: rival
                     .judged()
-                    .and_then(|judged| self.likely(judged.model())),
+                    .and_then(|judged| self.evidence_of(judged.model())),
             }
         })
     }

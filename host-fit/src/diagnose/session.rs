@@ -21,8 +21,8 @@ pub(super) struct Session<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) units: Units,
     pub(super) options: &'a Options,
-    /// Models at their most likely parameters, as far as they were asked for.
-    pub(super) likely: Mutex<Vec<(Model, Option<f64>)>>,
+    /// ln of the evidence of models, nats, as far as it was asked for.
+    pub(super) evidences: Mutex<Vec<(Model, Option<f64>)>>,
 }
 
 /// The ladder from the first effect to the last.
@@ -245,7 +245,7 @@ impl Session<'_> {
             ladder,
             ranking,
             parameters,
-            evidence_nats: self.likely(last.judged.model()),
+            evidence_nats: self.evidence_of(last.judged.model()),
             certificates,
             parsimony,
             posterior,
@@ -356,7 +356,7 @@ mod tests {
             search: &search,
             units: bench.units,
             options: &options,
-            likely: Mutex::default(),
+            evidences: Mutex::default(),
         };
         let with = |effects: &[(&str, &[f64])]| {
             let mut model = bench.given.clone();

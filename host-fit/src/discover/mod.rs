@@ -122,11 +122,14 @@ pub fn discover(
         options,
         moving_zero: moving_zero.is_some(),
     };
-    let rung = |hypothesis: &Hypothesis, terms: &[&Term], step: &str| {
-        let judged = &hypothesis.judged;
-        let model = finder.outer(&judge.final_fit(judged).model, terms).0;
+    let rung = |hypothesis: &Hypothesis, terms: &[&Term], model: Model, step: &str| {
+        let held_out = &hypothesis.judged.held_out;
         let names: Vec<String> = terms.iter().map(|term| term.name()).collect();
-        Rung::of(judge, units, &judged.held_out, &names, step, Some(model))
+        Rung::of(judge, units, held_out, &names, step, Some(model))
+    };
+    let refitted_rung = |hypothesis: &Hypothesis, terms: &[&Term], step: &str| {
+        let (model, _) = finder.outer(&judge.final_fit(&hypothesis.judged).model, terms);
+        rung(hypothesis, terms, model, step)
     };
     progress("the model as given");
     let as_given = judge.held_out(|_| &bench.given)?;
@@ -152,7 +155,7 @@ pub fn discover(
     let bases = leanest.iter().cloned().chain(given).chain([found.best]);
     let by_size = |a: &Hypothesis, b: &Hypothesis| a.judged.size().total_cmp(&b.judged.size());
     let base = bases.chain(last).min_by(by_size).unwrap_or(root);
-    ladder.push(rung(&base, &[], "base model, no new term"));
+    ladder.push(refitted_rung(&base, &[], "base model, no new term"));
     let mut current = base.clone();
     let mut contexts = vec![current.clone()];
     let leaner = half.into_iter().chain(leanest);
@@ -180,7 +183,7 @@ pub fn discover(
         current = term.with.clone();
         let step = format!("with {}", term.term.name());
         let own: Vec<&Term> = term.beside.iter().chain([&term.term]).collect();
-        ladder.push(rung(&current, &own, &step));
+        ladder.push(refitted_rung(&current, &own, &step));
         if missing(current.judged.rmse()) && found.len() + 1 < options.terms {
             finder.better_as_formula(&mut term, &mut current);
         }
@@ -201,11 +204,12 @@ pub fn discover(
     progress("formulas");
     let (terms, end) = finder.formulas(found, current);
     let own: Vec<&Term> = terms.iter().map(|found| &found.term).collect();
-    if !terms.is_empty() {
-        ladder.push(rung(&end, &own, "with formulas that fit equally well"));
-    }
     let fitted = judge.final_fit(&end.judged);
     let (mut model, written) = finder.outer(&fitted.model, &own);
+    if !terms.is_empty() {
+        let step = "with formulas that fit equally well";
+        ladder.push(rung(&end, &own, model.clone(), step));
+    }
     if own.is_empty() && as_given.rmse() <= end.judged.rmse() {
         model = handed_in.clone();
         if as_given.rmse() < end.judged.rmse() {

@@ -66,8 +66,8 @@ const STEPS: &[Step] = &[
         room: None,
         run: || crate::setup::setup(&[]),
     },
-    // The README's test command; documentation examples are part of it. Everything is compiled, so that it is soon out of the
-    // others' way.
+    // The README's test command; documentation examples are part of it. All of it is compiled before, so that the
+    // folder is locked for moments only.
     Step {
         name: "tests",
         after: &[BUILD],

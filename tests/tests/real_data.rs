@@ -55,11 +55,8 @@ fn fitted(linear: &Model, train: &Record) -> Model {
     fit.model
 }
 
-/// Silverbox, an electronic Duffing circuit: a linear model leaves 6.95 mV, the
-/// best published models 0.3 mV; what is missing is a cubic stiffness.
-#[test]
-#[ignore = "measured sets, which are not part of the project: cargo xtask kept-rigs"]
-fn silverbox_lacks_a_cubic_stiffness() {
+/// Silverbox, an electronic Duffing circuit: a linear model, and what it is learned from and judged on.
+fn silverbox() -> (Model, Record, Record) {
     let (mut train, test) = halves(
         "silverbox/silverbox_train_multisine.csv",
         "silverbox/silverbox_test_multisine.csv",
@@ -80,6 +77,14 @@ fn silverbox_lacks_a_cubic_stiffness() {
         ..Model::default()
     };
     let linear = fitted(&linear, &train);
+    (linear, train, test)
+}
+
+/// A linear model leaves 6.95 mV, the best published models 0.3 mV; what is missing is a cubic stiffness.
+#[test]
+#[ignore = "measured sets, which are not part of the project: cargo xtask kept-rigs"]
+fn silverbox_lacks_a_cubic_stiffness() {
+    let (linear, train, test) = silverbox();
     let before = held_out(&linear, &test);
     assert!((0.0066..0.0075).contains(&before), "linear: {before}");
     let found = diagnosed(&linear, &[train, test], 1);
@@ -89,19 +94,12 @@ fn silverbox_lacks_a_cubic_stiffness() {
     assert!(after < 0.0015, "with the cubic term: {after}");
 }
 
-/// A hair dryer whose command is in volts and whose thermocouple rests at none: the model that is handed back does
-/// on the test record, in the user's units, what the search for terms says of it.
+/// A command and a reading in volts: the model with the term that is handed back does on the test record, in the user's
+/// units, what the search for terms says of it.
 #[test]
 #[ignore = "measured sets, which are not part of the project: cargo xtask kept-rigs"]
-fn what_discover_says_of_a_dryer_its_model_does() {
-    let period_s = 0.08;
-    let (train, test) = (
-        "hair_dryer/hair_dryer_train.csv",
-        "hair_dryer/hair_dryer_test.csv",
-    );
-    let (train, test) = halves(train, test, period_s);
-    let linear = second_order(period_s, 2, [1.3, -0.4], 0.1);
-    let linear = fitted(&linear, &train);
+fn what_discover_says_of_a_circuit_its_model_does() {
+    let (linear, train, test) = silverbox();
     let set = DataSet::from_records(None, vec![train, test]).expect("a data set");
     let options = DiscoverOptions {
         terms: 1,
@@ -115,7 +113,8 @@ fn what_discover_says_of_a_dryer_its_model_does() {
     let told = found.discovery.ladder.last().expect("a rung").validate_rmse;
     let (before, after) = (error(&linear), error(&found.model));
     assert_eq!(told, after);
-    assert!(after <= before, "{before} with {after}");
+    assert_eq!(found.discovery.terms.len(), 1);
+    assert!(after < 0.8 * before, "{before} with {after}");
 }
 
 /// A linear model of second order, as an engineer would hand it in.

@@ -38,12 +38,18 @@ pub(crate) fn faults(arguments: &[String]) -> Result<()> {
         }
         _ => bail!("the only option is --model FILE"),
     };
-    of(constants.as_deref())
+    on_the_line(constants.as_deref(), &[])?;
+    on_the_board(constants.as_deref())
 }
 
-/// Every fault on the board with these constants.
-pub(crate) fn of(constants: Option<&Path>) -> Result<()> {
-    on_the_line(constants)?;
+/// The faults that depend on the period of the loop, on the board with these constants.
+pub(crate) fn of_the_period(constants: &Path) -> Result<()> {
+    on_the_line(Some(constants), &["--timed"])?;
+    on_the_board(Some(constants))
+}
+
+/// Every fault that is injected into the board.
+fn on_the_board(constants: Option<&Path>) -> Result<()> {
     let elf = build(
         "qemu-mps2",
         "qemu-mps2",
@@ -108,9 +114,9 @@ pub(crate) fn of(constants: Option<&Path>) -> Result<()> {
 }
 
 /// Faults between host and board.
-fn on_the_line(constants: Option<&Path>) -> Result<()> {
+fn on_the_line(constants: Option<&Path>, options: &[&str]) -> Result<()> {
     let rig = build("qemu-mps2", "qemu-rig", &[], constants)?;
-    run(scenario("line-faults").arg(&rig))
+    run(scenario("line-faults").arg(&rig).args(options))
 }
 
 fn dialogue(line: &mut Line) -> Result<()> {

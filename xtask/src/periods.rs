@@ -1,5 +1,5 @@
 //! The loop at other periods than 1 ms: lockstep at the ends of the range and between, bit for bit, and the emulated board
-//! at 10 ms with every fault.
+//! at 10 ms with the faults that depend on the period.
 
 use crate::Task;
 use crate::shell::root;
@@ -22,5 +22,5 @@ pub(crate) fn periods(arguments: &[String]) -> Result<()> {
     }
     crate::pil::pil(&["--periods", PERIODS].map(str::to_owned)).context("lockstep")?;
     let constants = crate::identified::of(Some(&root().join(SLOW)), None)?;
-    crate::faults::of(Some(&constants)).context("the board at 10 ms")
+    crate::faults::of_the_period(&constants).context("the board at 10 ms")
 }

@@ -48,12 +48,21 @@ fn base() -> Model {
     }
 }
 
-/// All of them.
+/// How graded commands act in the cases of an effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gradings {
+    /// Each effect in every way.
+    All,
+    /// Each effect in one way, and each way in every third effect.
+    InTurn,
+}
+
+/// All models.
 ///
 /// # Panics
 /// When a file of the project cannot be read.
 #[must_use]
-pub fn cases() -> Vec<Case> {
+pub fn cases(gradings: Gradings) -> Vec<Case> {
     let mut cases = Vec::new();
     for folder in ["data/paper", "firmware/identified/models"] {
         for path in files(folder) {
@@ -75,11 +84,15 @@ pub fn cases() -> Vec<Case> {
             is_bundled: false,
         });
     };
-    for spec in SPECS.iter().chain(NUISANCES) {
-        if spec.place == Place::Delay {
-            continue;
-        }
-        for grading in Grading::ALL {
+    let effects = SPECS.iter().chain(NUISANCES);
+    for (i, spec) in effects
+        .filter(|spec| spec.place != Place::Delay)
+        .enumerate()
+    {
+        for (j, grading) in Grading::ALL.into_iter().enumerate() {
+            if gradings == Gradings::InTurn && j != i % Grading::ALL.len() {
+                continue;
+            }
             let mut model = Model { grading, ..base() };
             model.add(
                 spec,

@@ -6,7 +6,7 @@ mod languages;
 mod pace;
 mod vectors;
 
-pub use cases::{Case, cases};
+pub use cases::{Case, Gradings, cases};
 pub use languages::{Tool, run};
 pub use pace::{Pace, pace};
 pub use vectors::Vectors;

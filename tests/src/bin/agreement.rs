@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 use clap::Parser;
-use scenarios::agreement::{Pace, Tool, cases, pace, run};
+use scenarios::agreement::{Gradings, Pace, Tool, cases, pace, run};
 use std::process::ExitCode;
 
 /// Runs every bundled model, effect, delay law and control law in C, Python and Octave and compares with the
@@ -16,6 +16,9 @@ struct Arguments {
     /// Times a million samples of the bundled models in each language instead.
     #[arg(long)]
     pace: bool,
+    /// Tries each effect with graded commands of one kind, not of every kind.
+    #[arg(long)]
+    in_turn: bool,
     /// Only cases whose names contain this.
     #[arg(long, default_value = "")]
     only: String,
@@ -23,7 +26,11 @@ struct Arguments {
 
 fn main() -> Result<ExitCode> {
     let arguments = Arguments::parse();
-    let mut cases = cases();
+    let mut cases = cases(if arguments.in_turn {
+        Gradings::InTurn
+    } else {
+        Gradings::All
+    });
     cases.retain(|case| case.name.contains(&arguments.only));
     let folder = tempfile::tempdir()?;
     if arguments.pace {

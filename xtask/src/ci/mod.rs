@@ -111,7 +111,6 @@ const STEPS: &[Step] = &[
                 .env("RUSTDOCFLAGS", "-Dwarnings"))
         },
     },
-    // Of the libraries alone: the fitter does not depend on the simulator that it is judged by.
     Step {
         name: "msrv",
         after: &[],
@@ -224,7 +223,7 @@ const STEPS: &[Step] = &[
         name: "agreement",
         after: &[SET_UP, BUILD],
         room: None,
-        run: || (crate::agreement::TASK.run)(&["--all".to_owned()]),
+        run: || (crate::agreement::TASK.run)(&["--all", "--in-turn"].map(str::to_owned)),
     },
     Step {
         name: "examples",

@@ -38,6 +38,9 @@ impl Operator {
         match command {
             Command::Arm => controller.arm(),
             Command::Disarm => controller.disarm(),
+            Command::Pause => {
+                controller.pause();
+            }
             Command::Status | Command::Unknown => {}
         }
         let prefix = if command == Command::Unknown {
@@ -70,6 +73,8 @@ pub enum Command {
     Arm,
     /// Close the valves; also acknowledges a latched fault.
     Disarm,
+    /// Close the valves and keep the law's settings until `arm`.
+    Pause,
     /// Report the status.
     Status,
     /// Not understood.
@@ -100,6 +105,7 @@ impl Console {
             b"" => None,
             b"arm" => Some(Command::Arm),
             b"disarm" => Some(Command::Disarm),
+            b"pause" => Some(Command::Pause),
             b"status" => Some(Command::Status),
             _ => Some(Command::Unknown),
         };
@@ -134,6 +140,7 @@ impl Line {
             Mode::Disarmed => line.text("disarmed"),
             Mode::Armed => line.text("armed"),
             Mode::Playing => line.text("playing"),
+            Mode::Paused => line.text("paused"),
             Mode::Faulted(fault) => {
                 line.text("fault=");
                 line.text(fault.name());
@@ -213,12 +220,13 @@ mod tests {
     fn lines_become_commands() {
         let mut console = Console::new();
         let mut typed = std::vec::Vec::new();
-        for byte in b"arm\r\nstatus\ndisarm\n\nlaunch the rocket\narms\n".iter() {
+        for byte in b"arm\r\nstatus\npause\ndisarm\n\nlaunch the rocket\narms\n".iter() {
             typed.extend(console.receive(*byte));
         }
         let expected = [
             Command::Arm,
             Command::Status,
+            Command::Pause,
             Command::Disarm,
             Command::Unknown,
             Command::Unknown,

@@ -1,7 +1,7 @@
 //! One sample of the loop: from a reading to the valve's position.
 
 use crate::fault::Fault;
-use crate::law::Law;
+use crate::law::{Change, Law, Unchanged};
 use crate::sensor::{Calibration, Channel, Range, Watch};
 use identified::rig;
 use model_core::control::HoldTimes;
@@ -17,6 +17,8 @@ pub enum Mode {
     Armed,
     /// A command drives the valves; the law and its model only observe.
     Playing,
+    /// Valves shut; the law keeps its settings and continues when armed again.
+    Paused,
     /// Valves shut until the operator disarms.
     Faulted(Fault),
 }
@@ -136,14 +138,52 @@ impl<L: Law> Controller<L> {
         }
     }
 
-    /// Arms the law; a latched fault must be disarmed first.
+    /// Arms the law, or ends its pause; a latched fault must be disarmed first.
     pub fn arm(&mut self) {
-        if self.mode == Mode::Disarmed {
+        if matches!(self.mode, Mode::Disarmed | Mode::Paused) {
+            if self.mode == Mode::Disarmed {
+                self.strayed = 0.0;
+            }
             self.mode = Mode::Armed;
-            self.strayed = 0.0;
             #[cfg(feature = "defmt")]
             defmt::info!("armed at sample {}", self.samples);
         }
+    }
+
+    /// Closes the valve until the law is armed again, which keeps its settings; returns whether a law was running.
+    pub fn pause(&mut self) -> bool {
+        let runs = self.is_running();
+        if runs {
+            self.open = false;
+            self.mode = Mode::Paused;
+        }
+        runs
+    }
+
+    /// Changes a setting of the running law. A value outside its bounds closes the valve.
+    ///
+    /// # Errors
+    /// [`Unchanged`]; the settings stay as they were.
+    pub fn change(&mut self, change: Change) -> Result<(), Unchanged> {
+        if !self.is_running() {
+            return Err(Unchanged::NotRunning);
+        }
+        let result = self.law.change(change);
+        if result == Err(Unchanged::Outside) {
+            self.latch(Fault::Setting);
+        }
+        result
+    }
+
+    /// Whether a law is armed, paused or not.
+    fn is_running(&self) -> bool {
+        matches!(self.mode, Mode::Armed | Mode::Paused)
+    }
+
+    /// The settings of the law that may be changed.
+    #[must_use]
+    pub fn law_settings(&self) -> wire::reply::Settings {
+        self.law.settings()
     }
 
     /// Starts playing a command ([`Self::demand`]) with the valve closed; returns whether it is permitted.
@@ -170,6 +210,8 @@ impl<L: Law> Controller<L> {
         if matches!(self.mode, Mode::Disarmed | Mode::Faulted(Fault::SelfTest)) {
             return;
         }
+        // A law that is armed anew starts with the settings of its design.
+        self.law.restore();
         self.mode = Mode::Disarmed;
         #[cfg(feature = "defmt")]
         defmt::info!("disarmed at sample {}", self.samples);
@@ -245,7 +287,7 @@ impl<L: Law> Controller<L> {
         if reading.periods > 1 {
             fault = Some(Fault::Overrun);
         }
-        if let (Some(fault), Mode::Armed | Mode::Playing) = (fault, self.mode) {
+        if let (Some(fault), Mode::Armed | Mode::Playing | Mode::Paused) = (fault, self.mode) {
             self.latch(fault);
         }
         let y = self.settings.calibration.value(reading.counts);
@@ -257,14 +299,16 @@ impl<L: Law> Controller<L> {
         let action = match self.mode {
             Mode::Armed => self.law.act(y, &channels),
             Mode::Playing => self.law.follow(self.demand, y, &channels),
-            Mode::Disarmed | Mode::Faulted(_) => self.law.follow(false, y, &channels),
+            Mode::Disarmed | Mode::Paused | Mode::Faulted(_) => {
+                self.law.follow(false, y, &channels)
+            }
         };
         self.strayed += (action.residual - self.strayed) * Self::SHARE;
         let strayed = self.strayed.abs();
         // Written so that NaN counts as outside: a diverged model is detected.
         let within = strayed <= self.settings.residual_envelope;
         self.open = action.open;
-        if self.mode == Mode::Armed && !within {
+        if self.is_running() && !within {
             self.latch(Fault::Residual);
         }
         Tick {

@@ -22,11 +22,13 @@ pub enum Fault {
     Watchdog,
     /// The constants or the model's golden run differ from the generated ones.
     SelfTest,
+    /// A host set the running law to a value outside its bounds.
+    Setting,
 }
 
 impl Fault {
     /// All faults.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Overrun,
         Self::NotFinite,
         Self::AtRail,
@@ -36,6 +38,7 @@ impl Fault {
         Self::Link,
         Self::Watchdog,
         Self::SelfTest,
+        Self::Setting,
     ];
 
     /// Its name in the status line.
@@ -51,6 +54,7 @@ impl Fault {
             Self::Link => "link",
             Self::Watchdog => "watchdog",
             Self::SelfTest => "self-test",
+            Self::Setting => "setting",
         }
     }
 }

@@ -6,6 +6,7 @@ use model_core::control::golden::GoldenLaw;
 use model_core::history::Memory;
 use model_core::model::StateOf;
 use model_core::{Input, Parts, step};
+use wire::reply::Settings;
 
 /// The action of a law at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +19,28 @@ pub struct Action {
     pub residual: f32,
 }
 
+/// A change of the settings of a running law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Change {
+    /// The target, y of the flow.
+    Target(f32),
+    /// The air budget, in 1/1000 of the time.
+    Air(u16),
+}
+
+/// Why a change was not made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unchanged {
+    /// Outside its bounds.
+    Outside,
+    /// The change before is not complete.
+    Pending,
+    /// The law has no such setting.
+    NoSetting,
+    /// No law is running.
+    NotRunning,
+}
+
 /// A law with its model. Called once per sample, armed or not, so that the model knows all issued commands.
 pub trait Law {
     /// Decides from the reading y and the measured channels; the valve follows the returned position.
@@ -26,6 +49,15 @@ pub trait Law {
     fn follow(&mut self, open: bool, y: f32, channels: &[f32]) -> Action;
     /// y*, the law's reference; NaN without one.
     fn reference(&self) -> f32;
+    /// The settings that may be changed.
+    fn settings(&self) -> Settings;
+    /// Changes a setting of the running law.
+    ///
+    /// # Errors
+    /// [`Unchanged`]; the settings stay as they were.
+    fn change(&mut self, change: Change) -> Result<(), Unchanged>;
+    /// Returns to the settings of the design.
+    fn restore(&mut self);
 }
 
 /// The parameters of a law for model `M`, memories `Y` and `J`, and a look-ahead of `A` samples, such as
@@ -34,7 +66,7 @@ pub trait Law {
     message = "`{Self}` is no law that a board can run",
     note = "a model gets a law from `host-fit design`"
 )]
-pub trait Designed<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize> {
+pub trait Designed<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize>: Clone {
     /// State of the law.
     type State;
 
@@ -57,6 +89,19 @@ pub trait Designed<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize
 
     /// y* at this sample; NaN for a law without a reference.
     fn reference(&self, state: &Self::State) -> f32;
+
+    /// The settings that may be changed.
+    fn settings(&self) -> Settings {
+        Settings::NONE
+    }
+
+    /// Changes a setting.
+    ///
+    /// # Errors
+    /// [`Unchanged`]; the settings stay as they were.
+    fn change(&mut self, _state: &mut Self::State, _change: Change) -> Result<(), Unchanged> {
+        Err(Unchanged::NoSetting)
+    }
 
     /// Whether the law reproduces its golden run.
     fn holds(
@@ -93,6 +138,8 @@ where
     J: Memory<f32>,
 {
     design: D,
+    /// The law with the settings in use.
+    running: D,
     state: D::State,
     model: M,
     /// The free-running model. The law's own model may follow a faulty sensor.
@@ -127,6 +174,7 @@ where
     pub fn new(design: D, model: M, at_rest: StateOf<f32, M, Y, J>, smoothing: S) -> Self {
         Self {
             state: design.start(&at_rest),
+            running: design.clone(),
             design,
             model,
             alone: at_rest,
@@ -161,19 +209,32 @@ where
     #[inline]
     fn act(&mut self, y: f32, channels: &[f32]) -> Action {
         let open = self
-            .design
+            .running
             .act(&mut self.state, &self.model, &self.alone, y, channels);
         self.issue(open, y, channels)
     }
 
     #[inline]
     fn follow(&mut self, open: bool, y: f32, channels: &[f32]) -> Action {
-        self.design.idle(&mut self.state);
+        self.running.idle(&mut self.state);
         self.issue(open, y, channels)
     }
 
     fn reference(&self) -> f32 {
-        self.design.reference(&self.state)
+        self.running.reference(&self.state)
+    }
+
+    fn settings(&self) -> Settings {
+        self.running.settings()
+    }
+
+    #[inline(never)]
+    fn change(&mut self, change: Change) -> Result<(), Unchanged> {
+        self.running.change(&mut self.state, change)
+    }
+
+    fn restore(&mut self) {
+        self.running = self.design.clone();
     }
 }
 

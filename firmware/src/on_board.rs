@@ -98,6 +98,7 @@ mod tests {
     use super::*;
     use crate::controller::{Mode, Reading};
     use crate::fault::Fault;
+    use crate::law::{Change, Unchanged};
 
     /// The law's observer follows a faulty sensor within its limit; the fault must still be detected.
     #[test]
@@ -141,5 +142,100 @@ mod tests {
         }
         assert_eq!(controller.mode(), Mode::Armed);
         assert!((sum - model::LAW.reference).abs() < 0.02, "{sum}");
+    }
+
+    /// Changed in operation: bounded, and nonsense closes the valve.
+    #[test]
+    fn a_running_law_takes_what_is_within_bounds_and_stops_at_nonsense() {
+        let mut controller = controller();
+        let designed = controller.law_settings();
+        let [low, high] = designed.reachable;
+        let mut predicted = 0.0_f32;
+        let mut run = |controller: &mut Controller<OnBoard>, samples: u16| {
+            let mut sum = 0.0;
+            for k in 0..samples {
+                let counts = SETTINGS.calibration.counts(predicted) + f32::from(k % 2);
+                let tick = controller.tick(Reading {
+                    counts,
+                    channel: 2048.0,
+                    periods: 1,
+                });
+                predicted = tick.predicted;
+                sum += predicted / f32::from(samples);
+            }
+            sum
+        };
+        let lower = designed.target - 0.2 * (high - low);
+        let target = Change::Target(lower);
+        assert_eq!(controller.change(target), Err(Unchanged::NotRunning));
+        controller.arm();
+        run(&mut controller, 3000);
+        assert_eq!(controller.change(target), Ok(()));
+        run(&mut controller, 3000);
+        let held = run(&mut controller, 5000);
+        assert!((held - lower).abs() < 0.03, "{held} for {lower}");
+        assert!(controller.pause());
+        run(&mut controller, 500);
+        assert!(!controller.is_open() && controller.mode() == Mode::Paused);
+        controller.arm();
+        run(&mut controller, 100);
+        // The pause has kept the changed target.
+        assert_eq!(controller.law_settings().target, lower);
+        for nonsense in [
+            Change::Target(f32::NAN),
+            Change::Target(f32::INFINITY),
+            Change::Target(low),
+            Change::Target(high),
+            Change::Target(-1e30),
+            Change::Air(0),
+            Change::Air(1001),
+            Change::Air(u16::MAX),
+        ] {
+            controller.disarm();
+            controller.arm();
+            run(&mut controller, 300);
+            assert_eq!(controller.change(nonsense), Err(Unchanged::Outside));
+            assert_eq!(controller.mode(), Mode::Faulted(Fault::Setting));
+            assert!(!controller.is_open());
+            run(&mut controller, 100);
+            assert!(!controller.is_open());
+            // The faulted law cannot be changed back to life.
+            assert_eq!(controller.change(target), Err(Unchanged::NotRunning));
+            controller.disarm();
+            assert_eq!(controller.law_settings(), designed);
+        }
+    }
+
+    #[test]
+    fn a_ramp_is_completed_before_the_next_target() {
+        let mut law = model::LAW;
+        law.slope = 0.001;
+        let model = model::model();
+        let state = model::state(&model);
+        let driven: OnBoard = Driven::new(law, model, state, MovingAverage::new());
+        let mut controller = Controller::new(SETTINGS, driven);
+        controller.arm();
+        let mut k = 0_u16;
+        let mut tick = |controller: &mut Controller<OnBoard>| {
+            k += 1;
+            controller.tick(Reading {
+                counts: SETTINGS.calibration.counts(0.4) + f32::from(k % 2),
+                channel: 2048.0,
+                periods: 1,
+            });
+        };
+        tick(&mut controller);
+        let change = Change::Target(law.reference - 0.05);
+        assert_eq!(controller.change(change), Err(Unchanged::Pending));
+        let mut steps = 1;
+        while controller.change(change).is_err() {
+            tick(&mut controller);
+            steps += 1;
+            assert!(steps < 5000 && controller.mode() == Mode::Armed, "{steps}");
+        }
+        assert!(
+            (f32::from(steps as u16) * law.slope - law.reference).abs() < 0.01,
+            "{steps}"
+        );
     }
 }

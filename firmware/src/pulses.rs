@@ -13,7 +13,7 @@ where
     M: Parts<f32>,
     Y: Memory<f32>,
     J: Memory<f32>,
-    P: AsRef<[(u32, u32)]>,
+    P: AsRef<[(u32, u32)]> + Clone,
 {
     type State = Played;
 

@@ -82,7 +82,7 @@ where
         } else {
             self.valve.set_low()
         };
-        let _ = if matches!(tick.mode, Mode::Armed | Mode::Playing) {
+        let _ = if matches!(tick.mode, Mode::Armed | Mode::Playing | Mode::Paused) {
             self.lamp.set_high()
         } else {
             self.lamp.set_low()

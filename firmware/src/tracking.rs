@@ -1,11 +1,12 @@
 //! The tracking law of `model-core` as the loop's law.
 
-use crate::law::Designed;
+use crate::law::{Change, Designed, Unchanged};
 use model_core::Parts;
 use model_core::control::golden::GoldenLaw;
 use model_core::control::{Tracking, TrackingState};
 use model_core::history::Memory;
 use model_core::model::StateOf;
+use wire::reply::{NO_LIMIT, Settings};
 
 /// State of the law.
 #[derive(Clone)]
@@ -54,6 +55,35 @@ impl<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize> Designed<M, 
             self.reference
         } else {
             state.law.reference()
+        }
+    }
+
+    fn settings(&self) -> Settings {
+        Settings {
+            target: self.reference,
+            reachable: [self.reachable.low, self.reachable.high],
+            slope: self.slope,
+            air: self
+                .budget
+                .air
+                .map_or(NO_LIMIT, |air| air.per_mille.min(NO_LIMIT.into()) as u16),
+        }
+    }
+
+    fn change(&mut self, state: &mut Self::State, change: Change) -> Result<(), Unchanged> {
+        match change {
+            // A target on its way is not replaced: one step at a time.
+            Change::Target(target) if self.reachable.check(target).is_ok() => {
+                let now = Designed::<M, Y, J, A>::reference(self, state);
+                if now != self.reference {
+                    return Err(Unchanged::Pending);
+                }
+                self.set_reference(target).map_err(|_| Unchanged::Outside)
+            }
+            Change::Target(_) => Err(Unchanged::Outside),
+            Change::Air(per_mille) => self
+                .set_air(per_mille.into())
+                .map_err(|_| Unchanged::Outside),
         }
     }
 

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use std::time::{Duration, Instant};
 
 use wire::frame::Receiver;
-use wire::reply::{Answer, Info, PROTOCOL, Phase, Reply, Scale, Status};
+use wire::reply::{Answer, Info, NO_LIMIT, PROTOCOL, Phase, Reply, Scale, Settings, Status};
 use wire::request::{Ask, Request};
 use wire::samples::{Sample, Samples};
 
@@ -26,7 +26,7 @@ const ALIVE_SAMPLES: usize = 48;
 const BUSY: Duration = Duration::from_millis(2000);
 
 /// Names of the faults, in the order of the firmware's `Fault::ALL`.
-const FAULTS: [&str; 9] = [
+const FAULTS: [&str; 10] = [
     "overrun",
     "not-finite",
     "at-rail",
@@ -36,6 +36,7 @@ const FAULTS: [&str; 9] = [
     "link",
     "watchdog",
     "self-test",
+    "setting",
 ];
 
 /// Name of a phase of the board.
@@ -45,10 +46,35 @@ pub fn word(phase: Phase) -> &'static str {
         Phase::Disarmed => "disarmed",
         Phase::Armed => "armed",
         Phase::Playing => "playing",
+        Phase::Paused => "paused",
         Phase::Faulted(number) => FAULTS
             .get(usize::from(number))
             .copied()
             .unwrap_or("an unknown fault"),
+    }
+}
+
+/// A change of the running law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Change {
+    /// Another target, y of the flow.
+    Target(f64),
+    /// Another air budget, as a share of the time; 1 for no limit.
+    Air(f64),
+    /// The valve shut, the law kept ready.
+    Pause,
+    /// The end of a pause.
+    Resume,
+}
+
+impl std::fmt::Display for Change {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Target(target) => write!(f, "target {target}"),
+            Self::Air(share) => write!(f, "air {share}"),
+            Self::Pause => f.write_str("pause"),
+            Self::Resume => f.write_str("resume"),
+        }
     }
 }
 
@@ -148,7 +174,7 @@ impl Host {
                 board: info.protocol,
                 host: PROTOCOL,
             }),
-            Answer::Done { .. } => Err(LineError::Silent("who are you")),
+            Answer::Done { .. } | Answer::Settings(_) => Err(LineError::Silent("who are you")),
         }
     }
 
@@ -206,6 +232,59 @@ impl Host {
     /// [`LineError`].
     pub fn disarm(&mut self) -> Result<u64, LineError> {
         self.carry_out("disarm", Ask::Disarm)
+    }
+
+    /// The settings of the board's law, with their bounds.
+    ///
+    /// # Errors
+    /// [`LineError`].
+    pub fn settings(&mut self) -> Result<Settings, LineError> {
+        const ASKED: &str = "the settings of the law";
+        match self.ask(ASKED, |_, _| Ask::Settings)? {
+            Answer::Settings(settings) => Ok(settings),
+            Answer::Info(_) | Answer::Done { .. } => Err(LineError::Silent(ASKED)),
+        }
+    }
+
+    /// Changes the running law. A value outside the board's bounds is not sent, because the board would close the
+    /// valve.
+    ///
+    /// # Errors
+    /// [`LineError`], with the bounds where the value is outside them.
+    pub fn change(&mut self, change: Change) -> Result<u64, LineError> {
+        match change {
+            Change::Target(target) => {
+                const ASKED: &str = "change its target";
+                let settings = self.settings()?;
+                let target = target as f32;
+                if settings.has_target() && !settings.takes_target(target) {
+                    let [low, high] = settings.reachable;
+                    return Err(LineError::Refused {
+                        asked: ASKED,
+                        reason: format!(
+                            "{target} is outside the open interval ({low:.4}, {high:.4}) that on/off blowing can hold"
+                        ),
+                    });
+                }
+                self.carry_out(ASKED, Ask::Target(target))
+            }
+            Change::Air(share) => {
+                const ASKED: &str = "change its air budget";
+                // NaN becomes 0, which is outside.
+                let per_mille = (share * f64::from(NO_LIMIT)).round() as u16;
+                if !Settings::takes_air(per_mille) {
+                    return Err(LineError::Refused {
+                        asked: ASKED,
+                        reason: format!(
+                            "{share} is outside 0.001 to 1, the share of time with the valve open"
+                        ),
+                    });
+                }
+                self.carry_out(ASKED, Ask::Air(per_mille))
+            }
+            Change::Pause => self.carry_out("pause", Ask::Pause),
+            Change::Resume => self.carry_out("resume", Ask::Arm),
+        }
     }
 
     /// Executes a request; returns the board's sample count at its execution.
@@ -422,6 +501,14 @@ fn reason(status: Status, detail: u32) -> String {
             "the command on the board differs from the one to play; start again".into()
         }
         Status::Nothing => "there is nothing to play, or more samples than 32 bits count".into(),
+        Status::Outside => {
+            "the value is outside its bounds; the board shut the valve and latched `setting`".into()
+        }
+        Status::Pending => {
+            "the change before it is not complete (a ramp, or the valve's shortest time shut); wait and repeat".into()
+        }
+        Status::NoSetting => "its law has no such setting".into(),
+        Status::NotRunning => "no law is running; arm it first (`--arm`)".into(),
         Status::NotDisarmed => match Phase::from_byte(detail as u8) {
             Some(Phase::Faulted(number)) => format!(
                 "it has latched `{}`; see to its cause, then disarm (`--disarm`)",

@@ -17,6 +17,6 @@ pub mod watch;
 
 pub use command::Command;
 pub use error::LineError;
-pub use host::{Event, Host, Streamed, word};
+pub use host::{Change, Event, Host, Streamed, word};
 pub use port::{Bad, Port};
 pub use rig_file::{ChannelEntry, RigFile, SensorEntry, ValveEntry};

@@ -14,7 +14,7 @@ use wire::samples::Sample;
 
 use crate::alarm::{Alarm, Test, Verdict};
 use crate::error::LineError;
-use crate::host::{Event, Host, Streamed, word};
+use crate::host::{Change, Event, Host, Streamed, word};
 use crate::log::{Columns, value};
 use crate::record::MOST_SAMPLES;
 
@@ -52,6 +52,32 @@ pub struct Now {
     pub lost: u64,
     /// What is known of the model.
     pub verdict: Verdict,
+    /// Residual averaged over about 64 samples, y.
+    pub residual: Option<f64>,
+    /// How far that is from the limit at which the board shuts the valve, as a share of the limit.
+    pub margin: Option<f64>,
+}
+
+/// What to do after a moment of the loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Turn {
+    /// Watch on.
+    GoOn,
+    /// Change the running law, and watch on.
+    Change(Change),
+    /// End.
+    End,
+}
+
+/// A change of the law that was asked for. Serialises to the keys under `changes` of `watch --json`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Changed {
+    /// Time, s.
+    pub t: f64,
+    /// The change.
+    pub change: String,
+    /// Why it was not made; `None` if it was.
+    pub refused: Option<String>,
 }
 
 /// What came of it. Serialises to the keys of `watch --json`.
@@ -74,6 +100,10 @@ pub struct Watched {
     pub air: Option<f64>,
     /// Switches of the valve in a second.
     pub switches_per_s: Option<f64>,
+    /// The smallest distance of the averaged residual from the board's limit, as a share of the limit.
+    pub least_margin: Option<f64>,
+    /// The changes of the law.
+    pub changes: Vec<Changed>,
     /// What is known of the model.
     #[serde(flatten)]
     pub verdict: Option<Verdict>,
@@ -101,8 +131,14 @@ const SETTLING_S: f64 = 1.0;
 /// … and after so many samples: at a long period flows are slow.
 const SETTLING: u64 = 1000;
 
-/// Watches the loop behind `host` until `go_on` says no, and writes the log's
+/// Weight of a residual in the average that the board compares with its limit.
+const SHARE: f64 = 1.0 / 64.0;
+
+/// Watches the loop behind `host`, changes it as `turn` says until that says the end, and writes the log's
 /// folder, if any.
+///
+/// A change is answered by the board before the next one is asked for. One that is refused is noted, and the loop
+/// goes on as before.
 ///
 /// # Errors
 /// [`LineError`] when the board cannot be watched.
@@ -111,7 +147,7 @@ pub fn watch(
     plan: &Plan,
     columns: &Columns,
     log: Option<&Path>,
-    go_on: &mut dyn FnMut(&Now) -> bool,
+    turn: &mut dyn FnMut(&Now) -> Turn,
 ) -> Result<Watched, LineError> {
     let board = host.hello()?;
     if plan.arm && board.phase != Phase::Disarmed {
@@ -132,6 +168,9 @@ pub fn watch(
         period_s,
         sensor: columns.sensor.unwrap_or(board.sensor),
         board: board.sensor,
+        envelope: f64::from(board.envelope),
+        strayed: 0.0,
+        reference: None,
         alarm: Alarm::new(plan.test, period_s),
         next: 0,
         phase: Phase::Disarmed,
@@ -178,7 +217,22 @@ pub fn watch(
             armed = true;
             host.arm()?;
         }
-        if !go_on(&now) || now.t >= plan.duration_s {
+        match turn(&now) {
+            Turn::End => break None,
+            Turn::Change(change) => {
+                let result = host.change(change);
+                if let Err(error @ LineError::Gone(_)) = result {
+                    return Err(error);
+                }
+                watcher.watched.changes.push(Changed {
+                    t: now.t,
+                    change: change.to_string(),
+                    refused: result.err().map(|error| error.to_string()),
+                });
+            }
+            Turn::GoOn => {}
+        }
+        if now.t >= plan.duration_s {
             break None;
         }
     };
@@ -214,6 +268,12 @@ struct Watcher {
     sensor: Scale,
     /// What the board reckons with: the law's numbers come in its counts.
     board: Scale,
+    /// The board's limit of the averaged residual, y.
+    envelope: f64,
+    /// The averaged residual, y.
+    strayed: f64,
+    /// y* of the samples before.
+    reference: Option<f32>,
     alarm: Alarm,
     next: u32,
     phase: Phase,
@@ -247,6 +307,17 @@ impl Watcher {
             self.last = None;
         }
         self.phase = streamed.phase;
+        let runs = streamed.phase == Phase::Armed;
+        // Another target is another operating point, with a transient and its own model error.
+        if runs && streamed.reference != self.reference {
+            if self.reference.is_some() {
+                self.alarm.learn_again();
+            }
+            self.reference = streamed.reference;
+            self.armed_since = 0;
+        } else if !runs {
+            self.armed_since = 0;
+        }
         let mut newest = None;
         for (number, sample) in &streamed.samples {
             self.next = number.wrapping_add(1);
@@ -263,12 +334,17 @@ impl Watcher {
                 .law
                 .map(|law| f64::from((law.model - self.board.zero) * self.board.per_count));
             if let Some(law) = sample.law {
-                self.armed_since += 1;
+                self.armed_since += u64::from(runs);
                 let residual = f64::from(law.residual * self.board.per_count);
-                self.alarm.push(residual);
-                let settled = self.armed_since > SETTLING
+                self.strayed += SHARE * (residual - self.strayed);
+                let margin = self.margin();
+                let least = self.watched.least_margin.unwrap_or(margin);
+                self.watched.least_margin = Some(least.min(margin));
+                let settled = runs
+                    && self.armed_since > SETTLING
                     && self.armed_since as f64 * self.period_s > SETTLING_S;
                 if settled {
+                    self.alarm.push(residual);
                     let sums = &mut self.armed;
                     sums.samples += 1;
                     sums.y += y;
@@ -279,6 +355,9 @@ impl Watcher {
                         sums.referred += 1;
                         sums.error += (reference - y).powi(2);
                     }
+                } else if runs {
+                    // Its time counts, but a transient is no baseline.
+                    self.alarm.gap(1);
                 }
             }
             self.last = Some(sample.open);
@@ -291,9 +370,15 @@ impl Watcher {
                 open: sample.open,
                 lost: self.watched.lost_samples,
                 verdict: self.alarm.verdict(),
+                residual: sample.law.map(|_| self.strayed),
+                margin: sample.law.map(|_| self.margin()),
             });
         }
         newest
+    }
+
+    fn margin(&self) -> f64 {
+        1.0 - self.strayed.abs() / self.envelope
     }
 
     fn figures(&self) -> Watched {

@@ -282,7 +282,7 @@ fn a_loop_is_watched_logged_and_judged() {
         test: Test {
             block_s: 1.0,
             learn: 20,
-            false_alarms_per_day: 0.01,
+            false_alarms_per_year: 0.01,
         },
     };
     let folder = tempfile::tempdir().expect("a folder");
@@ -300,7 +300,7 @@ fn a_loop_is_watched_logged_and_judged() {
             } else {
                 seen.push(now.verdict);
             }
-            true
+            rig_line::watch::Turn::GoOn
         },
     );
     let watched = watched.expect("watched");
@@ -320,4 +320,90 @@ fn a_loop_is_watched_logged_and_judged() {
     let record = &set.records[0];
     assert!(record.u[..1000].iter().all(|u| *u == 0.0) && record.u.contains(&1.0));
     assert!(!hands.is_open.load(Ordering::Relaxed));
+}
+
+/// The running law is changed over a line that loses and changes bytes: each change is made once, a value outside its
+/// bounds is not sent, and the disarmed law has its designed target again.
+#[test]
+fn the_running_law_is_changed_over_a_bad_line() {
+    use rig_line::Change;
+    use rig_line::watch::Turn;
+    let (hands, line) = board();
+    hands.as_modelled.store(true, Ordering::Relaxed);
+    let bad = Bad {
+        millionths: 300,
+        seed: 11,
+    };
+    let mut host = host(&line, &hands, Some(bad), 5);
+    let designed = host.settings().expect("settings");
+    let [low, high] = designed.reachable.map(f64::from);
+    let other = f64::from(designed.target) - 0.2 * (high - low);
+    assert!(low < other, "{designed:?}");
+    let plan = rig_line::watch::Plan {
+        arm: true,
+        rest_s: 0.5,
+        duration_s: 20.0,
+        log_s: 1.0,
+        test: Default::default(),
+    };
+    let mut changes = [
+        (4.0, Change::Target(high + 0.01)),
+        (5.0, Change::Target(f64::NAN)),
+        (6.0, Change::Air(1.5)),
+        (7.0, Change::Target(other)),
+        (16.0, Change::Pause),
+        (18.0, Change::Resume),
+        (19.0, Change::Air(0.9)),
+    ]
+    .into_iter()
+    .peekable();
+    let (mut sum, mut count, mut paused) = (0.0, 0.0, false);
+    let mut held = None;
+    let watched = rig_line::watch::watch(&mut host, &plan, &Default::default(), None, &mut |now| {
+        if (10.0..16.0).contains(&now.t) {
+            held = now.reference;
+            (sum, count) = (sum + now.y, count + 1.0);
+        }
+        if (17.0..18.0).contains(&now.t) {
+            paused |= now.phase == wire::reply::Phase::Paused;
+            assert!(!now.open, "paused");
+        }
+        match changes.next_if(|(t, _)| now.t >= *t) {
+            Some((_, change)) => Turn::Change(change),
+            None => Turn::GoOn,
+        }
+    });
+    let watched = watched.expect("watched");
+    assert!(watched.ended.is_none(), "{watched:?}");
+    let refused: Vec<bool> = watched
+        .changes
+        .iter()
+        .map(|c| c.refused.is_some())
+        .collect();
+    assert_eq!(
+        refused,
+        [true, true, true, false, false, false, false],
+        "{:?}",
+        watched.changes
+    );
+    assert!(paused);
+    assert!(
+        held.is_some_and(|held| (held - other).abs() < 1e-6),
+        "{held:?}"
+    );
+    assert!(
+        (sum / count - other).abs() < 0.1,
+        "{} for {other}",
+        sum / count
+    );
+    assert!(
+        watched
+            .least_margin
+            .is_some_and(|m| (0.0..1.0).contains(&m))
+    );
+    let after = host.settings().expect("settings");
+    assert_eq!(after, designed);
+    // Without a running law nothing changes.
+    assert!(host.change(Change::Target(other)).is_err());
+    assert!(host.change(Change::Pause).is_err());
 }

@@ -4,7 +4,7 @@ use crate::bytes::{Reader, Writer};
 use crate::frame::{CONTENT, Frame};
 
 /// The version of this dialogue; host and board must have the same.
-pub const PROTOCOL: u8 = 1;
+pub const PROTOCOL: u8 = 2;
 /// A host that has not been heard for so long is lost, ms. What it had the board
 /// play ends then.
 pub const LOST_AFTER_MS: u32 = 500;
@@ -44,10 +44,18 @@ pub enum Status {
     Nothing = 6,
     /// A fault is latched, or the law or a command has the valve: disarm first.
     NotDisarmed = 7,
+    /// A setting outside its bounds: the valve is shut and the fault latched.
+    Outside = 8,
+    /// The change before is not complete: a ramp to a target, or the shortest time shut after a pause.
+    Pending = 9,
+    /// The law has no such setting.
+    NoSetting = 10,
+    /// No law is running; its settings change only while it is.
+    NotRunning = 11,
 }
 
 impl Status {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 12] = [
         Self::Done,
         Self::Busy,
         Self::TooLong,
@@ -56,6 +64,10 @@ impl Status {
         Self::OtherCommand,
         Self::Nothing,
         Self::NotDisarmed,
+        Self::Outside,
+        Self::Pending,
+        Self::NoSetting,
+        Self::NotRunning,
     ];
 }
 
@@ -68,6 +80,8 @@ pub enum Phase {
     Armed,
     /// A command is played.
     Playing,
+    /// The law is armed and waits with the valves shut.
+    Paused,
     /// Valves shut by the fault of that number, see the board's `Fault::ALL`.
     Faulted(u8),
 }
@@ -82,6 +96,7 @@ impl Phase {
             Self::Disarmed => 0,
             Self::Armed => 1,
             Self::Playing => 2,
+            Self::Paused => 3,
             Self::Faulted(number) => Self::FAULT | number,
         }
     }
@@ -93,6 +108,7 @@ impl Phase {
             0 => Some(Self::Disarmed),
             1 => Some(Self::Armed),
             2 => Some(Self::Playing),
+            3 => Some(Self::Paused),
             byte if byte & Self::FAULT != 0 => Some(Self::Faulted(byte & !Self::FAULT)),
             _ => None,
         }
@@ -146,11 +162,58 @@ pub struct Info {
     pub session: u32,
 }
 
+/// The settings of a law that a host may change, with their bounds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// The target, y of the flow; not finite for a law without one.
+    pub target: f32,
+    /// The open interval of targets.
+    pub reachable: [f32; 2],
+    /// Largest change of the target per sample; 0 for a step.
+    pub slope: f32,
+    /// Share of time with the valve open that the budget allows, in 1/1000; [`NO_LIMIT`] without a budget.
+    pub air: u16,
+}
+
+/// An air budget that does not limit, in 1/1000. A budget is at least 1.
+pub const NO_LIMIT: u16 = 1000;
+
+impl Settings {
+    /// Those of a law without any.
+    pub const NONE: Self = Self {
+        target: f32::NAN,
+        reachable: [f32::NAN; 2],
+        slope: 0.0,
+        air: NO_LIMIT,
+    };
+
+    /// Whether the law has a target.
+    #[must_use]
+    pub fn has_target(&self) -> bool {
+        self.target.is_finite()
+    }
+
+    /// Whether `target` is within its bounds.
+    #[must_use]
+    pub fn takes_target(&self, target: f32) -> bool {
+        let [low, high] = self.reachable;
+        low < target && target < high
+    }
+
+    /// Whether an air budget is within its bounds.
+    #[must_use]
+    pub fn takes_air(per_mille: u16) -> bool {
+        (1..=NO_LIMIT).contains(&per_mille)
+    }
+}
+
 /// An answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer {
     /// To [`Ask::Hello`](crate::request::Ask::Hello).
     Info(Info),
+    /// To [`Ask::Settings`](crate::request::Ask::Settings).
+    Settings(Settings),
     /// To anything else.
     Done {
         /// How it ended.
@@ -175,6 +238,7 @@ pub struct Reply {
 
 pub(crate) const INFO: u8 = 0x30;
 pub(crate) const DONE: u8 = 0x31;
+pub(crate) const SETTINGS: u8 = 0x32;
 
 impl Reply {
     /// The frame for the wire.
@@ -183,6 +247,7 @@ impl Reply {
         let mut content = Writer::<CONTENT>::new();
         content.put(&[match self.answer {
             Answer::Info(_) => INFO,
+            Answer::Settings(_) => SETTINGS,
             Answer::Done { .. } => DONE,
         }]);
         content.put(&self.number.to_le_bytes());
@@ -213,6 +278,13 @@ impl Reply {
                 content.put(&info.most_runs.to_le_bytes());
                 content.put(&info.damaged.to_le_bytes());
                 content.put(&info.session.to_le_bytes());
+            }
+            Answer::Settings(settings) => {
+                let [low, high] = settings.reachable;
+                for number in [settings.target, low, high, settings.slope] {
+                    content.put(&number.to_bits().to_le_bytes());
+                }
+                content.put(&settings.air.to_le_bytes());
             }
             Answer::Done {
                 status,
@@ -251,6 +323,12 @@ impl Reply {
                 most_runs: reader.u16()?,
                 damaged: reader.u32()?,
                 session: reader.u32()?,
+            }),
+            SETTINGS => Answer::Settings(Settings {
+                target: reader.f32()?,
+                reachable: [reader.f32()?, reader.f32()?],
+                slope: reader.f32()?,
+                air: reader.u16()?,
             }),
             DONE => Answer::Done {
                 status: {
@@ -325,6 +403,13 @@ mod tests {
         };
         let told = reply(Answer::Info(info));
         assert_eq!(through(&told), Some(told));
+        let settings = reply(Answer::Settings(Settings {
+            target: 0.5,
+            reachable: [0.0, 1.0625],
+            slope: 0.001,
+            air: 400,
+        }));
+        assert_eq!(through(&settings), Some(settings));
         for status in Status::ALL {
             let done = reply(Answer::Done {
                 status,

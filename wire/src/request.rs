@@ -16,7 +16,7 @@ use crate::frame::{CONTENT, Frame};
 pub const RUNS: usize = 56;
 
 /// What is asked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Ask<'a> {
     /// Who are you, how are things? Answered with [`Info`](crate::reply::Info).
     Hello,
@@ -41,14 +41,22 @@ pub enum Ask<'a> {
     },
     /// Stream every sample from now on, whatever the valve does.
     Stream,
-    /// Let the law drive the valve.
+    /// Let the law drive the valve; also ends a pause.
     Arm,
     /// Shut the valve, end what is played, take note of a fault.
     Disarm,
+    /// The settings of the law with their bounds? Answered with [`Settings`](crate::reply::Settings).
+    Settings,
+    /// Change the target of the running law, y of the flow.
+    Target(f32),
+    /// Change the air budget of the running law: the share of time with the valve open, in 1/1000.
+    Air(u16),
+    /// Shut the valve and keep the law ready until it is armed again.
+    Pause,
 }
 
 /// A request.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Request<'a> {
     /// Tells requests of a session apart.
     pub number: u16,
@@ -88,6 +96,10 @@ const PLAY: u8 = 0x23;
 const STREAM: u8 = 0x24;
 const ARM: u8 = 0x25;
 const DISARM: u8 = 0x26;
+const SETTINGS: u8 = 0x27;
+const TARGET: u8 = 0x28;
+const AIR: u8 = 0x29;
+const PAUSE: u8 = 0x2A;
 
 impl<'a> Request<'a> {
     /// From a frame's content; `None` if it is no request.
@@ -120,6 +132,10 @@ impl<'a> Request<'a> {
             STREAM => Ask::Stream,
             ARM => Ask::Arm,
             DISARM => Ask::Disarm,
+            SETTINGS => Ask::Settings,
+            TARGET => Ask::Target(reader.f32()?),
+            AIR => Ask::Air(reader.u16()?),
+            PAUSE => Ask::Pause,
             _ => return None,
         };
         reader.0.is_empty().then_some(Self {
@@ -141,6 +157,10 @@ impl<'a> Request<'a> {
             Ask::Stream => STREAM,
             Ask::Arm => ARM,
             Ask::Disarm => DISARM,
+            Ask::Settings => SETTINGS,
+            Ask::Target(_) => TARGET,
+            Ask::Air(_) => AIR,
+            Ask::Pause => PAUSE,
         };
         content.put(&[kind]);
         content.put(&self.number.to_le_bytes());
@@ -159,6 +179,8 @@ impl<'a> Request<'a> {
                 content.put(&runs.to_le_bytes());
                 content.put(&checksum.to_le_bytes());
             }
+            Ask::Target(target) => content.put(&target.to_bits().to_le_bytes()),
+            Ask::Air(per_mille) => content.put(&per_mille.to_le_bytes()),
             _ => {}
         }
         Frame::new(&content.0)
@@ -211,6 +233,10 @@ mod tests {
             Ask::Stream,
             Ask::Arm,
             Ask::Disarm,
+            Ask::Settings,
+            Ask::Target(0.625),
+            Ask::Air(400),
+            Ask::Pause,
         ];
         for ask in asks {
             let request = Request {

@@ -6,7 +6,7 @@
 
 use crate::controller::{Controller, Mode, Tick};
 use crate::fault::Fault;
-use crate::law::Law;
+use crate::law::{Change, Law, Unchanged};
 use crate::player::{Player, RUNS, Refusal};
 use crate::sensor::Calibration;
 use model_core::self_test::Crc32;
@@ -133,7 +133,7 @@ impl Service {
             return;
         }
         let calibration = &controller.settings().calibration;
-        let law = (tick.mode == Mode::Armed).then(|| samples::Law {
+        let law = matches!(tick.mode, Mode::Armed | Mode::Paused).then(|| samples::Law {
             model: calibration.counts(tick.predicted),
             residual: tick.residual / calibration.per_count,
         });
@@ -200,9 +200,22 @@ impl Service {
                     answer: Answer::Info(self.info(controller)),
                 });
             }
+            Ask::Settings => {
+                return Some(Reply {
+                    number: request.number,
+                    session: request.session,
+                    answer: Answer::Settings(controller.law_settings()),
+                });
+            }
             Ask::Alive => return None,
             // Any host may disarm.
-            Ask::Load { .. } | Ask::Play { .. } | Ask::Stream | Ask::Arm
+            Ask::Load { .. }
+            | Ask::Play { .. }
+            | Ask::Stream
+            | Ask::Arm
+            | Ask::Target(_)
+            | Ask::Air(_)
+            | Ask::Pause
                 if self.session.is_some() && !known =>
             {
                 Done {
@@ -235,7 +248,7 @@ impl Service {
         outbox: &mut Outbox,
     ) -> Done {
         let result = match request.ask {
-            Ask::Hello | Ask::Alive => Ok(()),
+            Ask::Hello | Ask::Alive | Ask::Settings => Ok(()),
             // A command must not change while it is played.
             Ask::Load { .. } if controller.mode() == Mode::Playing => not_disarmed(controller),
             Ask::Load { at, runs } => self.player.load(at, runs.iter()),
@@ -248,6 +261,17 @@ impl Service {
                 not_disarmed(controller)
             }
             Ask::Stream => Ok(()),
+            // The valve has been shut by the pause; it has to stay so for its shortest time.
+            Ask::Arm
+                if controller.mode() == Mode::Paused
+                    && self.shut < controller.settings().hold.of(false) =>
+            {
+                Err((Status::Pending, 0))
+            }
+            Ask::Target(target) => changed(controller.change(Change::Target(target))),
+            Ask::Air(per_mille) => changed(controller.change(Change::Air(per_mille))),
+            Ask::Pause if controller.pause() => Ok(()),
+            Ask::Pause => changed(Err(Unchanged::NotRunning)),
             Ask::Arm => {
                 controller.arm();
                 if controller.mode() == Mode::Armed {
@@ -332,6 +356,18 @@ impl Service {
     }
 }
 
+fn changed(result: Result<(), Unchanged>) -> Result<(), Refusal> {
+    result.map_err(|why| {
+        let status = match why {
+            Unchanged::Outside => Status::Outside,
+            Unchanged::Pending => Status::Pending,
+            Unchanged::NoSetting => Status::NoSetting,
+            Unchanged::NotRunning => Status::NotRunning,
+        };
+        (status, 0)
+    })
+}
+
 fn not_disarmed<L: Law>(controller: &Controller<L>) -> Result<(), Refusal> {
     Err((
         Status::NotDisarmed,
@@ -381,6 +417,7 @@ fn phase(mode: Mode) -> Phase {
         Mode::Disarmed => Phase::Disarmed,
         Mode::Armed => Phase::Armed,
         Mode::Playing => Phase::Playing,
+        Mode::Paused => Phase::Paused,
         Mode::Faulted(fault) => {
             let number = Fault::ALL.iter().position(|f| *f == fault);
             Phase::Faulted(number.map_or(0x7F, |n| n as u8))

@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, channel};
 
 use anyhow::bail;
-use rig_line::RigFile;
-use rig_line::alarm::{DAY_S, Test, Verdict};
+use rig_line::alarm::{Test, Verdict, YEAR_S};
 use rig_line::log::Columns;
-use rig_line::watch::{Now, Plan, Watched, watch};
-use rig_line::word;
+use rig_line::watch::{Now, Plan, Turn, Watched, watch};
+use rig_line::{Change, RigFile, word};
 
 use super::average::positive;
 use super::words::Words;
@@ -19,8 +19,11 @@ use crate::rig_port::PortArgs;
 /// still fits.
 ///
 /// The residual (reading minus the model's free run) is averaged over blocks, and each block is compared with
-/// the first ones; the probability of any false alarm in 8 hours is --false-alarms. The log starts at rest
-/// and ends at the first lost sample, because a free run needs the whole history.
+/// all before it. The probability of a false alarm in a year is at most --false-alarms, however long it runs. The
+/// log starts at rest and ends at the first lost sample, because a free run needs the whole history.
+///
+/// With --control the running law is changed while it is watched, by lines on standard input: `target 0.6`,
+/// `air 0.4`, `pause`, `resume`, `stop`.
 ///
 /// Example: host-fit watch --port /dev/ttyACM0 --rig rig.toml --seconds 60 -o service
 #[derive(Debug, clap::Args)]
@@ -46,9 +49,13 @@ pub(crate) struct Args {
     /// Number of blocks of the baseline.
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(3..=10_000))]
     learn: u32,
-    /// Probability of a false alarm in 8 hours.
+    /// Largest probability of a false alarm in a year of operation.
     #[arg(long, value_name = "CHANCE", default_value_t = 0.01, value_parser = positive)]
     false_alarms: f64,
+    /// Change the running law by lines on standard input: `target Y` (y* as shown), `air SHARE` (of the time, 1 for no
+    /// limit), `pause` (valve shut), `resume`, `stop`.
+    #[arg(long)]
+    control: bool,
     /// Rig file with the scale of the readings. Without it the board's own constants are used.
     #[arg(long, value_name = "rig.toml")]
     rig: Option<PathBuf>,
@@ -57,11 +64,11 @@ pub(crate) struct Args {
     disarm: bool,
 }
 
-/// A block length of at most a day, for which the false-alarm rate is valid.
+/// A block length of at most a year, for which the false-alarm rate is stated.
 fn block(text: &str) -> Result<f64, String> {
     match positive(text)? {
-        seconds if (1e-6..=DAY_S).contains(&seconds) => Ok(seconds),
-        _ => Err(format!("a time from 1e-6 to {DAY_S} s is needed")),
+        seconds if (1e-6..=YEAR_S).contains(&seconds) => Ok(seconds),
+        _ => Err(format!("a time from 1e-6 to {YEAR_S} s is needed")),
     }
 }
 
@@ -78,11 +85,21 @@ impl Words for Watched {
             shown("rms residual", self.rms_residual),
             shown("air", self.air),
             self.switches_per_s.map(|s| format!("switches/s {s:.1}")),
+            self.least_margin.map(|m| {
+                format!(
+                    "residual at most {:.0} % of the board's limit",
+                    100.0 * (1.0 - m)
+                )
+            }),
         ];
         let figures: Vec<String> = figures.into_iter().flatten().collect();
         if !figures.is_empty() {
             lines.push(figures.join(", "));
         }
+        lines.extend(self.changes.iter().map(|one| {
+            let answer = one.refused.as_deref().unwrap_or("done");
+            format!("{:.1} s, {}: {answer}", one.t, one.change)
+        }));
         lines.extend(self.verdict.map(|verdict| judged(&verdict)));
         if self.log.is_some() {
             lines.push(format!("log: {} samples", self.logged));
@@ -97,8 +114,7 @@ fn judged(verdict: &Verdict) -> String {
             format!("the model is not checked yet: the baseline needs {blocks_left} more blocks")
         }
         Verdict::True { largest, threshold } => format!(
-            "the model still fits: the largest deviation of a block is {largest:.1} standard deviations \
-            (alarm at {threshold:.1})"
+            "the model still fits: evidence of a change 10^{largest:.1} at most (alarm at 10^{threshold:.1})"
         ),
         Verdict::Stopped {
             at_s,
@@ -107,11 +123,55 @@ fn judged(verdict: &Verdict) -> String {
             distance,
             threshold,
         } => format!(
-            "MODEL NO LONGER FITS at {at_s:.1} s: the residual went from {usual:.4} to {residual:.4}, {:.1} \
-             standard deviations (alarm at {threshold:.1}); check the log with `compare` and `diagnose`",
+            "MODEL NO LONGER FITS at {at_s:.1} s: the residual went from {usual:.4} to {residual:.4} in the last block, \
+             {:.1} standard deviations; the evidence of a change exceeds 10^{threshold:.1}; check the log with `compare` \
+             and `diagnose`",
             distance.abs()
         ),
     }
+}
+
+/// A line of the operator.
+#[derive(Debug, PartialEq)]
+enum Order {
+    Change(Change),
+    Stop,
+}
+
+/// The order in a line, or the permitted ones.
+fn order(line: &str) -> Result<Order, String> {
+    let mut words = line.split_whitespace();
+    let (word, value, rest) = (words.next(), words.next(), words.next());
+    let number = || value.and_then(|text| text.parse().ok());
+    let change = match (word, value) {
+        (Some("target"), Some(_)) => number().map(Change::Target),
+        (Some("air"), Some(_)) => number().map(Change::Air),
+        (Some("pause"), None) => Some(Change::Pause),
+        (Some("resume"), None) => Some(Change::Resume),
+        (Some("stop"), None) => return Ok(Order::Stop),
+        _ => None,
+    };
+    match (change, rest) {
+        (Some(change), None) => Ok(Order::Change(change)),
+        _ => Err(format!(
+            "`{}` is no change; say `target Y`, `air SHARE`, `pause`, `resume` or `stop`",
+            line.trim()
+        )),
+    }
+}
+
+/// The lines of standard input, as they come.
+fn typed() -> Receiver<String> {
+    let (sender, receiver) = channel();
+    // Ends with the program: a read of a terminal cannot be interrupted.
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                break;
+            }
+        }
+    });
+    receiver
 }
 
 /// Runs the command.
@@ -128,7 +188,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         test: Test {
             block_s: args.block,
             learn: args.learn,
-            false_alarms_per_day: args.false_alarms.min(1.0),
+            false_alarms_per_year: args.false_alarms.min(1.0),
         },
     };
     let mut connected = args.port.connect()?;
@@ -137,6 +197,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     }
     let bar = console.progress(0, "{msg}");
     let interrupt = interrupt::watch();
+    let lines = args.control.then(typed);
     let watched = watch(
         &mut connected.host,
         &plan,
@@ -152,16 +213,34 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
                 Verdict::Stopped { .. } => "NO LONGER FITS",
             };
             bar.set_message(format!(
-                "{:8.1} s  {}  y {:6.3}{}{}  valve {}  lost {}  model: {state}",
+                "{:8.1} s  {}  y {:6.3}{}{}{}{}  valve {}  lost {}  model: {state}",
                 now.t,
                 word(now.phase),
                 now.y,
                 shown("y*", now.reference),
                 shown("model", now.model),
+                shown("residual", now.residual),
+                now.margin
+                    .map_or_else(String::new, |m| format!("  margin {:3.0} %", 100.0 * m)),
                 u8::from(now.open),
                 now.lost
             ));
-            !interrupt.load(Ordering::Relaxed)
+            if interrupt.load(Ordering::Relaxed) {
+                return Turn::End;
+            }
+            let line = lines.as_ref().and_then(|lines| lines.try_recv().ok());
+            match line
+                .filter(|line| !line.trim().is_empty())
+                .map(|line| order(&line))
+            {
+                None => Turn::GoOn,
+                Some(Ok(Order::Change(change))) => Turn::Change(change),
+                Some(Ok(Order::Stop)) => Turn::End,
+                Some(Err(wrong)) => {
+                    bar.println(wrong);
+                    Turn::GoOn
+                }
+            }
         },
     )?;
     bar.finish_and_clear();
@@ -169,12 +248,39 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let written: Vec<_> = written.iter().map(PathBuf::as_path).collect();
     console.show(&watched, &[], &written)?;
     console.say(&format!(
-        "probability of a false alarm in {} h: {}",
-        DAY_S / 3600.0,
-        plan.test.false_alarms_per_day
+        "probability of a false alarm in a year: at most {}",
+        plan.test.false_alarms_per_year
     ))?;
     match &watched.ended {
         Some(why) => bail!("{why}"),
         None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_order_is_a_whole_line() {
+        let change = |line: &str| match order(line) {
+            Ok(Order::Change(change)) => Some(change),
+            _ => None,
+        };
+        assert_eq!(change("target 0.6"), Some(Change::Target(0.6)));
+        assert_eq!(change("  air 0.4 "), Some(Change::Air(0.4)));
+        assert_eq!(change("pause"), Some(Change::Pause));
+        assert_eq!(change("resume"), Some(Change::Resume));
+        assert_eq!(order("stop"), Ok(Order::Stop));
+        for wrong in [
+            "target",
+            "target x",
+            "target 0.6 0.7",
+            "pause 3",
+            "arm",
+            "0.6",
+        ] {
+            assert!(order(wrong).is_err(), "{wrong}");
+        }
     }
 }

@@ -7,7 +7,7 @@ use super::steady::{Steady, steady, time_constants};
 use crate::model::{Delay, Model, Track};
 use closed_loop::{AHEAD, Figures, ModelFlow, TrackingController, run};
 use model_core::control::Unusable;
-use model_core::control::budget::Budget;
+use model_core::control::budget::{Air, Budget};
 use model_core::control::{HoldTimes, Reachable, Tracking};
 use model_core::delay::Transport;
 use serde::Serialize;
@@ -140,9 +140,12 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
             completely"
         ));
     }
-    let air = request
-        .air
-        .map(|share| [(share * 1000.0).round().clamp(0.0, 1000.0) as u32, 1000]);
+    let air = request.air.map(|share| {
+        [
+            (share * 1000.0).round().clamp(0.0, 1000.0) as u32,
+            Air::SAVED,
+        ]
+    });
     if let Some(allowed) = request.air
         && equivalent_duty > allowed
     {

@@ -102,6 +102,18 @@ impl Switches {
 }
 
 impl Air {
+    /// Samples of continuous blowing that a full store of a designed budget gives.
+    pub const SAVED: u32 = 1000;
+
+    /// The budget of `per_mille` with the usual store.
+    #[must_use]
+    pub const fn of(per_mille: u32) -> Self {
+        Self {
+            per_mille,
+            saved: Self::SAVED,
+        }
+    }
+
     /// Net consumption of air per sample of blowing.
     fn drain(&self) -> u32 {
         1000_u32.saturating_sub(self.per_mille)

@@ -12,7 +12,7 @@
 
 use crate::checks::look_ahead;
 use crate::control::ahead::{self, Foreknown};
-use crate::control::budget::Purse;
+use crate::control::budget::{Air, Purse};
 use crate::control::constants::{Tracking, Unusable};
 use crate::control::correction::{Correction, limited};
 use crate::control::hold::Hold;
@@ -134,6 +134,21 @@ impl<T: Real> Tracking<T> {
     pub fn set_reference(&mut self, reference: T) -> Result<(), Unreachable> {
         self.reachable.check(reference)?;
         self.reference = reference;
+        Ok(())
+    }
+
+    /// Changes the air budget, 1 to 1000 thousandths of the time; the store of a budget that is new starts empty.
+    ///
+    /// # Errors
+    /// [`Unusable`], and the budget stays as it was.
+    pub fn set_air(&mut self, per_mille: u32) -> Result<(), Unusable> {
+        if !(1..=1000).contains(&per_mille) {
+            return Err(Unusable::Constant("air"));
+        }
+        self.budget.air = Some(match self.budget.air {
+            Some(air) => Air { per_mille, ..air },
+            None => Air::of(per_mille),
+        });
         Ok(())
     }
 
@@ -536,6 +551,33 @@ mod tests {
         });
         assert!(open <= 12_000 + 510, "{open}");
         assert!(switches <= 400 + 12, "{switches}");
+    }
+
+    /// Changed in operation: the share of time with the valve open falls to the new budget, and nonsense changes nothing.
+    #[test]
+    fn the_air_budget_changes_in_operation() {
+        let mut law = law::<f64>(0.8, 10);
+        for nonsense in [0, 1001, u32::MAX] {
+            assert_eq!(law.set_air(nonsense), Err(Unusable::Constant("air")));
+        }
+        assert_eq!(law.budget.air, None);
+        let mut open = [0, 0];
+        on_its_model(
+            LagConvention::OneStep,
+            law,
+            30_000,
+            |k, _, law, decision| {
+                if k == 10_000 {
+                    law.set_air(400).unwrap();
+                }
+                if let Some(open) = open.get_mut(usize::from(k >= 10_000)) {
+                    *open += u32::from(decision.on);
+                }
+                None
+            },
+        );
+        assert!(open[0] > 6_500, "{open:?}");
+        assert!((7_500..=8_010).contains(&open[1]), "{open:?}");
     }
 
     #[test]

@@ -8,7 +8,7 @@ use rig_line::alarm::Test;
 use rig_line::emulator::{self, Emulator};
 use rig_line::log::Columns;
 use rig_line::record::record;
-use rig_line::watch::{Plan, watch};
+use rig_line::watch::{Plan, Turn, watch};
 use rig_line::{Command, Event, Host, LineError, word};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -279,7 +279,7 @@ fn watched(mut bench: Bench) -> Result<String> {
         None,
         &mut |now| {
             reference = now.reference.or(reference);
-            true
+            Turn::GoOn
         },
     )?;
     shut(&mut bench)?;

@@ -146,7 +146,7 @@ impl Bench {
     fn status(&mut self) -> Option<(Status, u32)> {
         match self.replies.last()?.answer {
             Answer::Done { status, detail, .. } => Some((status, detail)),
-            Answer::Info(_) => None,
+            Answer::Info(_) | Answer::Settings(_) => None,
         }
     }
 }

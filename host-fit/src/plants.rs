@@ -380,24 +380,23 @@ mod tests {
     fn a_slower_clock_changes_times_and_nothing_else() {
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-6 * a.abs().max(1e-3);
         let at_1_khz = proof_of(&slowed(1.0), 0.6, 3);
-        for slower in [10.0, 100.0] {
-            let model = slowed(slower);
-            assert!(near(model.sample_period_s, 0.001 * slower));
-            let proof = proof_of(&model, 0.6, 3);
-            assert_eq!(proof.cases.len(), at_1_khz.cases.len());
-            for (case, fast) in proof.cases.iter().zip(&at_1_khz.cases) {
-                assert_eq!(
-                    (case.group, case.kept),
-                    (fast.group, fast.kept),
-                    "{case:?} {fast:?}"
-                );
-                let (f, g) = (case.figures, fast.figures);
-                assert!((f.mean - g.mean).abs() < 0.01, "{case:?} {fast:?}");
-                assert!((f.rms - g.rms).abs() < 0.01, "{case:?} {fast:?}");
-                let switches = f.switches_per_s * slower / g.switches_per_s;
-                assert!((switches - 1.0).abs() < 0.05, "{case:?} {fast:?}");
-            }
-            assert!(near(proof.trace.sample_period_s, 0.001 * slower));
+        let slower = 100.0;
+        let model = slowed(slower);
+        assert!(near(model.sample_period_s, 0.001 * slower));
+        let proof = proof_of(&model, 0.6, 3);
+        assert_eq!(proof.cases.len(), at_1_khz.cases.len());
+        for (case, fast) in proof.cases.iter().zip(&at_1_khz.cases) {
+            assert_eq!(
+                (case.group, case.kept),
+                (fast.group, fast.kept),
+                "{case:?} {fast:?}"
+            );
+            let (f, g) = (case.figures, fast.figures);
+            assert!((f.mean - g.mean).abs() < 0.01, "{case:?} {fast:?}");
+            assert!((f.rms - g.rms).abs() < 0.01, "{case:?} {fast:?}");
+            let switches = f.switches_per_s * slower / g.switches_per_s;
+            assert!((switches - 1.0).abs() < 0.05, "{case:?} {fast:?}");
         }
+        assert!(near(proof.trace.sample_period_s, 0.001 * slower));
     }
 }

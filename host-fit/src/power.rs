@@ -267,11 +267,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_to_be_seen_is_named_and_a_sixth_of_it_is_not() {
+    fn what_is_said_to_be_seen_is_named() {
         let records = records(&[], &[], 2);
         let model = base(&records);
         let effect = "hot-film-lag";
+        // How often, and what smaller ones do: `cargo xtask hidden-effects --group power`.
         assert_eq!(named(&model, &records, effect, 0.75), [effect]);
-        assert!(named(&model, &records, effect, 0.16).is_empty());
     }
 }

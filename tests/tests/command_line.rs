@@ -163,7 +163,8 @@ fn several_models_are_compared_side_by_side() {
         data("paper/table-2-fixed.toml"),
         data("paper/table-2-state-dependent.toml"),
     ];
-    let set = data("paper-like");
+    let folder = tempfile::tempdir().expect("a folder");
+    let set = part_of_the_ramp(folder.path());
     let found = json(&[p("compare"), &models[0], &models[1], &set]);
     let listed = found["models"].as_array().expect("models");
     assert_eq!(listed.len(), 2);
@@ -186,7 +187,6 @@ fn several_models_are_compared_side_by_side() {
         let name = model.file_stem().expect("a name").to_string_lossy();
         assert_eq!(listed["model"], name.as_ref());
     }
-    let folder = tempfile::tempdir().expect("a folder");
     let page = folder.path().join("out.html");
     let output = run(&[
         p("compare"),

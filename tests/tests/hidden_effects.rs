@@ -205,7 +205,7 @@ fn other_units_change_no_name_and_transform_the_parameters() {
         asked(&Case {
             given: Given::Guess,
             units,
-            ..Case::new(Group::Units, Family::FirstOrder, &["starting-vortex"], 710)
+            ..Case::new(Group::Units, Family::FirstOrder, &["quadratic-drag"], 710)
         })
     });
     let [own, twin] = &rows;

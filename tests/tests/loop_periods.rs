@@ -57,6 +57,15 @@ fn a_slower_rig_gets_the_same_law_and_constants_with_its_period() {
             "12samples",
             "--min-off",
             "12samples",
+            // Trials of half the length, and a coarse robustness margin.
+            "--set",
+            "design.trial=6000",
+            "--set",
+            "design.trial-from=2000",
+            "--set",
+            "design.margin-rays=4",
+            "--set",
+            "design.margin-bisections=2",
         ]);
         assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
         let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");

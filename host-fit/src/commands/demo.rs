@@ -74,6 +74,8 @@ const FILES: [(&str, &str); 16] = [
 const ANSWER: &str = include_str!("../../data/hidden-ramp/answer.toml");
 /// Hidden effect outside the catalogue, seed of its rig, and folder of its recordings.
 const BEYOND: (&str, u64, &str) = ("tiring-jet", 4, "tiring-ramp");
+/// Those of its eight records that are enough to find it: the search takes half the time.
+const BEYOND_RECORDS: [&str; 5] = ["step", "sq4-80", "sq2-30", "sq5-40", "sq2-60"];
 /// Friction to hold in the loop (y), about 0.8 of steady blowing.
 const TARGET: f64 = 0.7;
 /// Shortest on and off times of the valve, samples.
@@ -267,7 +269,11 @@ fn beyond_the_catalogue(
     let (hidden, seed, name) = BEYOND;
     let plan = RigPlan::draw(Family::FirstOrder, &[hidden], NoiseKind::White, &[], seed)?;
     let folder = data.join(name);
-    plan.build()?.data.save(&folder)?;
+    let mut recorded = plan.build()?.data;
+    recorded
+        .records
+        .retain(|record| BEYOND_RECORDS.contains(&record.name.as_str()));
+    recorded.save(&folder)?;
     let set = DataSet::load(&folder)?;
     let given = steps::identify(&set, &IdentifyRequest::default(), &console.show_progress())?.model;
     given.save(&out.join("beyond-before.toml"))?;

@@ -7,6 +7,7 @@ use super::{Answer, Beside, StepError, check_period, level};
 use crate::data::DataSet;
 use crate::indicators::{Scores, score};
 use crate::model::Model;
+use crate::preparation::Preparation;
 use crate::residual::{Failures, where_it_fails};
 
 /// A model compared with records. Serialises to the keys of `compare --json`.
@@ -62,8 +63,16 @@ pub fn compare_several(
     models: &[(String, &Model)],
     set: &DataSet,
 ) -> Result<SideBySide, (String, StepError)> {
+    let of_first = |error| {
+        (
+            models.first().map(|(n, _)| n.clone()).unwrap_or_default(),
+            error,
+        )
+    };
+    let ready = prepared(set).map_err(of_first)?;
     let each = models.iter().map(|(name, model)| {
-        let comparison = compare(model, set).map_err(|error| (name.clone(), error))?;
+        let comparison = check_period(model, set).and_then(|()| compared_on(model, &ready));
+        let comparison = comparison.map_err(|error| (name.clone(), error))?;
         Ok(NamedComparison {
             model: name.clone(),
             parameters: model.values().iter().filter(|value| **value != 0.0).count(),
@@ -103,7 +112,11 @@ fn places<S: Serializer>(failures: &Failures, serializer: S) -> Result<S::Ok, S:
 /// [`StepError`] when the sampling periods differ, a channel is missing or a run diverges.
 pub fn compare(model: &Model, set: &DataSet) -> Result<Comparison, StepError> {
     check_period(model, set)?;
-    let prepared = prepared(set)?;
+    compared_on(model, &prepared(set)?)
+}
+
+/// [`compare`] on records that are made ready.
+fn compared_on(model: &Model, prepared: &Preparation) -> Result<Comparison, StepError> {
     let records = model.targets(&prepared.records);
     let (scores, runs) = score(model, &records)?;
     let failures = where_it_fails(model, &records)?;

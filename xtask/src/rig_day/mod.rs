@@ -32,6 +32,8 @@ struct Form {
     repeats: &'static str,
     /// Additional options of the calibration.
     calibration: &'static [&'static str],
+    /// Additional options of the law's design.
+    design: &'static [&'static str],
     /// Duration of `watch`, and of its learning phase, s.
     watched: [&'static str; 2],
     /// Largest allowed ratio of the second law's rms error to the first's.
@@ -44,6 +46,7 @@ const LONG: Form = Form {
     period: "10",
     repeats: "8",
     calibration: &[],
+    design: &[],
     watched: ["90", "30"],
     law: 1.0,
 };
@@ -62,6 +65,17 @@ const BRIEF: Form = Form {
     period: "5",
     repeats: "5",
     calibration: &["--steady", "1.5", "--pulses", "8"],
+    // Trials of half the length, and a coarse robustness margin.
+    design: &[
+        "--set",
+        "design.trial=6000",
+        "--set",
+        "design.trial-from=2000",
+        "--set",
+        "design.margin-rays=4",
+        "--set",
+        "design.margin-bisections=2",
+    ],
     watched: ["20", "8"],
     // Most of the error is the ripple of the shortest pulses, which so short a watch measures to 3 %.
     law: 1.06,
@@ -99,6 +113,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         period,
         repeats,
         calibration,
+        design,
         watched: [seconds, learn],
         law,
     } = form;
@@ -233,21 +248,27 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         let controlled = format!("{name}.toml");
         day.fit(
             &format!("design {name}"),
-            &words(&[
-                "design",
-                model,
-                "set",
-                "-o",
-                &controlled,
-                "--target",
-                TARGET,
-                "--min-on",
-                "0.02",
-                "--min-off",
-                "0.02",
-                "--rig",
-                "rig.toml",
-            ]),
+            &words(
+                &[
+                    &[
+                        "design",
+                        model,
+                        "set",
+                        "-o",
+                        &controlled,
+                        "--target",
+                        TARGET,
+                        "--min-on",
+                        "0.02",
+                        "--min-off",
+                        "0.02",
+                        "--rig",
+                        "rig.toml",
+                    ],
+                    *design,
+                ]
+                .concat(),
+            ),
         )?;
         day.firmware(name, Some(&controlled), true)?;
         let log = format!("service-{name}");
